@@ -1,0 +1,52 @@
+"""High-precision experiments on rotating rigid bodies: one TOML file is one experiment.
+
+``load`` reads a config, ``run`` integrates it and saves a run folder, ``open_run`` opens one again.
+Importing this package loads neither the integrator nor any plotting or file library.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
+    from rigidsim.plan import plan
+    from rigidsim.run import Run, open_run, run
+    from rigidsim.scene.reading import Experiment, load, parse
+
+__version__ = "0.1.0"
+
+_PLACES = {
+    "ConfigError": "rigidsim.errors",
+    "RigidsimError": "rigidsim.errors",
+    "RunFolderError": "rigidsim.errors",
+    "Experiment": "rigidsim.scene.reading",
+    "load": "rigidsim.scene.reading",
+    "parse": "rigidsim.scene.reading",
+    "Run": "rigidsim.run",
+    "open_run": "rigidsim.run",
+    "run": "rigidsim.run",
+    "plan": "rigidsim.plan",
+}
+
+__all__ = [
+    "ConfigError",
+    "Experiment",
+    "RigidsimError",
+    "Run",
+    "RunFolderError",
+    "load",
+    "open_run",
+    "parse",
+    "plan",
+    "run",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'rigidsim' has no attribute {name!r}")
+    value = getattr(import_module(_PLACES[name]), name)
+    globals()[name] = value  # over the submodule of the same name, which the import has put there
+    return value

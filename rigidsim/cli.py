@@ -1,0 +1,201 @@
+"""The command line. Each command loads what it needs, when it needs it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rigidsim.errors import RigidsimError
+
+app = typer.Typer(
+    name="rigidsim",
+    help="High-precision experiments on rotating rigid bodies: one TOML file is one experiment.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="TOML file of the experiment.")]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder (runs/NAME) or its dataset.h5.")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value, such as time.end=10; repeatable."),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+def _user_errors(command: Callable[..., None]) -> Callable[..., None]:
+    """Errors meant for the user end the program with their message and exit code, without a traceback."""
+
+    @wraps(command)
+    def guarded(*args: Any, **kwargs: Any) -> None:
+        try:
+            command(*args, **kwargs)
+        except RigidsimError as error:
+            print(f"rigidsim: {error}", file=sys.stderr)
+            raise typer.Exit(error.exit_code) from None
+        except KeyboardInterrupt:
+            print("rigidsim: interrupted", file=sys.stderr)
+            raise typer.Exit(130) from None
+        except BrokenPipeError:
+            sys.stderr.close()
+            raise typer.Exit(0) from None
+
+    return guarded
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from rigidsim import __version__
+
+        print(f"rigidsim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """High-precision experiments on rotating rigid bodies: one TOML file is one experiment."""
+
+
+@app.command()
+@_user_errors
+def run(
+    configs: Annotated[list[Path], typer.Argument(metavar="CONFIG...", help="TOML files.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")] = Path(
+        "runs"
+    ),
+    overrides: SetOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Integrate, write the run folder, print a summary of invariants and cost.
+
+    Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
+    """
+    from rigidsim import progress, report
+    from rigidsim.run import run as run_experiment
+    from rigidsim.scene.reading import load
+
+    experiments = [load(path, overrides=overrides or []) for path in configs]
+    worst = 0
+    for experiment in experiments:
+        with progress.observer() as observer:
+            result = run_experiment(experiment, out=out, force=force, observer=observer)
+        if as_json:
+            print(json.dumps(result.summary))
+        else:
+            report.print_summary(result.summary, str(result.folder.path))
+        code = int(result.summary["exit_code"])
+        if code:
+            print(f"rigidsim: {result.summary['message']}", file=sys.stderr)
+        worst = worst or code
+        if code == 130:
+            break
+    raise typer.Exit(worst)
+
+
+@app.command()
+@_user_errors
+def plan(config: ConfigPath, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+    """Explain what would be integrated and why; predict steps, time, memory and file sizes.
+
+    Example: rigidsim plan configs/heavy_top_nutating.toml
+    """
+    from rigidsim import report
+    from rigidsim.plan import plan as make_plan
+    from rigidsim.scene.reading import load
+
+    made = make_plan(load(config, overrides=overrides or []))
+    if as_json:
+        print(json.dumps(made))
+    else:
+        report.print_plan(made)
+
+
+@app.command()
+@_user_errors
+def info(run_path: RunPath, as_json: JsonOption = False) -> None:
+    """Summary of a run, finished or partial.
+
+    Example: rigidsim info runs/intermediate_axis
+    """
+    from rigidsim import report
+    from rigidsim.run import open_run
+
+    opened = open_run(run_path)
+    if as_json:
+        print(json.dumps(opened.summary))
+        return
+    report.print_summary(opened.summary, str(opened.folder.path))
+    with opened.dataset as dataset:
+        report.console().print(
+            f"dataset  {dataset.sizes['time']:,} samples of {', '.join(map(str, dataset.data_vars))}"
+        )
+
+
+@app.command()
+@_user_errors
+def view(
+    run_path: RunPath,
+    web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
+) -> None:
+    """Open the timeline in the rerun viewer (drawn first, where the run has none).
+
+    Example: rigidsim view runs/intermediate_axis
+    """
+    from rigidsim.look.viewer import open_viewer
+    from rigidsim.run import open_run
+
+    opened = open_run(run_path)
+    timeline = opened.folder.timeline
+    if not timeline.exists():
+        from rigidsim.look.timeline import write_timeline
+
+        with opened.dataset as dataset:
+            write_timeline(dataset, timeline)
+    raise typer.Exit(open_viewer(timeline, web=web))
+
+
+@app.command()
+@_user_errors
+def plot(
+    run_path: RunPath,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="PNG or SVG; default figure.png in the run.")
+    ] = None,
+) -> None:
+    """Draw the standard figures: rates, angles, drifts, polhode.
+
+    Example: rigidsim plot runs/intermediate_axis --out flip.svg
+    """
+    from rigidsim.look.figures import save_figure
+    from rigidsim.run import open_run
+
+    opened = open_run(run_path)
+    target = out or opened.folder.path / "figure.png"
+    with opened.dataset as dataset:
+        save_figure(dataset, target)
+    print(target)
+
+
+@app.command()
+@_user_errors
+def schema() -> None:
+    """Print the config's JSON schema, for editors.
+
+    Example: rigidsim schema > rigidsim.schema.json
+    """
+    from rigidsim.scene.schema import Config
+
+    print(json.dumps(Config.model_json_schema(), indent=2))

@@ -1,0 +1,61 @@
+"""Errors that a user can act on: what was given, what is allowed, what to do, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class RigidsimError(Exception):
+    """Base of all errors that rigidsim raises on purpose; its text is meant for the user."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong in a config.
+
+    Attributes:
+        where: the key as it stands in the file, for instance ``[body] principal_moments[1]``.
+        what: what was given, what is allowed and what to do.
+    """
+
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}"
+
+
+class ConfigError(RigidsimError):
+    """The config can't be run; ``problems`` lists everything that is wrong, not only the first."""
+
+    def __init__(self, problems: Sequence[Problem] | Problem, source: str | None = None) -> None:
+        self.problems = [problems] if isinstance(problems, Problem) else list(problems)
+        self.source = source
+        super().__init__(self._text())
+
+    def _text(self) -> str:
+        lines = "\n".join(f"  {problem}" for problem in self.problems)
+        head = f"{self.source}: " if self.source else ""
+        count = len(self.problems)
+        return f"{head}{count} problem{'s' if count > 1 else ''} in the config\n{lines}"
+
+    def at(self, source: str) -> ConfigError:
+        """The same error, naming the file that it came from."""
+        return ConfigError(self.problems, source)
+
+
+class RunFolderError(RigidsimError):
+    """A run folder is missing, unfinished, damaged, in use, or would be overwritten."""
+
+
+class StoppedError(RigidsimError):
+    """A run could not go on; the last good state was kept."""
+
+    exit_code = 3
+
+
+class MissingExtraError(RigidsimError):
+    """A command needs an optional dependency that isn't installed."""

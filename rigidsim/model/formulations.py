@@ -1,0 +1,137 @@
+"""How an attitude is carried: quaternion, Euler angles of any sequence, or rotation matrix.
+
+Each formulation yields its states, their kinematic equations for given body rates, R, and the quaternion
+and Euler angles as expressions of its states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model import rotations
+from rigidsim.model.rotations import Expression, ExpressionMatrix
+from rigidsim.scene import attitude
+from rigidsim.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class AttitudeStates:
+    """The part of a system of equations that carries the attitude.
+
+    Attributes:
+        kind: name of the formulation.
+        names: of the states.
+        derivatives: right-hand sides, in the same order.
+        initial: mpf values.
+        matrix: R, body to space, as expressions of the states.
+        quaternion: [w, x, y, z] as expressions; see ``quaternion_sign``.
+        quaternion_sign: how it is made continuous: "state" (it is one), "winding" (it changes sign with
+            each full turn of an angle) or "nearest" (the sign nearest to the sample before).
+        angles: positions within ``names`` of states that are angles and grow without bound.
+        defect: name, long name and expression of what should stay constant by construction, or None.
+        singular_factor: expression that vanishes where the formulation breaks down, or None.
+    """
+
+    kind: str
+    names: list[str]
+    derivatives: list[Expression]
+    initial: list[Any]
+    matrix: ExpressionMatrix
+    quaternion: list[Expression]
+    quaternion_sign: str
+    angles: tuple[int, ...] = ()
+    defect: tuple[str, str, Expression] | None = None
+    singular_factor: Expression | None = None
+    sequence: str = field(default="")
+
+
+def quaternion_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
+    """Four states, no singularity: q' = q (0, w) / 2 (the cheapest and the default)."""
+    names = ["qw", "qx", "qy", "qz"]
+    q = list(hy.make_vars(*names))
+    w, x, y, z = q
+    p, r, s = rates
+    derivatives = [
+        0.5 * (-x * p - y * r - z * s),
+        0.5 * (w * p + y * s - z * r),
+        0.5 * (w * r + z * p - x * s),
+        0.5 * (w * s + x * r - y * p),
+    ]
+    squared = hy.sum([c * c for c in q])
+    return AttitudeStates(
+        "quaternion",
+        names,
+        derivatives,
+        list(scene.quaternion),
+        rotations.quaternion_matrix(q),
+        q,
+        "state",
+        defect=("quaternion_norm", "norm of the attitude quaternion", hy.sqrt(squared)),
+    )
+
+
+def euler_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
+    """Three angles of the scene's sequence; singular where the middle one makes the outer axes parallel."""
+    sequence = scene.config.integrator.euler_sequence
+    names = ["phi", "theta", "psi"]
+    angles = list(hy.make_vars(*names))
+    derivatives, factor = rotations.euler_rates(sequence, angles, rates)
+    initial = scene.euler_angles
+    if initial is None:
+        matrix = attitude.rotation_matrix(scene.quaternion)
+        initial = attitude.euler_from_matrix(scene.context, matrix, sequence)
+    return AttitudeStates(
+        "euler_angles",
+        names,
+        derivatives,
+        list(initial),
+        rotations.euler_matrix(sequence, angles),
+        rotations.quaternion_from_euler(sequence, angles),
+        "winding",
+        angles=(0, 1, 2),
+        singular_factor=factor,
+        sequence=sequence,
+    )
+
+
+def matrix_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
+    """Nine direction cosines: R' = R [w]x."""
+    names = [f"r{i}{j}" for i in "123" for j in "123"]
+    flat = list(hy.make_vars(*names))
+    r = [flat[0:3], flat[3:6], flat[6:9]]
+    p, q, s = rates
+    derivatives = []
+    for a, b, c in r:
+        derivatives += [b * s - c * q, c * p - a * s, a * q - b * p]
+    defects = []
+    for i in range(3):
+        for j in range(i + 1):
+            product = hy.sum([r[i][m] * r[j][m] for m in range(3)])
+            difference = product - 1.0 if i == j else product
+            defects.append(difference * difference)
+    initial = attitude.rotation_matrix(scene.quaternion)
+    return AttitudeStates(
+        "rotation_matrix",
+        names,
+        derivatives,
+        [x for row in initial for x in row],
+        r,
+        rotations.quaternion_from_matrix(r),
+        "nearest",
+        defect=(
+            "orthogonality_defect",
+            "deviation of R from orthogonality, root of the summed squares of R R^T - 1",
+            hy.sqrt(hy.sum(defects)),
+        ),
+    )
+
+
+BUILDERS = {
+    "quaternion": quaternion_states,
+    "euler_angles": euler_states,
+    "rotation_matrix": matrix_states,
+}
+"""The formulations that carry an attitude, by the name that a config uses."""

@@ -1,0 +1,221 @@
+"""The registry of observables and invariants: everything that can be recorded, as expressions.
+
+A new observable is one ``Observable`` in ``OBSERVABLES``; a new invariant one whose ``conserved`` says when
+and why it holds. It then shows up in the dataset, the summary, the plots and the timeline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model import rotations
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotations import Expression
+from rigidsim.model.scaling import potential_amplitude
+from rigidsim.scene.context import apply, norm
+
+Dims = tuple[str, ...]
+BODY: Dims = ("body_axis",)
+SPACE: Dims = ("space_axis",)
+
+
+def _never(_: Mechanics) -> str | None:
+    return None
+
+
+@dataclass(frozen=True)
+class Observable:
+    """One recordable quantity.
+
+    Attributes:
+        name: of the dataset's variable.
+        dims: beside time.
+        units: SI.
+        long_name: for readers.
+        frame: "body axes", "space axes" or "".
+        needs: what must be carried: "attitude", "vertical", "flight", "gravity", "symmetry".
+        expressions: components as expressions of the state, in internal units.
+        exponents: binary exponents of the components' internal units.
+        conserved: why it is an invariant of this scene, or None where it isn't.
+        drift_scale: scale of its drift in SI (mpf), with a name for it.
+    """
+
+    name: str
+    dims: Dims
+    units: str
+    long_name: str
+    expressions: Callable[[Mechanics], list[Expression]]
+    exponents: Callable[[Mechanics], list[int]]
+    frame: str = ""
+    needs: tuple[str, ...] = ()
+    conserved: Callable[[Mechanics], str | None] = _never
+    drift_scale: Callable[[Mechanics], tuple[Any, str]] | None = None
+
+
+def momentum_scale(m: Mechanics) -> tuple[Any, str]:
+    """abs(L) at the start, or the momentum that gravity can build up, if that is larger."""
+    scene, context = m.scene, m.scene.context
+    initial = norm(context, apply(scene.body.inertia, scene.angular_velocity))
+    swing = context.sqrt(2 * max(scene.body.principal_moments) * potential_amplitude(scene))
+    if initial == 0 and swing == 0:
+        return context.one, "1 kg m^2/s (the body is at rest)"
+    if initial >= swing:
+        return initial, "initial norm of the angular momentum"
+    return swing, "sqrt(2 I_max M g l), the angular momentum of a swing"
+
+
+def rotational_scale(m: Mechanics) -> tuple[Any, str]:
+    """Initial rotational energy, plus M g l about a fixed point."""
+    scene, context = m.scene, m.scene.context
+    kinetic = sum(
+        (w * x for w, x in zip(scene.angular_velocity, apply(scene.body.inertia, scene.angular_velocity), strict=True)),
+        context.zero,
+    ) / 2  # fmt: skip
+    amplitude = potential_amplitude(scene)
+    if kinetic + amplitude == 0:
+        return context.one, "1 J (the body is at rest)"
+    name = "initial rotational energy" + (" plus M g l" if amplitude else "")
+    return kinetic + amplitude, name
+
+
+def energy_scale(m: Mechanics) -> tuple[Any, str]:
+    """As ``rotational_scale``, plus the largest kinetic energy of the flight."""
+    scene, context = m.scene, m.scene.context
+    scale, name = rotational_scale(m)
+    if m.velocity is None or scene.velocity is None:
+        return scale, name
+    pull = norm(context, scene.gravity) if scene.gravity else context.zero
+    swiftest = norm(context, scene.velocity) + pull * (scene.end - scene.start)
+    flight = scene.body.mass * swiftest**2 / 2
+    return (scale + flight if flight else scale), name + " plus the flight's largest kinetic energy"
+
+
+def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
+    """M abs(v) at the start."""
+    assert m.scene.velocity is not None
+    value = m.scene.body.mass * norm(m.scene.context, m.scene.velocity)
+    return (value, "initial norm of the linear momentum") if value else (m.scene.context.one, "1 kg m/s")
+
+
+def _torque_free(m: Mechanics) -> str | None:
+    return "no torque acts" if m.numbers.arm is None else None
+
+
+def _axial(m: Mechanics) -> str | None:
+    if m.symmetry_direction is None:
+        return None
+    return "the body is symmetric about its axis" + (
+        ", on which the centre of mass lies" if m.numbers.arm is not None else ", and no torque acts"
+    )
+
+
+def _linear(m: Mechanics) -> str | None:
+    return "no force acts" if m.scene.gravity is None and m.velocity is not None else None
+
+
+def _along_symmetry_axis(m: Mechanics) -> list[Expression]:
+    assert m.symmetry_direction is not None
+    pairs = zip(m.symmetry_direction, m.momentum_body, strict=True)
+    return [hy.sum([m.number(e) * x for e, x in pairs if e != 0])]
+
+
+def _along_vertical(m: Mechanics) -> list[Expression]:
+    assert m.vertical is not None
+    return [hy.sum([v * x for v, x in zip(m.vertical, m.momentum_body, strict=True)])]
+
+
+def _euler(m: Mechanics) -> list[Expression]:
+    assert m.attitude is not None
+    sequence = m.scene.config.integrator.euler_sequence
+    if m.attitude.kind == "euler_angles":
+        return list(hy.make_vars(*m.attitude.names))
+    return rotations.euler_from_matrix(sequence, m.matrix)
+
+
+def _linear_momentum(m: Mechanics) -> list[Expression]:
+    assert m.velocity is not None
+    context = m.scene.context
+    mass = context.ldexp(m.scene.body.mass, -_mass_exponent(m))
+    return [m.number(mass) * v for v in m.velocity]
+
+
+def _mass_exponent(m: Mechanics) -> int:
+    return int(m.scene.context.frexp(m.scene.body.mass)[1])
+
+
+def _same(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mechanics], list[int]]:
+    return lambda m: [exponent(m)] * count
+
+
+_MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
+_ENERGY = lambda m: m.scaling.energy  # noqa: E731
+_NONE = lambda m: 0  # noqa: E731
+
+OBSERVABLES: tuple[Observable, ...] = (
+    Observable(
+        "angular_velocity", BODY, "rad s-1", "angular velocity", lambda m: m.rate_states,
+        lambda m: [e - m.scaling.time for e in m.scaling.rates], "body axes",
+    ),
+    Observable(
+        "quaternion", ("quaternion_component",), "1", "attitude quaternion, body to space",
+        lambda m: m.carried(m.attitude).quaternion, _same(_NONE, 4), "body to space", ("attitude",),
+    ),
+    Observable(
+        "euler_angles", ("euler_angle",), "rad", "intrinsic Euler angles, body to space",
+        _euler, _same(_NONE, 3), "body to space", ("attitude",),
+    ),
+    Observable(
+        "rotation_matrix", ("space_axis", "body_axis"), "1", "rotation matrix, body to space",
+        lambda m: [x for row in m.matrix for x in row], _same(_NONE, 9), "body to space", ("attitude",),
+    ),
+    Observable(
+        "angular_momentum", SPACE, "kg m2 s-1", "angular momentum",
+        lambda m: m.momentum_space, _same(_MOMENTUM, 3), "space axes", ("attitude",),
+        _torque_free, momentum_scale,
+    ),
+    Observable(
+        "angular_momentum_norm", (), "kg m2 s-1", "norm of the angular momentum",
+        lambda m: [hy.sqrt(hy.sum([x * x for x in m.momentum_body]))], _same(_MOMENTUM, 1), "", (),
+        _torque_free, momentum_scale,
+    ),
+    Observable(
+        "angular_momentum_vertical", (), "kg m2 s-1", "angular momentum along the vertical",
+        _along_vertical, _same(_MOMENTUM, 1), "space axes", ("vertical",),
+        lambda m: "gravity has no torque about the vertical", momentum_scale,
+    ),
+    Observable(
+        "angular_momentum_axial", (), "kg m2 s-1", "angular momentum along the symmetry axis",
+        _along_symmetry_axis, _same(_MOMENTUM, 1), "body axes", ("symmetry",), _axial, momentum_scale,
+    ),
+    Observable(
+        "energy", (), "J", "total energy", lambda m: [m.energy], _same(_ENERGY, 1), "", ("energy",),
+        lambda m: "all loads have a potential that doesn't depend on time", energy_scale,
+    ),
+    Observable(
+        "rotational_energy", (), "J", "kinetic energy of rotation",
+        lambda m: [m.rotational_energy], _same(_ENERGY, 1), "", (),
+        lambda m: _torque_free(m) if m.scene.free_flight else None, rotational_scale,
+    ),
+    Observable(
+        "potential_energy", (), "J", "potential energy",
+        lambda m: [m.potential_energy], _same(_ENERGY, 1), "", ("gravity",),
+    ),
+    Observable(
+        "position", SPACE, "m", "position of the centre of mass", lambda m: m.carried(m.position),
+        _same(lambda m: m.scaling.length, 3), "space axes", ("flight",),
+    ),
+    Observable(
+        "velocity", SPACE, "m s-1", "velocity of the centre of mass", lambda m: m.carried(m.velocity),
+        _same(lambda m: m.scaling.speed, 3), "space axes", ("flight",),
+    ),
+    Observable(
+        "linear_momentum", SPACE, "kg m s-1", "linear momentum", _linear_momentum,
+        _same(lambda m: m.scaling.speed + _mass_exponent(m), 3), "space axes", ("flight",),
+        _linear, linear_momentum_scale,
+    ),
+)  # fmt: skip
+"""All observables, in the order in which a dataset holds them."""

@@ -1,0 +1,140 @@
+"""Powers of two that bring every quantity of a scene to O(1), so that scaling never rounds anything.
+
+heyoka's step control is absolute below 1 and relative to the largest component above: a spin of 1e-6 rad/s
+or a component dwarfed by another loses digits. Inside the equations time, inertia, length and each state
+are therefore measured in a unit of their own; results are multiplied back, exactly, when they are stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.scene.context import dot, norm
+from rigidsim.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Binary exponents of the internal units, in SI: one internal unit of time is ``2**time`` seconds.
+
+    Attributes:
+        time, inertia, length, speed: exponents.
+        rates: exponents of the three body rates relative to ``1 / (unit of time)``.
+    """
+
+    time: int
+    inertia: int
+    rates: tuple[int, int, int]
+    length: int = 0
+    speed: int = 0
+
+    @property
+    def momentum(self) -> int:
+        """Exponent of the internal unit of angular momentum, kg m^2/s."""
+        return self.inertia - self.time
+
+    @property
+    def energy(self) -> int:
+        """Exponent of the internal unit of energy, J."""
+        return self.inertia - 2 * self.time
+
+
+# A component is given a unit of its own only where it stays this far below the fastest one: within this
+# factor step control sees it well enough, and the equations stay the simplest.
+_WORTH_A_UNIT = 4  # bits
+
+
+def exponent(context: Any, value: Any) -> int:
+    """The smallest e with abs(value) <= 2**e; zero for zero."""
+    if value == 0:
+        return 0
+    mantissa, power = context.frexp(abs(value))
+    return int(power) - 1 if mantissa == 0.5 else int(power)
+
+
+def largest_rates(scene: Scene) -> list[Any]:
+    """Upper bounds of the absolute body rates over the whole motion, from energy and momentum, rad/s.
+
+    For a free body in principal axes both 2 E I_max - L^2 and L^2 - 2 E I_min are sums of squares with
+    positive weights, so each bounds two rates and the smaller bound is sharp (Landau & Lifshitz, section 37).
+    Otherwise |w_i| <= sqrt(2 E_kin,max (I^-1)_ii).
+    """
+    context, body, w = scene.context, scene.body, scene.angular_velocity
+    inertia, inverse = body.inertia, scene.inverse_inertia
+    zero = context.zero
+    weighted = [dot(row, w) for row in inertia]
+    twice_energy = dot(w, weighted)
+    swing = 4 * potential_amplitude(scene)
+    diagonal = all(inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j)
+    axis = symmetry_axis(scene) if diagonal else None
+    if swing != 0 and axis is not None:
+        # the spin about the symmetry axis is constant and its energy can't feed the other two
+        transverse = sum((inertia[i][i] * w[i] ** 2 for i in range(3) if i != axis), zero) + swing
+        return [abs(w[i]) if i == axis else context.sqrt(transverse * inverse[i][i]) for i in range(3)]
+    bounds = [context.sqrt((twice_energy + swing) * inverse[i][i]) for i in range(3)]
+    if swing != 0 or not diagonal:
+        return bounds
+    moments = [inertia[i][i] for i in range(3)]
+    for extreme in (max(moments), min(moments)):
+        invariant = sum((m * abs(extreme - m) * x**2 for m, x in zip(moments, w, strict=True)), zero)
+        for i, moment in enumerate(moments):
+            if moment != extreme and moment != 0:
+                bound = context.sqrt(invariant / (moment * abs(extreme - moment)))
+                bounds[i] = min(bounds[i], bound)
+    return bounds
+
+
+def symmetry_axis(scene: Scene) -> int | None:
+    """The body axis about which a diagonal tensor is symmetric and on which the centre of mass lies."""
+    inertia, center = scene.body.inertia, scene.body.center_of_mass
+    for axis in range(3):
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        if inertia[j][j] == inertia[k][k] and center[j] == 0 and center[k] == 0:
+            return axis
+    return None
+
+
+def potential_amplitude(scene: Scene) -> Any:
+    """M g l: half the range of the potential energy about a fixed point, J; zero without a torque."""
+    arm = scene.torque_arm
+    if arm is None:
+        return scene.context.zero
+    assert scene.gravity is not None
+    return norm(scene.context, arm) * norm(scene.context, scene.gravity)
+
+
+def choose_scaling(scene: Scene) -> Scaling:
+    """The units of a scene; a pure function of it, so that the same config gives the same bits."""
+    context, body = scene.context, scene.body
+    bounds = largest_rates(scene)
+    fastest = max(bounds)
+    potential = potential_amplitude(scene)
+    if potential != 0:
+        smallest = min(m for m in body.principal_moments if m != 0)
+        axial = symmetry_axis(scene)
+        swing_moment = smallest
+        if axial is not None and all(body.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j):
+            swing_moment = body.inertia[(axial + 1) % 3][(axial + 1) % 3]
+        fastest = max(fastest, context.sqrt(potential / swing_moment))
+    time = -exponent(context, fastest)
+    if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
+        time = exponent(context, scene.end - scene.start)
+    rates = []
+    for bound in bounds:
+        relative = exponent(context, bound) + time if bound != 0 else 0
+        rates.append(relative if abs(relative) >= _WORTH_A_UNIT else 0)
+    length = speed = 0
+    if scene.position is not None and scene.velocity is not None:
+        horizon = scene.end - scene.start
+        pull = norm(context, scene.gravity) if scene.gravity is not None else context.zero
+        swiftest = norm(context, scene.velocity) + pull * horizon
+        farthest = norm(context, scene.position) + swiftest * horizon
+        length, speed = exponent(context, farthest), exponent(context, swiftest)
+    return Scaling(
+        time=time,
+        inertia=exponent(context, max(body.principal_moments)),
+        rates=(rates[0], rates[1], rates[2]),
+        length=length,
+        speed=speed,
+    )

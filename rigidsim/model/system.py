@@ -1,0 +1,320 @@
+"""The system of equations that a scene needs, ready to be integrated and recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.dynamics import (
+    Number,
+    flight_equations,
+    rate_equations,
+    scaled_numbers,
+    vertical_equations,
+    vertical_from_attitude,
+)
+from rigidsim.model.formulations import BUILDERS, AttitudeStates
+from rigidsim.model.mechanics import Mechanics, in_common_unit
+from rigidsim.model.observables import OBSERVABLES, Observable
+from rigidsim.model.requirements import Requirements, choose_requirements
+from rigidsim.model.rotations import Expression
+from rigidsim.model.scaling import Scaling, choose_scaling, largest_rates
+from rigidsim.scene import attitude as numeric
+from rigidsim.scene.context import apply, transpose
+from rigidsim.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One variable of the dataset.
+
+    Attributes:
+        first, count: its components among ``System.outputs``.
+        exponents: binary exponents that bring the components to SI.
+        continuity: how samples are joined: "" (as they are), "winding" (angles that are states),
+            "unwrap" (angles found from another formulation), "parity" and "nearest" (quaternion signs).
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    frame: str
+    first: int
+    count: int
+    exponents: list[int]
+    invariant: bool
+    continuity: str = ""
+
+
+@dataclass(frozen=True)
+class Invariant:
+    """Something that the motion conserves, and the drift that is watched.
+
+    Attributes:
+        why: the reason that it is conserved.
+        expressions: its components, in internal units.
+        exponents: binary exponents of the components' units.
+        scale: what drifts are relative to, SI (mpf); ``scale_name`` says what it is.
+        numerical: True for what only the numerical representation has (a quaternion's norm).
+    """
+
+    name: str
+    why: str
+    units: str
+    long_name: str
+    expressions: list[Expression]
+    exponents: list[int]
+    scale: Any
+    scale_name: str
+    numerical: bool = False
+
+
+@dataclass(frozen=True)
+class System:
+    """First-order equations with scaled states, and everything recorded as expressions of them.
+
+    Attributes:
+        states: names.
+        equations: (variable, right-hand side).
+        initial: mpf, in internal units.
+        state_exponents: binary exponents that bring the states to SI.
+        outputs: components of all recorded variables, then one drift per invariant, whose initial values
+            are ``par[..]`` in the order of the invariants' components.
+        angle_states: positions of states that are angles growing without bound.
+        singular_factor: expression that vanishes where the formulation breaks down, or None.
+        rate_bound: upper bound of the absolute angular velocity, rad/s (mpf).
+    """
+
+    scene: Scene
+    scaling: Scaling
+    requirements: Requirements
+    states: list[str]
+    equations: list[tuple[Expression, Expression]]
+    initial: list[Any]
+    state_exponents: list[int]
+    recorded: list[Recorded]
+    invariants: list[Invariant]
+    outputs: list[Expression]
+    angle_states: tuple[int, ...]
+    singular_factor: Expression | None
+    sequence: str
+    rate_bound: Any
+
+    @property
+    def variables(self) -> list[Expression]:
+        """The states as heyoka variables."""
+        return [variable for variable, _ in self.equations]
+
+
+def build_system(scene: Scene, number: Number) -> System:
+    """Build the least system that the scene needs.
+
+    Args:
+        number: from an mpf to the working precision's scalar, rounded once.
+
+    Raises:
+        ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.
+    """
+    requirements = choose_requirements(scene)
+    scaling = choose_scaling(scene)
+    numbers = scaled_numbers(scene, scaling)
+    context = scene.context
+
+    rate_names = ["wx", "wy", "wz"]
+    rate_states = list(hy.make_vars(*rate_names))
+    rates = in_common_unit(rate_states, numbers.rate_units, number)
+    attitude: AttitudeStates | None = None
+    vertical: list[Expression] | None = None
+    names, derivatives = list(rate_names), []
+    initial = [
+        context.ldexp(w, scaling.time - e) for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
+    ]
+    exponents = [e - scaling.time for e in scaling.rates]
+    if requirements.formulation != "rates":
+        attitude = BUILDERS[requirements.formulation](scene, rates)
+        names += attitude.names
+        derivatives += attitude.derivatives
+        initial += attitude.initial
+        exponents += [0] * len(attitude.names)
+        if numbers.arm is not None:
+            vertical = vertical_from_attitude(attitude.matrix, numbers, number)
+    elif requirements.vertical:
+        vertical_names = ["gx", "gy", "gz"]
+        vertical = list(hy.make_vars(*vertical_names))
+        names += vertical_names
+        derivatives += vertical_equations(vertical, rates)
+        assert numbers.up is not None
+        initial += apply(transpose(numeric.rotation_matrix(scene.quaternion)), numbers.up)
+        exponents += [0] * 3
+    position = velocity = None
+    if requirements.flight:
+        assert scene.position is not None and scene.velocity is not None
+        position = list(hy.make_vars("x", "y", "z"))
+        velocity = list(hy.make_vars("vx", "vy", "vz"))
+        names += ["x", "y", "z", "vx", "vy", "vz"]
+        x_rates, v_rates = flight_equations(scene, scaling, velocity, number)
+        derivatives += x_rates + v_rates
+        initial += [context.ldexp(x, -scaling.length) for x in scene.position]
+        initial += [context.ldexp(v, -scaling.speed) for v in scene.velocity]
+        exponents += [scaling.length] * 3 + [scaling.speed] * 3
+    derivatives = rate_equations(scene, numbers, rate_states, vertical, number) + derivatives
+    mechanics = Mechanics(
+        scene, scaling, numbers, rate_states, attitude, vertical, position, velocity, number
+    )
+    _refuse_singular_start(scene, attitude)
+    recorded, outputs = _recorded(mechanics, requirements)
+    invariants = _invariants(mechanics)
+    outputs += _drifts(invariants, context, number)
+    angle_states = tuple(3 + i for i in attitude.angles) if attitude else ()
+    return System(
+        scene=scene,
+        scaling=scaling,
+        requirements=requirements,
+        states=names,
+        equations=list(zip(hy.make_vars(*names), derivatives, strict=True)),
+        initial=initial,
+        state_exponents=exponents,
+        recorded=recorded,
+        invariants=invariants,
+        outputs=outputs,
+        angle_states=angle_states,
+        singular_factor=attitude.singular_factor if attitude else None,
+        sequence=scene.config.integrator.euler_sequence,
+        rate_bound=max(largest_rates(scene)),
+    )
+
+
+def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
+    if attitude is None or attitude.singular_factor is None:
+        return
+    context = scene.context
+    middle = attitude.initial[1]
+    proper = attitude.sequence[0] == attitude.sequence[2]
+    factor = abs(context.sin(middle) if proper else context.cos(middle))
+    if factor < context.mpf(2) ** -20:
+        raise ConfigError(
+            Problem(
+                "[integrator] formulation",
+                f"the motion starts {context.nstr(factor, 3)} rad from the singularity of the sequence "
+                f"{attitude.sequence} (middle angle {context.nstr(middle, 8)} rad), where Euler angles have "
+                'no rates; choose formulation = "quaternion" or another euler_sequence',
+            )
+        )
+
+
+def _available(m: Mechanics, observable: Observable) -> bool:
+    has = {
+        "attitude": m.attitude is not None,
+        "vertical": m.vertical is not None and m.numbers.arm is not None,
+        "flight": m.velocity is not None,
+        "gravity": m.potential_energy is not None,
+        "symmetry": m.symmetry_direction is not None,
+        "energy": m.velocity is not None or not m.scene.free_flight,
+    }
+    return all(has[need] for need in observable.needs)
+
+
+def _by_default(m: Mechanics, observable: Observable) -> bool:
+    if observable.name == "euler_angles":
+        return m.attitude is not None and m.attitude.kind == "euler_angles"
+    if observable.name == "rotation_matrix":
+        return m.attitude is not None and m.attitude.kind == "rotation_matrix"
+    if observable.name == "rotational_energy":
+        return m.scene.free_flight
+    return True
+
+
+def _recorded(m: Mechanics, requirements: Requirements) -> tuple[list[Recorded], list[Expression]]:
+    recorded: list[Recorded] = []
+    outputs: list[Expression] = []
+    asked = requirements.record
+    for observable in OBSERVABLES:
+        wanted = _by_default(m, observable) if asked is None else observable.name in asked
+        if not wanted:
+            continue
+        if not _available(m, observable):
+            if asked is not None:
+                raise ConfigError(
+                    Problem(
+                        "[output] record", f'given "{observable.name}": this scene has none; leave it out'
+                    )
+                )
+            continue
+        components = observable.expressions(m)
+        continuity = ""
+        if m.attitude is not None and observable.name == "euler_angles":
+            continuity = "winding" if m.attitude.kind == "euler_angles" else "unwrap"
+        if m.attitude is not None and observable.name == "quaternion":
+            signs = {"state": "", "winding": "parity", "nearest": "nearest"}
+            continuity = signs[m.attitude.quaternion_sign]
+        recorded.append(
+            Recorded(
+                observable.name,
+                observable.dims,
+                observable.units,
+                observable.long_name,
+                observable.frame,
+                len(outputs),
+                len(components),
+                observable.exponents(m),
+                observable.conserved(m) is not None,
+                continuity,
+            )
+        )
+        outputs += components
+    return recorded, outputs
+
+
+def _invariants(m: Mechanics) -> list[Invariant]:
+    found = []
+    for observable in OBSERVABLES:
+        if observable.drift_scale is None or not _available(m, observable):
+            continue
+        why = observable.conserved(m)
+        if why is None:
+            continue
+        scale, scale_name = observable.drift_scale(m)
+        found.append(
+            Invariant(
+                observable.name,
+                why,
+                observable.units,
+                observable.long_name,
+                observable.expressions(m),
+                observable.exponents(m),
+                scale,
+                scale_name,
+            )
+        )
+    if m.attitude is not None and m.attitude.defect is not None:
+        name, long_name, expression = m.attitude.defect
+        found.append(
+            Invariant(name, "it is so by definition", "1", long_name, [expression], [0],
+                      m.scene.context.one, "1", numerical=True)
+        )  # fmt: skip
+    if m.attitude is None and m.vertical is not None:
+        norm = hy.sqrt(hy.sum([v * v for v in m.vertical]))
+        found.append(
+            Invariant("vertical_norm", "it is so by definition", "1", "norm of the vertical in body axes",
+                      [norm], [0], m.scene.context.one, "1", numerical=True)
+        )  # fmt: skip
+    return found
+
+
+def _drifts(invariants: list[Invariant], context: Any, number: Number) -> list[Expression]:
+    """(value - initial) / scale; of a vector, the norm of the difference over the scale."""
+    drifts = []
+    first = 0
+    for invariant in invariants:
+        inverse = number(context.ldexp(1, invariant.exponents[0]) / invariant.scale)
+        differences = [x - hy.par[first + n] for n, x in enumerate(invariant.expressions)]
+        first += len(differences)
+        if len(differences) == 1:
+            drifts.append(inverse * differences[0])
+        else:
+            drifts.append(inverse * hy.sqrt(hy.sum([d * d for d in differences])))
+    return drifts

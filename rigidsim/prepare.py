@@ -1,0 +1,98 @@
+"""From an experiment to everything that its integration needs, with all that can be refused refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.system import System, build_system
+from rigidsim.scene.reading import Experiment
+from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.store.variables import Variable, time_variable
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene with its equations, before the first step.
+
+    Attributes:
+        tolerance: scalar of the precision, or None for its epsilon.
+    """
+
+    experiment: Experiment
+    scene: Scene
+    precision: Precision
+    system: System
+    clock: SampleClock
+    tolerance: Any | None
+
+    @property
+    def effective_tolerance(self) -> float:
+        """What the step control works with."""
+        epsilon = float(self.precision.epsilon)
+        return epsilon if self.tolerance is None else float(self.tolerance)
+
+    def variables(self) -> list[Variable]:
+        """The dataset's variables, time first, then what is recorded, then each invariant's drift."""
+        parts = self.precision.part_count
+        result = [time_variable(parts)]
+        for recorded in self.system.recorded:
+            attributes: dict[str, Any] = {
+                "units": recorded.units,
+                "long_name": recorded.long_name,
+            }
+            if recorded.frame:
+                attributes["frame"] = recorded.frame
+            if recorded.name == "euler_angles":
+                attributes["euler_sequence"] = self.system.sequence
+                attributes["convention"] = "intrinsic"
+            if recorded.invariant:
+                attributes["invariant"] = 1
+            result.append(Variable(recorded.name, recorded.dims, attributes, parts))
+        for invariant in self.system.invariants:
+            result.append(
+                Variable(
+                    f"{invariant.name}_drift",
+                    (),
+                    {
+                        "units": "1",
+                        "long_name": f"drift of the {invariant.long_name}",
+                        "scale": float(invariant.scale),
+                        "scale_units": invariant.units,
+                        "scale_name": invariant.scale_name,
+                        "definition": "norm of (value - initial) / scale"
+                        if len(invariant.expressions) > 1
+                        else "(value - initial) / scale",
+                        "drift_of": invariant.name,
+                    },
+                )
+            )
+        return result
+
+
+def prepare(experiment: Experiment) -> Prepared:
+    """Work out an experiment up to its equations.
+
+    Raises:
+        ConfigError: with what was given, what is allowed and where.
+    """
+    scene = build_scene(experiment)
+    try:
+        precision = precision_of(scene.config.integrator.precision)
+        asked = scene.config.integrator.tolerance
+        tolerance = None if isinstance(asked, str) else precision.number(asked.at(scene.context))
+        system = build_system(scene, precision.number)
+        clock = SampleClock(scene.samples, precision, system.scaling.time)
+    except ConfigError as error:
+        raise error.at(experiment.source) from None
+    except OverflowError as error:
+        problem = Problem(
+            "config",
+            f"the scene's numbers span more than {scene.config.integrator.precision} precision can hold "
+            f"({error}); choose a higher precision or check the units",
+        )
+        raise ConfigError(problem, experiment.source) from None
+    return Prepared(experiment, scene, precision, system, clock, tolerance)

@@ -1,0 +1,141 @@
+"""What the commands print on stdout: tables for people, never needed by the library."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+
+def console() -> Console:
+    """stdout; wide enough for whole words when piped."""
+    width = None if sys.stdout.isatty() else max(110, shutil.get_terminal_size().columns)
+    return Console(width=width, highlight=False)
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for name in columns:
+        right = name in ("largest drift", "final drift", "bound", "value", "initial")
+        table.add_column(name, justify="right" if right else "left", overflow="fold")
+    return table
+
+
+def duration(seconds: float) -> str:
+    """A time span in the unit that suits it."""
+    for unit, size in (("yr", 31557600.0), ("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.3g} {unit}"
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
+def size(count: float) -> str:
+    """Bytes in a readable unit."""
+    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= factor:
+            return f"{count / factor:.3g} {unit}"
+    return f"{count:.0f} B"
+
+
+def _number(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, list):
+        return "[" + ", ".join(f"{x:.6g}" for x in value) + "]"
+    return f"{value:.9g}"
+
+
+def _drift(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2e}"
+
+
+def print_summary(summary: dict[str, Any], folder: str, out: Console | None = None) -> None:
+    """The table at the end of ``run`` and of ``info``."""
+    out = out or console()
+    status = summary["status"]
+    color = "green" if status == "finished" else "yellow"
+    head = Text.assemble((str(summary.get("name", "")), "bold"), "  ", (status, f"bold {color}"))
+    out.print(head)
+    if summary.get("description"):
+        out.print(Text(str(summary["description"]), style="dim"))
+    if status != "finished":
+        out.print(Text(str(summary.get("message", ""))))
+    if "cost" not in summary:
+        out.print(f"folder   {folder}")
+        return
+    cost, accuracy = summary["cost"], summary["accuracy"]
+    seconds = sum(v for k, v in cost["seconds"].items() if k != "engine")
+    out.print(
+        f"model    {summary['formulation']}, {len(summary['states'])} states "
+        f"({' '.join(summary['states'])}), {summary['precision']} precision, "
+        f"tolerance {summary['tolerance']:.3g}"
+    )
+    out.print(
+        f"cost     {cost['steps']:,} steps, {summary['samples']:,} of {summary['samples_planned']:,} samples, "
+        f"{duration(seconds)} wall ({duration(cost['seconds']['engine'])} integrating), "
+        f"{duration(cost['cpu_seconds'])} CPU"
+    )
+    table = _table("invariant", "initial", "largest drift", "final drift", "bound", "relative to")
+    for name, row in summary["invariants"].items():
+        largest = row["largest_drift"]
+        style = "red" if largest is not None and not largest <= row["bound"] else ""
+        table.add_row(
+            name,
+            _number(row["initial"]),
+            Text(_drift(largest), style=style),
+            _drift(row["final_drift"]),
+            _drift(row["bound"]),
+            row["scale_name"],
+        )
+    out.print(table)
+    estimate = accuracy["estimated_attitude_error"]
+    if estimate is not None:
+        out.print(
+            f"attitude about {estimate:.1e} rad uncertain at the end by the round-off law; {accuracy['how']}"
+        )
+    for warning in summary["warnings"]:
+        out.print(Text(f"warning  {warning}", style="bold red"))
+    out.print(f"folder   {folder}")
+
+
+def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
+    """What ``rigidsim plan`` says."""
+    out = out or console()
+    out.print(Text.assemble((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}"))
+    table = _table("states", "carried because")
+    for row in plan["reasons"]:
+        table.add_row(row["states"], row["why"])
+    for row in plan["left_out"]:
+        table.add_row(Text(f"no {row['what']}", style="dim"), Text(row["why"], style="dim"))
+    out.print(table)
+    out.print(Text("equations (internal units: powers of two)", style="bold"))
+    for line in plan["equations"]:
+        out.print(Text("  " + line), soft_wrap=True)
+    table = _table("invariant", "holds because")
+    for row in plan["invariants"]:
+        table.add_row(row["name"], row["why"])
+    out.print(table)
+    out.print(f"recorded   {', '.join(plan['recorded'])}", soft_wrap=True)
+    predicted, pilot = plan["predicted"], plan["pilot"]
+    out.print(
+        f"precision  {plan['precision']}, tolerance {plan['tolerance']:.3g}, Taylor order "
+        f"{plan['taylor_order']}"
+    )
+    out.print(
+        f"predicted  {predicted['steps']:.3g} steps of about {duration(pilot['step'])} "
+        f"(pilot of {pilot['steps']:.0f}), {duration(predicted['total_seconds'])}, "
+        f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
+        f"timeline {size(predicted['timeline_bytes'])}"
+    )
+    error = predicted["attitude_error_rad"]
+    if error is not None and math.isfinite(error):
+        out.print(f"accuracy   attitude about {error:.1e} rad uncertain at the end, by the round-off law")

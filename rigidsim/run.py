@@ -1,0 +1,359 @@
+"""Running an experiment: integrate, save segments, complete the dataset, draw the timeline, summarise."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import rigidsim.summary as summaries
+from rigidsim.errors import RunFolderError
+from rigidsim.prepare import Prepared, prepare
+from rigidsim.scene.reading import Experiment, load
+from rigidsim.solve.advance import Advance, Progress
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.status import Status
+from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.winding import Winding
+from rigidsim.store import netcdf, provenance, segments
+from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.variables import SCHEMA_VERSION
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Observer:
+    """Is told how a run goes; the command line draws a progress bar with it. Does nothing by itself."""
+
+    def started(self, prepared: Prepared, folder: Path) -> None:
+        """The equations are compiled; integration begins."""
+
+    def progressed(self, progress: Progress) -> None:
+        """Called between chunks, at most some tens of times per second."""
+
+    def phase(self, name: str) -> None:
+        """A new phase begins: "integrate", "dataset", "timeline"."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run on disk, finished or partial.
+
+    Attributes:
+        folder: its files.
+        summary: the content of ``summary.json``.
+    """
+
+    folder: RunFolder
+    summary: dict[str, Any]
+
+    @property
+    def status(self) -> str:
+        """How it ended; ``"finished"`` is the only complete one."""
+        return str(self.summary["status"])
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """The dataset, read lazily; of an unfinished run what its segments hold.
+
+        Raises:
+            RunFolderError: nothing was saved.
+        """
+        import xarray
+
+        if self.folder.dataset.exists():
+            return xarray.open_dataset(self.folder.dataset, engine="h5netcdf")
+        paths = segments.segment_paths(self.folder.segments)
+        if not paths:
+            raise RunFolderError(f"{self.folder.path}: nothing was saved")
+        pieces = [xarray.open_dataset(path, engine="h5netcdf") for path in paths]
+        joined = xarray.concat(
+            pieces, dim="time", data_vars="minimal", coords="minimal", compat="override", join="override"
+        )
+        joined.attrs = dict(pieces[0].attrs, status=self.status)
+        return joined
+
+
+def open_run(path: str | Path) -> Run:
+    """Open a run folder, or the dataset in one, finished or partial.
+
+    Raises:
+        RunFolderError: no run there, or a damaged summary.
+    """
+    folder = find_run(path)
+    return Run(folder, folder.read_summary())
+
+
+class _Interruption:
+    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Handle the signals inside the block (in the main thread, the only one that gets them)."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def note(*_: object) -> None:
+            self.requested = True
+
+        before = {s: signal.signal(s, note) for s in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+class _Guards:
+    """The checks between chunks."""
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        watch: summaries.Watch,
+        interruption: _Interruption,
+        observer: Observer,
+        writer: segments.SegmentWriter,
+    ) -> None:
+        limits = prepared.scene.config.limits
+        self._wall = None if limits.wall_time is None else float(limits.wall_time)
+        self._drift = None if limits.max_drift is None else float(limits.max_drift)
+        self._steps = limits.max_steps
+        self._watch = watch
+        self._interruption = interruption
+        self._observer = observer
+        self._writer = writer
+        self._started = time.monotonic()
+        self._reported = 0.0
+
+    def __call__(self, progress: Progress) -> Status | None:
+        now = time.monotonic()
+        if now - self._reported > 0.05:
+            self._reported = now
+            self._observer.progressed(progress)
+            self._writer.flush_if_due()
+        if self._interruption.requested:
+            return Status.INTERRUPTED
+        if self._wall is not None and now - self._started > self._wall:
+            return Status.WALL_TIME
+        if self._steps is not None and progress.steps >= self._steps:
+            return Status.MAX_STEPS
+        if self._drift is not None and max(self._watch.largest.values(), default=0.0) > self._drift:
+            return Status.MAX_DRIFT
+        return None
+
+
+def run(
+    experiment: Experiment | str | Path,
+    *,
+    out: str | Path = "runs",
+    force: bool = False,
+    observer: Observer | None = None,
+) -> Run:
+    """Run an experiment and save it in ``out/<name>/``.
+
+    Args:
+        experiment: from ``load``, or the path of a config.
+        out: folder of the run folders.
+        force: replace a run of the same name.
+        observer: is told how it goes.
+
+    Returns:
+        The run; its ``status`` tells how it ended, which need not be "finished".
+
+    Raises:
+        ConfigError: the config can't be run; nothing was written.
+        RunFolderError: the run folder is in use or can't be written.
+    """
+    if not isinstance(experiment, Experiment):
+        experiment = load(experiment)
+    observer = observer or Observer()
+    clock = _Phases()
+    cpu = time.process_time()
+    prepared = prepare(experiment)
+    folder = RunFolder(Path(out) / prepared.scene.name)
+    folder.create(force=force)
+    netcdf.write_bytes(folder.config, experiment.text.encode())
+
+    winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
+    evaluator = Evaluator(prepared.system, prepared.precision, winding)
+    attributes = _attributes(prepared, stepper)
+    variables = prepared.variables()
+    writer = segments.SegmentWriter(folder.segments, variables, attributes)
+    watch = summaries.Watch()
+    interruption = _Interruption()
+
+    def sink(_: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
+        recorded: dict[str, list[np.ndarray]] = evaluator.evaluate(states, turns)
+        exponent = prepared.clock.exponent
+        recorded["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]
+        for invariant in prepared.system.invariants:
+            watch.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
+        factors = evaluator.singular_factors(states)
+        if factors is not None:
+            watch.see_singular(factors, recorded["time"][0])
+        writer.add(recorded)
+
+    clock.next("build")
+    observer.started(prepared, folder.path)
+    observer.phase("integrate")
+    guards = _Guards(prepared, watch, interruption, observer, writer)
+    advance = Advance(stepper, prepared.clock, winding, prepared.precision, sink, guards)
+    with interruption.watching():
+        progress = advance.run()
+        writer.flush()
+    clock.next("integrate_and_record")
+    observer.progressed(progress)
+    message = _message(prepared, progress, evaluator)
+    summary = summaries.summarise(
+        prepared,
+        progress,
+        watch,
+        message=message,
+        initial=evaluator.initial_invariants(),
+        seconds=clock.seconds,
+        cpu_seconds=time.process_time() - cpu,
+        provenance=_plain(attributes),
+    )
+    summary["cost"]["seconds"]["engine"] = progress.integration_seconds
+    try:
+        if progress.status.final:
+            _complete(prepared, folder, variables, attributes, summary, clock, observer)
+    except KeyboardInterrupt:
+        summary |= {"status": Status.INTERRUPTED.value, "exit_code": Status.INTERRUPTED.exit_code}
+        summary["message"] = "interrupted after the integration; all samples are saved as segments"
+    summary["cost"]["cpu_seconds"] = time.process_time() - cpu
+    folder.write_summary(summary)
+    return Run(folder, json.loads(json.dumps(summary, default=str)))
+
+
+def _complete(
+    prepared: Prepared,
+    folder: RunFolder,
+    variables: list[Any],
+    attributes: dict[str, Any],
+    summary: dict[str, Any],
+    clock: _Phases,
+    observer: Observer,
+) -> None:
+    """Segments to dataset, dataset to timeline."""
+    observer.phase("dataset")
+    cost = summary["cost"]
+    final = {
+        **attributes,
+        "status": summary["status"],
+        "status_message": summary["message"],
+        "warnings": "\n".join(summary["warnings"]),
+        "steps": cost["steps"],
+        "wall_seconds": sum(clock.seconds.values()),
+        "cpu_seconds": cost["cpu_seconds"],
+        "finished_at": provenance.now(),
+    }
+    segments.merge(folder.segments, folder.dataset, variables, final)
+    segments.remove(folder.segments)
+    summary["dataset_sha256"] = provenance.file_sha256(folder.dataset)
+    clock.next("dataset")
+    output = prepared.scene.config.output
+    if output.timeline and summary["samples"]:
+        observer.phase("timeline")
+        from rigidsim.look.timeline import write_timeline
+
+        with Run(folder, summary).dataset as dataset:
+            write_timeline(dataset, folder.timeline, rows=output.timeline_rows)
+        clock.next("timeline")
+
+
+class _Phases:
+    """Wall seconds of each phase."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._since = time.perf_counter()
+
+    def next(self, finished: str) -> None:
+        """Close the phase that was under way."""
+        now = time.perf_counter()
+        self.seconds[finished] = now - self._since
+        self._since = now
+
+
+def _attributes(prepared: Prepared, stepper: Stepper) -> dict[str, Any]:
+    """Root attributes of segments and dataset."""
+    scene, system = prepared.scene, prepared.system
+    found = {f"version_{k}": v for k, v in provenance.versions().items()}
+    found |= {f"code_{k}": v for k, v in provenance.code_target(stepper.integrator).items()}
+    return {
+        "Conventions": "CF-1.11",
+        "title": scene.name,
+        "comment": scene.description,
+        "source": "rigidsim",
+        "schema_version": SCHEMA_VERSION,
+        "status": Status.RUNNING.value,
+        "config": prepared.experiment.text,
+        "config_sha256": prepared.experiment.sha256,
+        "formulation": system.requirements.formulation,
+        "euler_sequence": system.sequence,
+        "states": " ".join(system.states),
+        "precision": prepared.precision.name,
+        "precision_bits": prepared.precision.bits,
+        "tolerance": prepared.effective_tolerance,
+        "integrator": "heyoka Taylor, natural steps, dense output",
+        "taylor_order": int(stepper.integrator.order),
+        "compact_mode": int(prepared.precision.compact),
+        "high_accuracy": 0,
+        "batch_size": 1,
+        "unit_exponents": json.dumps(
+            {"time": system.scaling.time, "inertia": system.scaling.inertia,
+             "states": system.state_exponents}
+        ),
+        "principal_moments": json.dumps([float(m) for m in scene.body.principal_moments]),
+        "principal_axes": json.dumps([[float(x) for x in a] for a in scene.body.principal_axes]),
+        "inertia_tensor": json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
+        "body_source": scene.body.source,
+        "drawing": json.dumps(scene.body.drawing),
+        "cpu_model": provenance.cpu_model(),
+        "started_at": provenance.now(),
+        **found,
+    }  # fmt: skip
+
+
+def _plain(attributes: dict[str, Any]) -> dict[str, Any]:
+    """The attributes that the summary repeats."""
+    kept = ("config_sha256", "cpu_model", "started_at", "taylor_order", "compact_mode", "unit_exponents")
+    return {k: v for k, v in attributes.items() if k in kept or k.startswith(("version_", "code_"))}
+
+
+def _message(prepared: Prepared, progress: Progress, evaluator: Evaluator) -> str:
+    """The status in words, with where and why for a run that broke down."""
+    text = progress.status.message
+    if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
+        return text
+    text += f"; last good state at {progress.time:.9g} s after {progress.steps} steps"
+    if progress.last_good is None:
+        return text
+    state = np.array([progress.last_good.state], dtype=prepared.precision.scalar)
+    factors = evaluator.singular_factors(state)
+    if factors is not None:
+        middle = float(state[0][prepared.system.states.index("theta")])
+        text += (
+            f"; the middle Euler angle theta = {middle:.9g} rad came within {abs(float(factors[0])):.2g} of "
+            f'the singularity of {prepared.system.sequence}: choose formulation = "quaternion"'
+        )
+    else:
+        largest = int(np.argmax(np.abs(state[0].astype(np.float64))))
+        text += f"; the largest state there was {prepared.system.states[largest]}"
+    return text

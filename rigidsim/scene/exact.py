@@ -1,0 +1,140 @@
+"""Numbers exactly as they were written: a rational times a power of pi, rounded only when a run asks.
+
+A config's ``0.1`` is one tenth until the moment that it becomes a coefficient or an initial value at the
+working precision; binary floating point never stands in between.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+from rigidsim.scene import units
+
+# Far past any physical quantity and any precision, and still quick to expand into integers.
+_LARGEST_DECIMAL_EXPONENT = 5000
+_LONGEST_TEXT = 5000
+
+_DECIMAL = r"[+-]?(?:\d+(?:_\d+)*\.?(?:\d+(?:_\d+)*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER_AND_UNIT = re.compile(
+    rf"\s*(?P<number>{_DECIMAL})"
+    rf"(?:\s*(?P<operator>/|\^|\*\*)\s*(?P<operand>{_DECIMAL}))?(?:\s*\*\s*|\s*)(?P<unit>[^\d\s.].*)?"
+)
+
+
+@dataclass(frozen=True)
+class ExactNumber:
+    """``rational * pi**pi_power``, in SI units (angles in radians)."""
+
+    rational: Fraction
+    pi_power: int = 0
+
+    def at(self, context: Any) -> Any:
+        """The value as an ``mpf`` of the given mpmath context, correct to its precision."""
+        value = context.mpf(self.rational.numerator) / context.mpf(self.rational.denominator)
+        return value * context.pi**self.pi_power if self.pi_power else value
+
+    def __float__(self) -> float:
+        import mpmath
+
+        context = mpmath.MPContext()
+        context.prec = 120
+        return float(self.at(context))
+
+    @property
+    def sign(self) -> int:
+        """-1, 0 or 1."""
+        return (self.rational > 0) - (self.rational < 0)
+
+
+ZERO = ExactNumber(Fraction(0))
+
+
+def _rational(text: str | Decimal) -> Fraction:
+    number = text if isinstance(text, Decimal) else Decimal(text.replace("_", ""))
+    if not number.is_finite():
+        raise ValueError("given a number that is not finite; allowed are finite numbers")
+    exponent = number.as_tuple().exponent
+    assert isinstance(exponent, int)
+    if number and abs(exponent) + len(number.as_tuple().digits) > _LARGEST_DECIMAL_EXPONENT:
+        raise ValueError(
+            f"given a number with an exponent or digits beyond {_LARGEST_DECIMAL_EXPONENT}; "
+            "write fewer digits or a larger unit"
+        )
+    return Fraction(number)
+
+
+def _power(base: Fraction, exponent: Fraction) -> Fraction:
+    if exponent.denominator != 1 or abs(exponent) > _LARGEST_DECIMAL_EXPONENT:
+        raise ValueError("a power in a number needs a whole exponent of moderate size, as in 2^-20")
+    if base == 0 or max(abs(base.numerator), base.denominator) > 10**6:
+        raise ValueError("a power in a number needs a base between 1e-6 and 1e6, as in 2^-20")
+    return base ** int(exponent)
+
+
+def _from_text(text: str, unit: str) -> ExactNumber:
+    if len(text) > _LONGEST_TEXT:
+        raise ValueError(f"given {len(text)} characters; a number has at most {_LONGEST_TEXT}")
+    match = _NUMBER_AND_UNIT.fullmatch(text)
+    if match is None:
+        raise ValueError(
+            f'given "{text[:60]}"; a number, or a string of a number and a unit, is allowed, '
+            f'such as 1.5, "1/3", "2^-20" or {example(unit)}'
+        )
+    rational = _rational(match["number"])
+    if match["operand"] is not None:
+        operand = _rational(match["operand"])
+        if match["operator"] != "/":
+            rational = _power(rational, operand)
+        elif operand == 0:
+            raise ValueError(f'given "{text[:60]}", a division by zero')
+        else:
+            rational = rational / operand
+    if match["unit"] is None:
+        return ExactNumber(rational)
+    try:
+        factor, pi_power = units.conversion(match["unit"].strip(), unit)
+    except units.UnitError as error:
+        raise ValueError(f'given "{text[:60]}": {error}; write for instance {example(unit)}') from None
+    return ExactNumber(rational * factor, pi_power)
+
+
+def example(unit: str) -> str:
+    """An example of a number with a unit, for messages."""
+    return {
+        "1": '"1"',
+        "rad": '"23.44 deg"',
+        "rad/s": '"7.292115e-5 rad/s"',
+        "s": '"430 day"',
+        "kg m^2": '"8.008e37 kg m^2"',
+        "kg": '"5.97e24 kg"',
+        "m": '"6378 km"',
+    }.get(unit, f'"1.5 {unit}"')
+
+
+def parse_number(value: Any, unit: str) -> ExactNumber:
+    """A TOML value as an exact number in the SI unit ``unit``.
+
+    Args:
+        value: an int, a Decimal (as the TOML reader yields), a float (taken as the exact binary number
+            that it is), an ExactNumber, or a string such as ``"430 day"``, ``"1/3"`` or ``"2^-20 kg m^2"``.
+        unit: SI unit that bare numbers have and that a written unit must agree with; ``"1"`` for none.
+
+    Raises:
+        ValueError: not a finite number, or a unit of another dimension; the text says what is allowed.
+    """
+    if isinstance(value, ExactNumber):
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float | Decimal | str):
+        kind = {"bool": "true/false", "list": "an array", "dict": "a table"}.get(
+            type(value).__name__, type(value).__name__
+        )
+        raise ValueError(f"given {kind}; a number is allowed, in {unit}, or {example(unit)}")
+    if isinstance(value, str):
+        return _from_text(value, unit)
+    if isinstance(value, float) and value - value != 0.0:
+        raise ValueError(f"given {value}; finite numbers are allowed")
+    return ExactNumber(_rational(value) if isinstance(value, Decimal) else Fraction(value))

@@ -1,0 +1,149 @@
+"""Turns what the schema validator reports into messages that name the key and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from rigidsim.errors import ConfigError, Problem
+
+_LATER: dict[tuple[str, ...], str] = {
+    ("parameters",): "named constants belong to expression loads, which this version doesn't have yet",
+    ("events",): "events are not in this version yet",
+    ("sweep",): "sweeps are not in this version yet",
+    ("integrator", "accuracy"): "not in this version yet; choose a precision and a tolerance",
+}
+_LATER_VALUES: dict[tuple[str, ...], tuple[Any, str]] = {
+    ("integrator", "method"): ("closed_form", "not in this version yet; allowed: taylor"),
+    ("integrator", "hold_invariants"): (True, "not in this version yet; allowed: false"),
+    ("integrator", "formulation"): ("canonical", "not in this version yet"),
+    ("output", "lyapunov"): (True, "not in this version yet; allowed: false"),
+}
+_TABLES = ("body", "initial", "loads", "time", "integrator", "output", "limits")
+
+
+def nearest(given: str, allowed: Iterable[str]) -> str:
+    """``; did you mean "x"?`` when something close is allowed, else an empty text."""
+    close = difflib.get_close_matches(str(given), list(allowed), n=1, cutoff=0.6)
+    return f'; did you mean "{close[0]}"?' if close else ""
+
+
+def place(location: Iterable[str | int]) -> str:
+    """A key's path as it is written in TOML: ``[body] principal_moments[1]``."""
+    parts = list(location)
+    if not parts:
+        return "config"
+    if parts[0] in _TABLES:
+        head, rest = f"[{parts[0]}]", parts[1:]
+        if parts[0] == "loads":
+            head = "[[loads]]"
+            if rest and isinstance(rest[0], int):
+                head, rest = f"[[loads]] number {rest[0] + 1}", rest[1:]
+    else:
+        head, rest = "", parts
+    path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in rest).lstrip(".")
+    return f"{head} {path}".strip()
+
+
+def later_features(table: Mapping[str, Any]) -> list[Problem]:
+    """Keys of the interface that this version knows of but doesn't carry out."""
+    problems = []
+    for path, why in _LATER.items():
+        if _value_at(table, path) is not None:
+            problems.append(Problem(place(path), why + "; remove the key"))
+    for path, (value, why) in _LATER_VALUES.items():
+        if _value_at(table, path) == value:
+            problems.append(Problem(place(path), f"given {value!r}: {why}"))
+    return problems
+
+
+def _value_at(table: Any, path: tuple[str, ...]) -> Any:
+    for key in path:
+        if not isinstance(table, Mapping) or key not in table:
+            return None
+        table = table[key]
+    return table
+
+
+def _model_at(model: type[BaseModel], location: tuple[str | int, ...]) -> type[BaseModel] | None:
+    """The table that holds the last key of ``location``."""
+    current: type[BaseModel] | None = model
+    for key in location[:-1]:
+        if isinstance(key, int) or current is None:
+            continue
+        field = current.model_fields.get(key)
+        current = _first_model(field.annotation) if field else None
+    return current
+
+
+def _first_model(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in get_args(annotation):
+        found = _first_model(argument)
+        if found is not None:
+            return found
+    return None
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    if isinstance(value, Mapping):
+        text = "a table"
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, str):
+        text = f'"{value}"'
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _what(model: type[BaseModel], error: Mapping[str, Any]) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    location, given = tuple(error["loc"]), error["input"]
+    if kind == "extra_forbidden":
+        table = _model_at(model, location)
+        fields = sorted(table.model_fields) if table else []
+        near = nearest(str(location[-1]), fields)
+        return f"unknown key{near}; allowed: {', '.join(fields)}"
+    if kind == "missing":
+        return "missing; it must be given"
+    if kind in ("literal_error", "union_tag_invalid"):
+        allowed = context.get("expected", context.get("expected_tags", ""))
+        allowed = allowed.replace("'", "").replace(" or ", ", ")
+        names = [part.strip() for part in allowed.split(",")]
+        return f"given {_short(given)}{nearest(str(given), names)}; allowed: {', '.join(names)}"
+    if kind in ("too_short", "too_long"):
+        low, high = context.get("min_length"), context.get("max_length")
+        count = f"at least {low}" if high is None else f"exactly {high if low is None else low}"
+        return f"given {context['actual_length']} entries; {count} are needed"
+    if kind in ("list_type", "model_type", "model_attributes_type"):
+        wanted = "an array" if kind == "list_type" else "a table"
+        return f"given {_short(given)}; {wanted} is allowed"
+    if kind in ("int_type", "int_from_float"):
+        return f"given {_short(given)}; a whole number is allowed"
+    if kind == "string_type":
+        return f"given {_short(given)}; a string is allowed"
+    if kind == "bool_type":
+        return f"given {_short(given)}; true or false is allowed"
+    if kind == "greater_than_equal":
+        return f"given {_short(given)}; at least {context['ge']} is allowed"
+    return str(error["msg"])
+
+
+def config_error(model: type[BaseModel], error: ValidationError) -> ConfigError:
+    """All that the validator found, one problem per key, in the words of ``Problem``."""
+    problems: dict[str, Problem] = {}
+    for item in error.errors(include_url=False):
+        # the alternatives of a union each report; the branch's name is no part of the user's key
+        location = tuple(
+            part
+            for part in item["loc"]
+            if not (isinstance(part, str) and ("[" in part or part in ("str", "int", "none")))
+        )
+        where = place(location)
+        problem = Problem(where, _what(model, {**item, "loc": location}))
+        problems.setdefault(where, problem)
+    return ConfigError(list(problems.values()))

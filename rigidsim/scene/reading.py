@@ -1,0 +1,149 @@
+"""From TOML text to a validated config, with every digit as it was written."""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene import messages
+from rigidsim.scene.schema import Config
+
+_LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A config as given, and its meaning.
+
+    Attributes:
+        text: the TOML text; with overrides applied it says so in comments at its end.
+        config: the validated tables.
+        source: where it came from, for messages.
+    """
+
+    text: str
+    config: Config
+    source: str
+
+    @property
+    def sha256(self) -> str:
+        """Of the TOML text."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+def _decimal(text: str) -> Decimal:
+    try:
+        return Decimal(text.replace("_", ""))
+    except InvalidOperation:  # an exponent past what Decimal itself holds
+        raise ValueError(f"the number {text[:40]} is out of range") from None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The tables of a TOML text, decimals kept as written.
+
+    Raises:
+        ConfigError: not TOML; the message has the line and column.
+    """
+    try:
+        return tomllib.loads(text, parse_float=_decimal)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(Problem("TOML", f"can't be read: {error}"), source) from None
+
+
+def _apply(table: dict[str, Any], assignment: str) -> None:
+    """One ``--set KEY=VALUE``: dotted key with optional [index], TOML value (a bare word is a string)."""
+    key, equals, value_text = assignment.partition("=")
+    where = f"--set {assignment[:60]}"
+    if not equals or not key.strip():
+        raise ConfigError(Problem(where, "write KEY=VALUE, such as time.end=10"))
+    try:
+        value = tomllib.loads(f"value = {value_text}", parse_float=_decimal)["value"]
+    except (ValueError, RecursionError):
+        value = value_text.strip()
+    steps: list[str | int] = []
+    for part in key.strip().split("."):
+        name, *indices = part.replace("]", "").split("[")
+        steps.append(name)
+        try:
+            steps.extend(int(index) for index in indices)
+        except ValueError:
+            raise ConfigError(Problem(where, f'"{part}" has an index that is no number')) from None
+    target: Any = table
+    for step, following in zip(steps, steps[1:], strict=False):
+        if isinstance(target, dict) and isinstance(step, str):
+            target = target.setdefault(step, [] if isinstance(following, int) else {})
+        elif isinstance(target, list) and isinstance(step, int) and 0 <= step < len(target):
+            target = target[step]
+        else:
+            raise ConfigError(Problem(where, f'there is nothing at "{step}" to set'))
+    last = steps[-1]
+    try:
+        if isinstance(target, list) == isinstance(last, str):
+            raise TypeError
+        target[last] = value
+    except (TypeError, IndexError):
+        raise ConfigError(Problem(where, f'there is nothing at "{last}" to set')) from None
+
+
+def parse(text: str, *, source: str = "config", overrides: Sequence[str] = ()) -> Experiment:
+    """Read a TOML text.
+
+    Args:
+        text: the config.
+        source: its name in messages.
+        overrides: ``KEY=VALUE`` texts that replace values, in order.
+
+    Raises:
+        ConfigError: with every problem found.
+    """
+    table = parse_toml(text, source)
+    try:
+        for assignment in overrides:
+            _apply(table, assignment)
+        later = messages.later_features(table)
+        if later:
+            raise ConfigError(later)
+        config = Config.model_validate(table)
+    except ValidationError as error:
+        raise messages.config_error(Config, error).at(source) from None
+    except ConfigError as error:
+        raise error.at(source) from None
+    if overrides:
+        text = text.rstrip("\n") + "\n" + "".join(f"#:set {line}\n" for line in overrides)
+    return Experiment(text, config, source)
+
+
+def load(path: str | Path, *, overrides: Sequence[str] = ()) -> Experiment:
+    """Read a config file; see ``parse``.
+
+    A text that a run wrote (``config.toml`` of a run folder) carries its overrides in ``#:set`` lines and
+    means the same again.
+
+    Raises:
+        ConfigError: no such file, not text, too large, or a bad config.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST_FILE:
+            raise ConfigError(
+                Problem("file", f"{size} bytes; a config has at most {_LARGEST_FILE}"), str(path)
+            )
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(Problem("file", f"can't be read: {error.strerror or error}"), str(path)) from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(
+            Problem("file", f"not UTF-8 text (byte {error.start}); save it as UTF-8"), str(path)
+        ) from None
+    kept = [line[6:].strip() for line in text.splitlines() if line.startswith("#:set ")]
+    body = "\n".join(line for line in text.split("\n") if not line.startswith("#:set "))
+    return parse(body, source=str(path), overrides=[*kept, *overrides])

@@ -1,0 +1,265 @@
+"""The scene: a config with every number worked out and every physical contradiction refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene import attitude, schema
+from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
+from rigidsim.scene.context import Matrix, Vector, apply, context_for, dot, transpose
+from rigidsim.scene.reading import Experiment
+
+_MOST_SAMPLES = 10**12
+
+
+@dataclass(frozen=True)
+class SampleTimes:
+    """Where samples lie, seconds: ``start + i * span / intervals``, or a list.
+
+    Attributes:
+        start, span: mpf; sample i of a grid is at ``start + i * span / intervals``.
+        intervals: of the grid; zero for a list.
+        times: the list, or None.
+        count: number of samples.
+    """
+
+    start: Any
+    span: Any
+    intervals: int
+    times: list[Any] | None
+    count: int
+
+    @property
+    def last(self) -> Any:
+        """Time of the last sample."""
+        if self.times is not None:
+            return self.times[-1]
+        return self.start + self.span * (self.count - 1) / self.intervals
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that the equations of motion depend on; numbers are mpf of ``context`` in SI units.
+
+    Attributes:
+        angular_velocity: initial, body axes, rad/s.
+        quaternion: initial, unit, body to space.
+        euler_angles: as given in ``euler_sequence`` (radians), or None where another attitude was given.
+        position, velocity: of the centre of mass, space axes; None unless the body moves freely.
+        gravity: uniform acceleration in space axes, m/s^2, or None without such a load.
+        inverse_inertia: pseudo-inverse of ``body.inertia``.
+    """
+
+    name: str
+    description: str
+    context: Any
+    body: RigidBody
+    inverse_inertia: Matrix
+    angular_velocity: Vector
+    quaternion: Vector
+    euler_angles: Vector | None
+    position: Vector | None
+    velocity: Vector | None
+    gravity: Vector | None
+    start: Any
+    end: Any
+    samples: SampleTimes
+    config: schema.Config
+
+    @property
+    def free_flight(self) -> bool:
+        """True in six degrees of freedom, False about a fixed point or in free rotation."""
+        return self.position is not None
+
+    @property
+    def torque_arm(self) -> Vector | None:
+        """Mass times centre of mass (kg m, body axes) on which gravity pulls; None without a torque."""
+        if self.gravity is None or self.free_flight or self.body.mass is None:
+            return None
+        if all(x == 0 for x in self.body.center_of_mass) or all(g == 0 for g in self.gravity):
+            return None
+        return [self.body.mass * x for x in self.body.center_of_mass]
+
+
+def build_scene(experiment: Experiment) -> Scene:
+    """Work out the scene of a config.
+
+    Raises:
+        ConfigError: something in it contradicts mechanics or another key; names the file.
+    """
+    config = experiment.config
+    context = context_for(config.integrator.precision)
+    try:
+        body = build_body(config.body, context)
+        inverse = inverse_inertia(context, body)
+        quaternion, angles = _initial_attitude(config, context)
+        gravity = _gravity(config, context)
+        position, velocity = _translation(config, body, context)
+        if gravity is not None and body.mass is None:
+            off_center = any(x != 0 for x in body.center_of_mass)
+            if position is not None or off_center:
+                raise _fail("body", "mass", "missing; uniform_gravity needs it")
+        start, end, samples = _times(config, context)
+        _check_limits(config)
+        return Scene(
+            name=config.name,
+            description=config.description,
+            context=context,
+            body=body,
+            inverse_inertia=inverse,
+            angular_velocity=_initial_rates(config, body, inverse, quaternion, context),
+            quaternion=quaternion,
+            euler_angles=angles,
+            position=position,
+            velocity=velocity,
+            gravity=gravity,
+            start=start,
+            end=end,
+            samples=samples,
+            config=config,
+        )
+    except ConfigError as error:
+        raise error.at(experiment.source) from None
+
+
+def _fail(table: str, key: str, text: str) -> ConfigError:
+    return ConfigError(Problem(f"[{table}] {key}".strip(), text))
+
+
+def _initial_attitude(config: schema.Config, context: Any) -> tuple[Vector, Vector | None]:
+    table = config.initial
+    if table.quaternion is not None and table.euler_angles is not None:
+        raise _fail("initial", "euler_angles", "given beside quaternion; only one attitude is allowed")
+    if table.euler_angles is not None:
+        angles = [x.at(context) for x in table.euler_angles]
+        sequence = config.integrator.euler_sequence
+        return attitude.quaternion_from_euler(context, angles, sequence), angles
+    if table.quaternion is None:
+        return [context.one] + [context.zero] * 3, None
+    q = [x.at(context) for x in table.quaternion]
+    if all(x == 0 for x in q):
+        raise _fail(
+            "initial", "quaternion", "given zero; [w, x, y, z] with a norm that is not zero is allowed"
+        )
+    return attitude.unit_quaternion(context, q), None
+
+
+def _initial_rates(
+    config: schema.Config, body: RigidBody, inverse: Matrix, quaternion: Vector, context: Any
+) -> Vector:
+    table = config.initial
+    if (table.angular_velocity is None) == (table.angular_momentum is None):
+        given = "neither" if table.angular_velocity is None else "both"
+        raise _fail("initial", "angular_velocity", f"given {given} of it and angular_momentum; one is needed")
+    if table.angular_velocity is not None:
+        rates = [x.at(context) for x in table.angular_velocity]
+        key = "angular_velocity"
+    else:
+        assert table.angular_momentum is not None
+        to_body = transpose(attitude.rotation_matrix(quaternion))
+        momentum = apply(to_body, [x.at(context) for x in table.angular_momentum])
+        rates = apply(inverse, momentum)
+        key = "angular_momentum"
+        for moment, axis in zip(body.principal_moments, body.principal_axes, strict=True):
+            if moment == 0 and abs(dot(axis, momentum)) > max(abs(m) for m in momentum) * 1e-14:
+                raise _fail("initial", key, "has a part along the axis that has no moment of inertia")
+    for moment, axis in zip(body.principal_moments, body.principal_axes, strict=True):
+        if moment == 0 and abs(dot(axis, rates)) > max(abs(r) for r in rates) * 1e-14:
+            raise _fail(
+                "initial",
+                key,
+                "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
+                "make that component zero",
+            )
+    return rates
+
+
+def _gravity(config: schema.Config, context: Any) -> Vector | None:
+    if not config.loads:
+        return None
+    total = [context.zero] * 3
+    for load in config.loads:
+        total = [t + a.at(context) for t, a in zip(total, load.acceleration, strict=True)]
+    return total
+
+
+def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:
+    table = config.initial
+    if table.position is None and table.velocity is None:
+        return None, None
+    if any(x != 0 for x in body.center_of_mass):
+        raise _fail(
+            "body",
+            "reference",
+            "a body with a position or velocity turns about its centre of mass, but the inertia is given "
+            "about another point; give it about the centre of mass (remove reference or center_of_mass)",
+        )
+    if body.mass is None:
+        raise _fail("body", "mass", "missing; a body with a position or velocity needs it")
+    zero = [context.zero] * 3
+    position = [x.at(context) for x in table.position] if table.position else zero
+    velocity = [x.at(context) for x in table.velocity] if table.velocity else list(zero)
+    return position, velocity
+
+
+def _times(config: schema.Config, context: Any) -> tuple[Any, Any, SampleTimes]:
+    table = config.time
+    ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
+    if len(ways) > 1:
+        raise _fail("time", ways[1], f"given beside {ways[0]}; one of samples, every, times is allowed")
+    start = table.start.at(context)
+    if table.times is not None:
+        times = [t.at(context) for t in table.times]
+        if not times:
+            raise _fail("time", "times", "given an empty list; at least one time is needed")
+        for i, (a, b) in enumerate(zip(times, times[1:], strict=False)):
+            if not a < b:
+                raise _fail(
+                    "time",
+                    f"times[{i + 1}]",
+                    f"given {context.nstr(b, 12)} after {context.nstr(a, 12)}; times must increase",
+                )
+        if times[0] < start:
+            raise _fail("time", "times[0]", f"lies before start ({context.nstr(start, 12)} s)")
+        end = table.end.at(context) if table.end is not None else times[-1]
+        if times[-1] > end:
+            raise _fail("time", "times", f"the last lies after end ({context.nstr(end, 12)} s)")
+        return start, end, SampleTimes(start, end - start, 0, times, len(times))
+    if table.end is None:
+        raise _fail("time", "end", "missing; it must be given, unless times are")
+    end = table.end.at(context)
+    if not end > start:
+        raise _fail(
+            "time",
+            "end",
+            f"given {context.nstr(end, 12)} s; after start ({context.nstr(start, 12)} s) is allowed",
+        )
+    if table.every is not None:
+        step = table.every.at(context)
+        if not step > 0:
+            raise _fail("time", "every", f"given {context.nstr(step, 12)} s; a positive time is allowed")
+        ratio = (end - start) / step
+        if ratio > _MOST_SAMPLES:
+            raise _fail(
+                "time", "every", f"asks for {context.nstr(ratio, 3)} samples; at most 1e12 are allowed"
+            )
+        # an end on the grid is a sample, also where the quotient was rounded just below a whole number
+        intervals = int(context.floor(ratio + context.mpf(2) ** (60 - context.prec)))
+        if intervals == 0:
+            raise _fail("time", "every", "longer than the whole run; at most end - start is allowed")
+        return start, end, SampleTimes(start, step * intervals, intervals, None, intervals + 1)
+    count = table.samples if table.samples is not None else 1001
+    if not 2 <= count <= _MOST_SAMPLES:
+        raise _fail(
+            "time", "samples", f"given {count}; 2 to 1e12 are allowed (the first at start, the last at end)"
+        )
+    return start, end, SampleTimes(start, end - start, count - 1, None, count)
+
+
+def _check_limits(config: schema.Config) -> None:
+    for key in ("wall_time", "max_drift"):
+        value = getattr(config.limits, key)
+        if value is not None and value.sign <= 0:
+            raise _fail("limits", key, f"given {float(value):g}; a positive number is allowed")

@@ -1,0 +1,279 @@
+"""The config's schema: what may stand in the TOML file, table by table (the interface's section 1).
+
+Only shapes and single values are checked here; what needs mechanics (triangle inequality, a spin about an
+axis without inertia, ...) is checked where the scene is built.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    WithJsonSchema,
+    field_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.shapes import SHAPES
+
+LARGEST_DIGITS = 1000
+PRECISION_NAMES = ("single", "double", "extended", "quadruple")
+FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix")
+RECORDABLE = (
+    "angular_velocity",
+    "quaternion",
+    "euler_angles",
+    "rotation_matrix",
+    "angular_momentum",
+    "angular_momentum_norm",
+    "energy",
+    "potential_energy",
+    "rotational_energy",
+    "angular_momentum_vertical",
+    "angular_momentum_axial",
+    "position",
+    "velocity",
+    "linear_momentum",
+)
+EULER_SEQUENCES = tuple(
+    first + second + third
+    for first in "xyz"
+    for second in "xyz"
+    for third in "xyz"
+    if first != second != third
+)
+
+
+def _refuse(text: str) -> PydanticCustomError:
+    return PydanticCustomError("rigidsim", "{text}", {"text": text})
+
+
+def quantity(unit: str) -> Any:
+    """The annotated type of a number in the SI unit ``unit`` (see ``parse_number``)."""
+
+    def validate(value: Any) -> ExactNumber:
+        try:
+            return parse_number(value, unit)
+        except ValueError as error:
+            raise _refuse(str(error)) from None
+
+    shown = {"anyOf": [{"type": "number"}, {"type": "string"}], "description": f"number, in {unit}"}
+    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(shown)]
+
+
+T = TypeVar("T")
+Triple = Annotated[list[T], Field(min_length=3, max_length=3)]
+"""A vector of three."""
+
+if TYPE_CHECKING:
+    Dimensionless = Metre = Kilogram = Second = Moment = Rate = Angle = Momentum = Speed = Acceleration = (
+        ExactNumber
+    )
+else:
+    Dimensionless = quantity("1")
+    Metre = quantity("m")
+    Kilogram = quantity("kg")
+    Second = quantity("s")
+    Moment = quantity("kg m^2")
+    Rate = quantity("rad/s")
+    Angle = quantity("rad")
+    Momentum = quantity("kg m^2/s")
+    Speed = quantity("m/s")
+    Acceleration = quantity("m/s^2")
+
+
+class Table(BaseModel):
+    """A TOML table: unknown keys are errors, values never change after reading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+
+class PointMass(Table):
+    """One particle of a body of particles."""
+
+    mass: Kilogram
+    position: Triple[Metre]
+
+
+class Solid(Table):
+    """A homogeneous shape with its dimensions (metres); which ones it takes is in ``shapes.SHAPES``."""
+
+    shape: StrictStr | None = None
+    size: list[Metre] | None = None
+    semi_axes: list[Metre] | None = None
+    radius: Metre | None = None
+    height: Metre | None = None
+    length: Metre | None = None
+    major_radius: Metre | None = None
+    minor_radius: Metre | None = None
+    inner_radius: Metre | None = None
+    outer_radius: Metre | None = None
+
+    @field_validator("shape")
+    @classmethod
+    def _known_shape(cls, value: str | None) -> str | None:
+        if value is not None and value not in SHAPES:
+            from rigidsim.scene.messages import nearest
+
+            raise _refuse(f'given "{value}"{nearest(value, SHAPES)}; allowed: {", ".join(SHAPES)}')
+        return value
+
+
+class Part(Solid):
+    """One solid of a composite body, placed by its centre of mass."""
+
+    shape: StrictStr
+    mass: Kilogram
+    position: Triple[Metre] = Field(default_factory=lambda: [ZERO] * 3)
+    quaternion: Annotated[list[Dimensionless], Field(min_length=4, max_length=4)] | None = None
+
+
+class Body(Solid):
+    """``[body]``: exactly one source of inertia, and what loads need beside it."""
+
+    principal_moments: Triple[Moment] | None = None
+    inertia_tensor: Triple[Triple[Moment]] | None = None
+    points: Annotated[list[PointMass], Field(min_length=1)] | None = None
+    parts: Annotated[list[Part], Field(min_length=1)] | None = None
+    preset: StrictStr | None = None
+    mass: Kilogram | None = None
+    center_of_mass: Triple[Metre] | None = None
+    reference: StrictStr | Triple[Metre] | None = None
+
+
+class Initial(Table):
+    """``[initial]``: the state at ``time.start``."""
+
+    angular_velocity: Triple[Rate] | None = None
+    angular_momentum: Triple[Momentum] | None = None
+    quaternion: Annotated[list[Dimensionless], Field(min_length=4, max_length=4)] | None = None
+    euler_angles: Triple[Angle] | None = None
+    position: Triple[Metre] | None = None
+    velocity: Triple[Speed] | None = None
+
+
+class UniformGravity(Table):
+    """A uniform field; a torque about the fixed point, or free fall in a scene with a position."""
+
+    kind: Literal["uniform_gravity"]
+    acceleration: Triple[Acceleration] = Field(
+        default_factory=lambda: [parse_number(a, "m/s^2") for a in ("0", "0", "-9.80665")]
+    )
+
+
+class Time(Table):
+    """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``."""
+
+    start: Second = ZERO
+    end: Second | None = None
+    samples: StrictInt | None = None
+    every: Second | None = None
+    times: list[Second] | None = None
+
+
+class Integrator(Table):
+    """``[integrator]``: how accurately, and in which variables."""
+
+    precision: Literal["single", "double", "extended", "quadruple"] | StrictInt = "double"
+    tolerance: Literal["auto"] | Dimensionless = "auto"
+    formulation: Literal["auto", "rates", "quaternion", "euler_angles", "rotation_matrix"] = "auto"
+    euler_sequence: StrictStr = "zxz"
+    method: Literal["taylor"] = "taylor"
+    hold_invariants: StrictBool = False
+
+    @field_validator("euler_sequence")
+    @classmethod
+    def _known_sequence(cls, value: str) -> str:
+        if value not in EULER_SEQUENCES:
+            raise _refuse(f'given "{value}"; allowed: {", ".join(EULER_SEQUENCES)} (intrinsic)')
+        return value
+
+    @field_validator("precision", mode="before")
+    @classmethod
+    def _known_precision(cls, value: Any) -> Any:
+        if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= LARGEST_DIGITS:
+            return value
+        if isinstance(value, str) and value in PRECISION_NAMES:
+            return value
+        raise _refuse(
+            f"given {value!r}; allowed: {', '.join(PRECISION_NAMES)}, "
+            f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
+        )
+
+    @field_validator("tolerance", mode="before")
+    @classmethod
+    def _positive_tolerance(cls, value: Any) -> Any:
+        if value == "auto":
+            return value
+        try:
+            number = parse_number(value, "1")
+        except ValueError as error:
+            raise _refuse(f'{error}; or "auto"') from None
+        if not 0 < number.rational <= 1:
+            raise _refuse(f'given {value}; allowed: above 0 and at most 1, or "auto"')
+        return number
+
+
+class Output(Table):
+    """``[output]``: what is kept and how it is shown."""
+
+    record: list[StrictStr] | None = None
+    timeline: StrictBool = True
+    timeline_rows: StrictInt = Field(default=100_000, ge=2)
+    lyapunov: StrictBool = False
+
+    @field_validator("record")
+    @classmethod
+    def _recordable(cls, value: list[str] | None) -> list[str] | None:
+        from rigidsim.scene.messages import nearest
+
+        for name in value or []:
+            if name not in RECORDABLE:
+                near = nearest(name, RECORDABLE)
+                raise _refuse(f'given "{name}"{near}; allowed: {", ".join(RECORDABLE)}')
+        if value is not None and not value:
+            raise _refuse("given an empty list; name at least one variable, or leave the key out")
+        if value is not None and len(set(value)) < len(value):
+            raise _refuse("a variable is named twice; name each once")
+        return value
+
+
+class Limits(Table):
+    """``[limits]``: guards that stop the run, resumable, with the reason named."""
+
+    wall_time: Second | None = None
+    max_steps: StrictInt | None = Field(default=None, ge=1)
+    max_drift: Dimensionless | None = None
+
+
+class Config(Table):
+    """One experiment."""
+
+    name: StrictStr
+    description: StrictStr = ""
+    body: Body
+    initial: Initial
+    loads: list[UniformGravity] = Field(default_factory=list)
+    time: Time
+    integrator: Integrator = Field(default_factory=Integrator)
+    output: Output = Field(default_factory=Output)
+    limits: Limits = Field(default_factory=Limits)
+
+    @field_validator("name")
+    @classmethod
+    def _folder_name(cls, value: str) -> str:
+        if not re.fullmatch(r"[A-Za-z0-9._-]{1,100}", value) or not value.strip("."):
+            raise _refuse(
+                f'given "{value[:40]}"; allowed: 1 to 100 letters, digits, dots, underscores and '
+                "hyphens, not dots alone, since it names the run folder"
+            )
+        return value

@@ -1,0 +1,119 @@
+"""The units that a config may use, as definitions for pint, with exact rational factors.
+
+Pi is a unit of its own here ("pi"), not a number: a conversion from degrees yields a rational factor and
+a power of pi, and pi itself is filled in later at the run's own precision. Everything is defined from SI
+by exact decimals, except the atomic mass constant (CODATA 2022, measured) and the sidereal day.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+_DEFINITIONS = """
+yocto- = 1e-24 = y-
+zepto- = 1e-21 = z-
+atto- = 1e-18 = a-
+femto- = 1e-15 = f-
+pico- = 1e-12 = p-
+nano- = 1e-9 = n-
+micro- = 1e-6 = µ- = μ- = u-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+giga- = 1e9 = G-
+tera- = 1e12 = T-
+peta- = 1e15 = P-
+exa- = 1e18 = E-
+meter = [length] = m = metre
+kilogram = [mass] = kg
+second = [time] = s = sec
+gram = 1e-3 * kilogram = g
+pi = [circle_constant] = π
+radian = [] = rad
+degree = pi / 180 * radian = deg = °
+arcminute = degree / 60 = arcmin
+arcsecond = degree / 3600 = arcsec
+milliarcsecond = degree / 3600000 = mas
+turn = 2 * pi * radian = rev = revolution = cycle
+revolutions_per_minute = 2 * pi * radian / minute = rpm
+minute = 60 * second = min
+hour = 3600 * second = h = hr
+day = 86400 * second = d
+year = 31557600 * second = yr = a = julian_year
+century = 3155760000 * second = cy
+sidereal_day = 86164.0905 * second
+angstrom = 1e-10 * meter = Å
+astronomical_unit = 149597870700 * meter = au
+tonne = 1000 * kilogram = t
+dalton = 1.66053906892e-27 * kilogram = Da = u
+newton = kilogram * meter / second ** 2 = N
+joule = newton * meter = J
+standard_gravity = 9.80665 * meter / second ** 2 = g0
+""".strip().splitlines()
+
+_UNIT_TEXT = re.compile(r"[\w°µμÅπ*/^ ().·-]{1,60}")
+_LARGEST_EXPONENT = 12
+
+
+class UnitError(ValueError):
+    """The unit is unknown, malformed, or of another dimension than the key asks for."""
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint  # only configs that write units pay for it
+
+    registry = pint.UnitRegistry(None, non_int_type=Fraction)
+    registry.load_definitions(_DEFINITIONS)
+    return registry
+
+
+@lru_cache(maxsize=512)
+def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
+    """Factor, power of pi and dimensions of a unit."""
+    import pint
+
+    exponents = [int(digits) for digits in re.findall(r"\d+", text)]
+    if not _UNIT_TEXT.fullmatch(text) or any(e > _LARGEST_EXPONENT for e in exponents):
+        raise UnitError(f'"{text}" is not a unit')
+    try:
+        unit = _registry().parse_units(text.replace("·", "*"))
+        quantity = _registry().Quantity(Fraction(1), unit).to_root_units()
+    except pint.UndefinedUnitError as error:
+        raise UnitError(f'unknown unit "{error.args[0]}"; {known_units()}') from None
+    except Exception as error:  # pint and its tokenizer raise many kinds on malformed text
+        raise UnitError(f'"{text}" is not a unit ({error})') from None
+    powers = {str(name): Fraction(power) for name, power in quantity._units.items()}
+    pi_power = powers.pop("pi", Fraction(0))
+    powers.pop("radian", None)
+    if pi_power.denominator != 1:
+        raise UnitError(f'"{text}" takes a root of an angle')
+    return Fraction(quantity.magnitude), int(pi_power), powers
+
+
+def known_units() -> str:
+    """A line that lists the units, for error messages."""
+    names = []
+    for line in _DEFINITIONS:
+        names_of_unit = [part.strip() for part in line.split("=")]
+        if names_of_unit[0].endswith("-") or names_of_unit[0] == "pi":
+            continue
+        names.append(names_of_unit[2] if len(names_of_unit) > 2 else names_of_unit[0])
+    return "known units: " + " ".join(names) + ", with SI prefixes, * / ^"
+
+
+def conversion(text: str, expected: str) -> tuple[Fraction, int]:
+    """Exact factor from the unit ``text`` to the SI unit ``expected``, as ``rational * pi**power``.
+
+    Raises:
+        UnitError: unknown unit, or another dimension than ``expected``.
+    """
+    factor, pi_power, dimensions = _to_si(text)
+    wanted_factor, _, wanted = _to_si(expected) if expected != "1" else (Fraction(1), 0, {})
+    if dimensions != wanted:
+        raise UnitError(f'"{text}" is not a unit of the dimension asked for, which is {expected}')
+    return factor / wanted_factor, pi_power

@@ -1,0 +1,245 @@
+"""The loop that takes a system from its start to its last sample."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rigidsim.solve.precision import Precision
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.status import Status
+from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.winding import INTERVAL, Winding
+
+# Between two looks at the clock and at Ctrl-C; well below the half second that a user waits.
+_CHUNK_SECONDS = 0.1
+_BLOCK_STEPS = 4096
+_WORTH_A_BLOCK = 64  # steps; fewer are cheaper one by one
+_SPARSE = 20.0  # steps per sample from which skipping pays
+_MARGIN = 0.9  # of the predicted steps to the next sample that are skipped at once
+_HOPELESS_STEPS = 1e15
+_ROWS_AT_ONCE = 8192
+
+
+@dataclass
+class Progress:
+    """How far a run is; the one mutable record of it.
+
+    Attributes:
+        next_sample: index of the first sample that isn't recorded yet.
+        samples: their number.
+        steps: natural steps taken.
+        time: where the integration stands, seconds.
+        integration_seconds: CPU-bound wall time in the engine, without recording.
+    """
+
+    samples: int
+    next_sample: int = 0
+    steps: int = 0
+    time: float = 0.0
+    smallest_step: float = float("inf")
+    largest_step: float = 0.0
+    redone_steps: int = 0
+    status: Status = Status.RUNNING
+    integration_seconds: float = 0.0
+    last_good: Mark | None = None
+
+    @property
+    def fraction(self) -> float:
+        """Of the samples that are recorded."""
+        return self.next_sample / self.samples
+
+
+Sink = Callable[[int, np.ndarray, np.ndarray, np.ndarray], None]
+"""Takes (index of the first sample, times (n,), states (n, states), turns (n, angles))."""
+
+Check = Callable[[Progress], Status | None]
+"""Looks at guards and interruptions between chunks; a status ends the run."""
+
+
+@dataclass
+class Advance:
+    """Drives a stepper through the samples.
+
+    Attributes:
+        sink: receives finished samples in order.
+        check: asked between chunks, at least every tenth of a second or after each single step.
+    """
+
+    stepper: Stepper
+    clock: SampleClock
+    winding: Winding
+    precision: Precision
+    sink: Sink
+    check: Check
+    progress: Progress = field(init=False)
+    _pace: float = field(default=0.0, init=False)  # steps per second, measured
+
+    def __post_init__(self) -> None:
+        self.progress = Progress(self.clock.count)
+        self._buffer: list[tuple[np.ndarray, np.ndarray]] = []
+        self._buffered = 0
+        self._last = float(self.clock.at(self.clock.count - 1))
+
+    def run(self) -> Progress:
+        """Go on until the last sample is recorded or something ends the run."""
+        progress = self.progress
+        progress.last_good = self.stepper.mark()
+        while progress.next_sample + self._buffered < self.clock.count:
+            stop = self.check(progress)
+            if stop is not None:
+                self._flush()
+                # what is flushed may complete the run, or break a guard of its own
+                if progress.next_sample < self.clock.count:
+                    progress.status = stop
+                    return progress
+                break
+            started = time.perf_counter()
+            before = self.stepper.steps
+            fine = self._go_on()
+            elapsed = time.perf_counter() - started
+            progress.integration_seconds += elapsed
+            progress.steps = self.stepper.steps
+            progress.time = float(np.ldexp(float(self.stepper.time), self.clock.exponent))
+            taken = max(self.stepper.steps - before, 1)
+            self._pace = taken / max(elapsed, 1e-9)
+            if not fine:
+                self._flush()
+                progress.status = Status.NON_FINITE
+                return progress
+            if self._buffered >= _ROWS_AT_ONCE:
+                self._flush()
+            if self._hopeless():
+                self._flush()
+                progress.status = Status.COLLAPSED
+                return progress
+        self._flush()
+        progress.status = Status.FINISHED
+        return progress
+
+    def _hopeless(self) -> bool:
+        step = self.stepper.largest
+        return step <= 0.0 or (self._last - float(self.stepper.time)) / step > _HOPELESS_STEPS
+
+    def _go_on(self) -> bool:
+        """One chunk: choose how, and never pass a wrap of angles or the patience of a user."""
+        upcoming = self.clock.at(self.progress.next_sample + self._buffered)
+        step = self.stepper.largest
+        gap = float(upcoming) - float(self.stepper.time)
+        patience = max(1, int(self._pace * _CHUNK_SECONDS))
+        wrap_in = INTERVAL - self.stepper.steps % INTERVAL if self.winding.positions else patience
+        expected = gap / step if step > 0 else 0.0
+        if expected > _SPARSE:
+            count = int(min(_MARGIN * expected - 2, patience, wrap_in))
+            return self._wrapped(self._skip(count, upcoming))
+        if self.precision.cheap and not self.winding.positions and step > 0:
+            left = int((self._last - float(self.stepper.time)) / step)
+            if left >= _WORTH_A_BLOCK:
+                return self._block(min(_BLOCK_STEPS, max(patience, _WORTH_A_BLOCK), left))
+        return self._step_by_step(min(patience, wrap_in))
+
+    def _wrapped(self, fine: bool) -> bool:
+        if fine and self.winding.positions and self.stepper.steps % INTERVAL == 0:
+            self.winding.wrap(self.stepper.state)
+        return fine
+
+    def _note_steps(self) -> None:
+        self.progress.smallest_step = min(self.progress.smallest_step, self.stepper.smallest)
+        self.progress.largest_step = max(self.progress.largest_step, self.stepper.largest)
+
+    def _skip(self, count: int, upcoming: Any) -> bool:
+        """Many steps towards a sample; if they went past it, back and again, nearer."""
+        mark, before = self.stepper.mark(), self.stepper.steps
+        fine = self.stepper.skip(count)
+        if not fine:
+            return self._find_last_good(mark, before)
+        if self.stepper.time > upcoming:
+            self.progress.redone_steps += self.stepper.steps - before
+            largest = self.stepper.largest
+            self.stepper.back_to(mark, before)
+            self.stepper.largest = largest * 1.5  # expect longer steps next time
+            return True
+        self._note_steps()
+        self.progress.last_good = None
+        return True
+
+    def _block(self, count: int) -> bool:
+        mark, before = self.stepper.mark(), self.stepper.steps
+        fine, output = self.stepper.block(count)
+        if not fine:
+            return self._find_last_good(mark, before)
+        self._note_steps()
+        first = self.progress.next_sample + self._buffered
+        times = self._times_until(first, self.stepper.time)
+        if len(times):
+            self._keep(times, output(times))
+        if first + len(times) == self.clock.count:
+            # end at the first boundary past the last sample, so that the count of steps is no accident
+            needed = int(np.searchsorted(np.asarray(output.times), times[-1]))
+            self.stepper.back_to(mark, before)
+            self.stepper.skip(max(needed, 1))
+        return True
+
+    def _step_by_step(self, count: int) -> bool:
+        for _ in range(count):
+            mark, before = self.stepper.mark(), self.stepper.steps
+            if not self.stepper.step():
+                self.stepper.back_to(mark, before)
+                self.progress.last_good = mark
+                return False
+            self._note_steps()
+            first = self.progress.next_sample + self._buffered
+            if self.clock.at(first) <= self.stepper.time:
+                times = self._times_until(first, self.stepper.time)
+                self._keep(times, np.array([self.stepper.dense(t) for t in times]))
+            self._wrapped(True)
+            if self.progress.next_sample + self._buffered >= self.clock.count:
+                break
+        return True
+
+    def _find_last_good(self, mark: Mark, before: int) -> bool:
+        """After a failure somewhere in many steps: walk to the last state that is finite."""
+        self.stepper.back_to(mark, before)
+        while True:
+            mark, before = self.stepper.mark(), self.stepper.steps
+            if not self.stepper.step():
+                self.stepper.back_to(mark, before)
+                self.progress.last_good = mark
+                return False
+            first = self.progress.next_sample + self._buffered
+            if first < self.clock.count and self.clock.at(first) <= self.stepper.time:
+                times = self._times_until(first, self.stepper.time)
+                self._keep(times, np.array([self.stepper.dense(t) for t in times]))
+
+    def _times_until(self, first: int, limit: Any) -> np.ndarray:
+        """Times of the samples from ``first`` on that lie at or before ``limit``."""
+        pieces = []
+        position = first
+        while position < self.clock.count:
+            times = self.clock.internal(position, min(position + _ROWS_AT_ONCE, self.clock.count))
+            inside = int(np.count_nonzero(times <= limit))
+            pieces.append(times[:inside])
+            position += inside
+            if inside < len(times):
+                break
+        return np.concatenate(pieces) if pieces else self.precision.zeros((0,))
+
+    def _keep(self, times: np.ndarray, states: np.ndarray) -> None:
+        turns = np.tile(self.winding.turns, (len(times), 1))
+        self._buffer.append((times, states, turns))  # type: ignore[arg-type]
+        self._buffered += len(times)
+
+    def _flush(self) -> None:
+        """Hand the buffered samples over, in blocks of bounded size."""
+        if not self._buffer:
+            return
+        times, states, turns = (np.concatenate(c) for c in zip(*self._buffer, strict=True))
+        self._buffer, self._buffered = [], 0
+        for first in range(0, len(times), _ROWS_AT_ONCE):
+            rows = slice(first, first + _ROWS_AT_ONCE)
+            self.sink(self.progress.next_sample, times[rows], states[rows], turns[rows])
+            self.progress.next_sample += len(times[rows])

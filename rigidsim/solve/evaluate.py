@@ -1,0 +1,144 @@
+"""From states at sample times to the recorded variables, compiled and in the run's own precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.system import Recorded, System
+from rigidsim.solve.precision import Precision
+from rigidsim.solve.winding import Winding
+
+
+@dataclass
+class Memory:
+    """What joins a block of samples to the one before (part of a checkpoint).
+
+    Attributes:
+        turns: of derived Euler angles, shape (3,), and the last raw angles.
+        last_angles, last_quaternion: float64 copies; None before the first block.
+    """
+
+    turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    last_angles: np.ndarray | None = None
+    last_quaternion: np.ndarray | None = None
+
+
+class Evaluator:
+    """Evaluates a system's outputs on blocks of states.
+
+    Attributes:
+        initial: initial values of the invariants' components, in internal units.
+        memory: see ``Memory``.
+    """
+
+    def __init__(self, system: System, precision: Precision, winding: Winding) -> None:
+        self._system = system
+        self._precision = precision
+        self._winding = winding
+        self.memory = Memory()
+        self._outputs = self._compile(system.outputs) if system.outputs else None
+        components = [x for invariant in system.invariants for x in invariant.expressions]
+        self._invariants = self._compile(components)
+        initial = precision.array(system.initial)
+        self.initial = self._invariants(initial)
+        self._parameters = len(components)
+        factor = system.singular_factor
+        self._singular = None if factor is None else self._compile([factor])
+
+    def singular_factors(self, states: np.ndarray) -> np.ndarray | None:
+        """What vanishes in the formulation's singularity, at states (n, states); None without one."""
+        if self._singular is None:
+            return None
+        values = self._singular(np.ascontiguousarray(states.T))
+        return np.asarray(values[0])
+
+    def _compile(self, expressions: list[Any]) -> Any:
+        return hy.cfunc(
+            expressions,
+            self._system.variables,
+            compact_mode=self._precision.compact,
+            **self._precision.options,
+        )
+
+    def evaluate(self, states: np.ndarray, turns: np.ndarray) -> dict[str, list[np.ndarray]]:
+        """All variables of a block.
+
+        Args:
+            states: (n, states), internal units, angles wrapped.
+            turns: (n, angles) full turns of the angle states.
+
+        Returns:
+            For each recorded variable float64 parts of shape (n, components) in SI (see
+            ``Precision.parts``), and for each invariant its drift, (n, 1), one part.
+        """
+        count = len(states)
+        pars = np.repeat(self.initial[:, None], count, axis=1)
+        assert self._outputs is not None
+        # compiled code for expressions without parameters refuses an array of them
+        arguments = {"pars": pars} if self._parameters else {}
+        values = self._outputs(np.ascontiguousarray(states.T), **arguments)
+        result: dict[str, list[np.ndarray]] = {}
+        for variable in self._system.recorded:
+            block = values[variable.first : variable.first + variable.count].T
+            block = self._joined(variable, block, turns)
+            parts = self._precision.parts(block)
+            exponents = np.array(variable.exponents, dtype=np.int32)
+            if exponents.any():
+                parts = [np.ldexp(part, exponents) for part in parts]
+            result[variable.name] = parts
+        first = len(self._system.outputs) - len(self._system.invariants)
+        for n, invariant in enumerate(self._system.invariants):
+            drift = values[first + n].astype(np.float64)
+            result[f"{invariant.name}_drift"] = [drift[:, None]]
+        return result
+
+    def _joined(self, variable: Recorded, block: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        if variable.continuity == "winding":
+            return self._winding.unwrapped(block, turns)
+        if variable.continuity == "parity":
+            odd = turns.sum(axis=1) % 2 == 1
+            block = block.copy()
+            block[odd] = -block[odd]
+            return block
+        if variable.continuity == "nearest":
+            return self._nearest(block)
+        if variable.continuity == "unwrap":
+            return self._unwrapped(block)
+        return block
+
+    def _nearest(self, block: np.ndarray) -> np.ndarray:
+        """Give each quaternion the sign nearest to the one before."""
+        plain = block.astype(np.float64)
+        before = self.memory.last_quaternion
+        if before is None:
+            before = np.array([float(x) for x in self._system.scene.quaternion])
+        products = np.einsum("ij,ij->i", plain, np.vstack([before, plain[:-1]]))
+        signs = np.cumprod(np.where(products < 0, -1, 1))
+        block = block.copy()
+        block[signs < 0] = -block[signs < 0]
+        self.memory.last_quaternion = plain[-1] * signs[-1]
+        return block
+
+    def _unwrapped(self, block: np.ndarray) -> np.ndarray:
+        """Add the full turns that make each angle nearest to the sample before."""
+        plain = block.astype(np.float64)
+        before = plain[0] if self.memory.last_angles is None else self.memory.last_angles
+        jumps = np.diff(np.vstack([before, plain]), axis=0)
+        turns = self.memory.turns - np.cumsum(np.rint(jumps / (2 * np.pi)), axis=0).astype(np.int64)
+        self.memory.turns, self.memory.last_angles = turns[-1], plain[-1]
+        return self._winding.unwrapped(block, turns)
+
+    def initial_invariants(self) -> dict[str, list[float]]:
+        """Initial values of the invariants' components in SI, nearest doubles, by name."""
+        values = {}
+        first = 0
+        for invariant in self._system.invariants:
+            block = self.initial[first : first + len(invariant.expressions)]
+            first += len(invariant.expressions)
+            lead = self._precision.parts(block)[0]
+            values[invariant.name] = [float(x) for x in np.ldexp(lead, invariant.exponents)]
+        return values

@@ -1,0 +1,47 @@
+"""How a run can end; each status carries the words that the user reads."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Status(Enum):
+    """``value`` stands in datasets and summaries."""
+
+    RUNNING = "running"
+    FINISHED = "finished"
+    INTERRUPTED = "interrupted"
+    WALL_TIME = "stopped: wall_time"
+    MAX_STEPS = "stopped: max_steps"
+    MAX_DRIFT = "stopped: max_drift"
+    NON_FINITE = "stopped: non-finite state"
+    COLLAPSED = "stopped: step size collapsed"
+
+    @property
+    def message(self) -> str:
+        """One sentence for the user."""
+        return _MESSAGES[self]
+
+    @property
+    def exit_code(self) -> int:
+        """Of the command line."""
+        if self is Status.FINISHED:
+            return 0
+        return 130 if self is Status.INTERRUPTED else 3
+
+    @property
+    def final(self) -> bool:
+        """True where going on could not help, so that the dataset is completed as it is."""
+        return self in (Status.FINISHED, Status.NON_FINITE, Status.COLLAPSED)
+
+
+_MESSAGES = {
+    Status.RUNNING: "the run is under way, or was killed",
+    Status.FINISHED: "the run reached its last sample",
+    Status.INTERRUPTED: "the run was interrupted; what was integrated is kept",
+    Status.WALL_TIME: "the guard [limits] wall_time was reached; what was integrated is kept",
+    Status.MAX_STEPS: "the guard [limits] max_steps was reached; what was integrated is kept",
+    Status.MAX_DRIFT: "an invariant drifted past the guard [limits] max_drift; what was integrated is kept",
+    Status.NON_FINITE: "the state stopped being finite; the samples before it are kept",
+    Status.COLLAPSED: "the steps became too small to ever arrive; the samples so far are kept",
+}

@@ -1,0 +1,110 @@
+"""heyoka's integrator, stepping freely: natural steps only, dense output, nothing ever clamped.
+
+Three ways to go on, which give the same bits and differ in cost alone (engine measurements in
+experiments/README.md): ``skip`` takes many steps at once and keeps no dense output, ``block`` takes many and
+keeps it (about a millisecond per call), ``step`` takes one and keeps it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.system import System
+from rigidsim.solve.precision import Precision
+
+_FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A natural step boundary: all that is needed to go on with the same bits."""
+
+    time: tuple[Any, Any]
+    state: np.ndarray
+
+
+class Stepper:
+    """A compiled integrator and its count of steps.
+
+    Attributes:
+        steps: natural steps taken and kept.
+        smallest, largest: step sizes of the latest call, internal units.
+    """
+
+    def __init__(self, system: System, precision: Precision, tolerance: Any, start: Any) -> None:
+        self._precision = precision
+        options = dict(precision.options)
+        if tolerance is not None:
+            options["tol"] = tolerance
+        self._integrator = hy.taylor_adaptive(
+            system.equations,
+            precision.array(system.initial),
+            time=start,
+            compact_mode=precision.compact,
+            **options,
+        )
+        far = _FAR if not precision.scalar == np.float32 else 1e37
+        self._far = precision.number(system.scene.context.mpf(far))
+        self.steps = 0
+        self.smallest = self.largest = 0.0
+
+    @property
+    def integrator(self) -> Any:
+        """The heyoka object (for provenance)."""
+        return self._integrator
+
+    @property
+    def time(self) -> Any:
+        """Current time (high part), internal units."""
+        return self._integrator.time
+
+    @property
+    def state(self) -> np.ndarray:
+        """Current state, a view that can be assigned to."""
+        return self._integrator.state
+
+    def mark(self) -> Mark:
+        """Remember this boundary."""
+        return Mark(self._integrator.dtime, np.array(self._integrator.state))
+
+    def back_to(self, mark: Mark, steps: int) -> None:
+        """Return to a boundary; ``steps`` is the count that it had."""
+        self._integrator.dtime = mark.time
+        self._integrator.state[:] = mark.state
+        self.steps = steps
+
+    def step(self) -> bool:
+        """One step with dense output; False when the state is no longer finite."""
+        outcome, size = self._integrator.step(write_tc=True)
+        self.smallest = self.largest = abs(float(size))
+        if outcome == hy.taylor_outcome.err_nf_state:
+            return False
+        self.steps += 1
+        return True
+
+    def dense(self, time: Any) -> np.ndarray:
+        """State at a time within the step just taken by ``step``, shape (states,)."""
+        return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
+
+    def skip(self, count: int) -> bool:
+        """At most ``count`` steps without dense output; False when the state is no longer finite."""
+        outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(self._far, max_steps=count)
+        return self._account(outcome, smallest, largest, taken)
+
+    def block(self, count: int) -> tuple[bool, Any]:
+        """``count`` steps with dense output: whether all went well, and a function of times (n,) that
+        returns states (n, states).
+        """
+        outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
+            self._far, max_steps=count, c_output=True
+        )
+        return self._account(outcome, smallest, largest, taken), output
+
+    def _account(self, outcome: Any, smallest: Any, largest: Any, taken: int) -> bool:
+        self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
+        self.steps += int(taken)
+        return bool(outcome != hy.taylor_outcome.err_nf_state)

@@ -1,0 +1,110 @@
+"""The run folder: ``config.toml``, ``dataset.h5``, ``timeline.rrd``, ``summary.json``, ``segments/``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rigidsim.errors import RunFolderError
+from rigidsim.store import netcdf, segments
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Paths of one run."""
+
+    path: Path
+
+    @property
+    def config(self) -> Path:
+        """The config as given."""
+        return self.path / "config.toml"
+
+    @property
+    def dataset(self) -> Path:
+        """The finished dataset."""
+        return self.path / "dataset.h5"
+
+    @property
+    def timeline(self) -> Path:
+        """The rerun recording."""
+        return self.path / "timeline.rrd"
+
+    @property
+    def summary(self) -> Path:
+        """Status, cost, drifts, accuracy."""
+        return self.path / "summary.json"
+
+    @property
+    def segments(self) -> Path:
+        """What an unfinished run has saved."""
+        return self.path / "segments"
+
+    def create(self, *, force: bool) -> None:
+        """Make the folder ready for a new run.
+
+        Raises:
+            RunFolderError: it holds a run and ``force`` is false, or something that is no run, or it can't
+                be written.
+        """
+        ours = [self.config, self.dataset, self.timeline, self.summary, self.segments]
+        try:
+            if self.path.exists() and not self.path.is_dir():
+                raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
+            present = list(self.path.iterdir()) if self.path.exists() else []
+            foreign = [p.name for p in present if p not in ours and not p.name.startswith(".")]
+            if foreign:
+                raise RunFolderError(
+                    f"{self.path}: holds {foreign[0]}, which no run writes; choose another --out or name"
+                )
+            held = [p for p in present if p in (self.dataset, self.summary, self.segments)]
+            if held and not force:
+                what = "a finished run" if self.dataset.exists() else "an unfinished run"
+                raise RunFolderError(
+                    f"{self.path}: holds {what}; --force replaces it, --out DIR puts this one elsewhere"
+                )
+            segments.remove(self.segments)
+            for path in ours[:-1]:
+                path.unlink(missing_ok=True)
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RunFolderError(
+                f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
+            ) from None
+
+    def write_summary(self, summary: dict[str, Any]) -> None:
+        """Write ``summary.json`` atomically."""
+        text = json.dumps(summary, indent=2, allow_nan=False, default=str)
+        netcdf.write_bytes(self.summary, (text + "\n").encode())
+
+    def read_summary(self) -> dict[str, Any]:
+        """The summary; a run that was killed has none and reads as "running".
+
+        Raises:
+            RunFolderError: damaged.
+        """
+        if not self.summary.exists():
+            return {"status": "running", "message": "the run is under way, or was killed"}
+        try:
+            content = json.loads(self.summary.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise RunFolderError(f"{self.summary}: can't be read ({error})") from None
+        if not isinstance(content, dict):
+            raise RunFolderError(f"{self.summary}: is no summary")
+        return content
+
+
+def find_run(path: str | Path) -> RunFolder:
+    """The run at ``path``: a run folder, or a file in one.
+
+    Raises:
+        RunFolderError: there is none.
+    """
+    given = Path(path)
+    folder = given if given.is_dir() else given.parent
+    run = RunFolder(folder)
+    if not given.exists() or not (run.dataset.exists() or run.segments.exists() or run.summary.exists()):
+        raise RunFolderError(f"{path}: no run here; give a run folder (runs/NAME) or its dataset.h5")
+    return run

@@ -1,0 +1,103 @@
+"""Writing netCDF-4 files that xarray, netCDF4, h5py and ncdump all read, never visible half-written.
+
+A file comes into being under a temporary name, is synced to disk, and then takes its name in one atomic
+step; so a file with a final name is whole, whatever kills the process or fills the disk.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import h5py
+import numpy as np
+
+from rigidsim.store.variables import LABELS, Variable
+
+CHUNK_ROWS = 8192
+GZIP_LEVEL = 4  # with shuffle: every reader opens it (other filters fail in some)
+Block = Mapping[str, Sequence[np.ndarray]]
+"""Variable name to float64 parts, each of shape (rows, components)."""
+
+
+@contextmanager
+def atomic(path: Path) -> Iterator[Path]:
+    """A temporary path beside ``path`` that replaces it when the block ends without an error."""
+    temporary = path.with_name(f".{path.name}.partial")
+    try:
+        yield temporary
+        descriptor = os.open(temporary, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        os.replace(temporary, path)
+        _sync_folder(path.parent)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a small file atomically."""
+    with atomic(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def declare(
+    file: Any,
+    variables: Sequence[Variable],
+    rows: int,
+    attributes: Mapping[str, Any],
+    *,
+    compressed: bool,
+) -> None:
+    """Lay out dimensions, coordinates, variables and attributes in an open h5netcdf file."""
+    dims = {dim for variable in variables for dim in variable.dims}
+    file.dimensions = {"time": rows, **{d: len(LABELS[d]) for d in LABELS if d in dims}}
+    for dim in LABELS:
+        if dim in dims:
+            labels = file.create_variable(dim, (dim,), h5py.string_dtype())
+            labels[...] = np.array(LABELS[dim], dtype=object)
+            labels.attrs["long_name"] = dim.replace("_", " ")
+    for variable in variables:
+        options: dict[str, Any] = {}
+        if rows:
+            options["chunks"] = (min(CHUNK_ROWS, rows), *variable.shape) if compressed else None
+            if compressed:
+                options |= {"compression": "gzip", "compression_opts": GZIP_LEVEL, "shuffle": True}
+        for part, name in enumerate(variable.part_names()):
+            created = file.create_variable(name, ("time", *variable.dims), np.dtype("<f8"), **options)
+            for key, value in variable.part_attributes(part).items():
+                created.attrs[key] = value
+    for key, value in attributes.items():
+        file.attrs[key] = value
+
+
+def fill(file: Any, variables: Sequence[Variable], block: Block, first: int, rows: int) -> None:
+    """Write one block of rows."""
+    for variable in variables:
+        for name, values in zip(variable.part_names(), block[variable.name], strict=True):
+            file.variables[name][first : first + rows] = values.reshape(rows, *variable.shape)
+
+
+def image(variables: Sequence[Variable], block: Block, rows: int, attributes: Mapping[str, Any]) -> bytes:
+    """A whole uncompressed file built in memory."""
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
+        declare(file, variables, rows, attributes, compressed=False)
+        fill(file, variables, block, 0, rows)
+    return buffer.getvalue()

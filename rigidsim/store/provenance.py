@@ -1,0 +1,63 @@
+"""Where a dataset comes from: versions, machine and settings, as far as they can change bits."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+
+def cpu_model() -> str:
+    """The processor's name, from the kernel where it tells."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def versions() -> dict[str, str]:
+    """Of everything that takes part in the numbers."""
+    found = {"python": platform.python_version(), "heyoka": str(hy.__version__), "numpy": np.__version__}
+    for name in ("rigidsim", "mpmath", "h5py", "h5netcdf"):
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:  # run from a source tree
+            found[name] = "unknown"
+    return found
+
+
+def code_target(integrator: Any) -> dict[str, str]:
+    """What LLVM compiled for: bits depend on the CPU's features. The wheel's LLVM has no version query;
+    it is fixed by heyoka's version.
+    """
+    lines = dict(line.split(":", 1) for line in str(integrator.llvm_state).splitlines() if ":" in line)
+    lines = {key.strip(): value.strip() for key, value in lines.items()}
+    features = lines.get("Target features", "")
+    return {
+        "llvm": f"as built into heyoka {hy.__version__}",
+        "target_cpu": lines.get("Target CPU", "unknown"),
+        "target_features_sha256": hashlib.sha256(features.encode()).hexdigest(),
+        "optimisation_level": lines.get("Optimisation level", "unknown"),
+        "fast_math": lines.get("Fast math", "unknown"),
+        "slp_vectorize": lines.get("SLP vectorization", "unknown"),
+    }
+
+
+def now() -> str:
+    """UTC, ISO 8601."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def file_sha256(path: Path) -> str:
+    """Digest of a file, read in pieces."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,196 @@
+"""The honest summary of a run: cost, drifts against the round-off law, and everything to be wary of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rigidsim.prepare import Prepared
+from rigidsim.solve.advance import Progress
+from rigidsim.solve.status import Status
+
+DRIFT_FACTOR = 50.0
+"""A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
+steps add up like a random walk (Brouwer 1937), with a few roundings per step."""
+
+_LOST_DIGITS = 1e-2  # rad; an attitude this uncertain is no result any more
+_NEAR_SINGULAR = 1e-3
+
+
+@dataclass
+class Watch:
+    """What is followed over all samples.
+
+    Attributes:
+        largest, final: drifts by invariant.
+        nearest_singularity: smallest absolute singular factor at a sample, and its time.
+    """
+
+    largest: dict[str, float] = field(default_factory=dict)
+    final: dict[str, float] = field(default_factory=dict)
+    nearest_singularity: float = math.inf
+    singularity_time: float = math.nan
+
+    def see(self, invariant: str, drifts: np.ndarray) -> None:
+        """Follow one invariant through a block of samples."""
+        size = np.abs(drifts)
+        self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.max(size)))
+        self.final[invariant] = float(drifts[-1])
+
+    def see_singular(self, factors: np.ndarray, times: np.ndarray) -> None:
+        """Follow the distance from a formulation's singularity."""
+        size = np.abs(factors.astype(np.float64))
+        nearest = int(np.argmin(size))
+        if size[nearest] < self.nearest_singularity:
+            self.nearest_singularity = float(size[nearest])
+            self.singularity_time = float(times[nearest])
+
+
+def round_off_law(tolerance: float, steps: int, rate: float, duration: float) -> float:
+    """Attitude error (rad) of a good integration: (eps / 2) sqrt(steps) |w| t / sqrt 3.
+
+    Rounding lets the frequencies wander as a random walk, and the phase integrates the walk (Brouwer 1937).
+    Motions that amplify errors exponentially lie outside of it.
+    """
+    return tolerance / 2 * math.sqrt(max(steps, 1)) * rate * duration / math.sqrt(3)
+
+
+def invariant_table(
+    prepared: Prepared, watch: Watch, steps: int, initial: dict[str, list[float]]
+) -> dict[str, Any]:
+    """One entry per invariant."""
+    bound = DRIFT_FACTOR * prepared.effective_tolerance * math.sqrt(max(steps, 1))
+    table = {}
+    for invariant in prepared.system.invariants:
+        values = initial[invariant.name]
+        table[invariant.name] = {
+            "initial": values[0] if len(values) == 1 else values,
+            "units": invariant.units,
+            "scale": float(invariant.scale),
+            "scale_name": invariant.scale_name,
+            "largest_drift": watch.largest.get(invariant.name),
+            "final_drift": watch.final.get(invariant.name),
+            "bound": bound,
+            "why": invariant.why,
+            "numerical": invariant.numerical,
+        }
+    return table
+
+
+def warnings(prepared: Prepared, progress: Progress, watch: Watch) -> list[str]:
+    """Reasons not to trust the result; empty for a sound run."""
+    found = []
+    system = prepared.system
+    bound = DRIFT_FACTOR * prepared.effective_tolerance * math.sqrt(max(progress.steps, 1))
+    for name, drift in watch.largest.items():
+        if not drift <= bound:
+            found.append(
+                f"{name} drifted by {drift:.2g}, more than {bound:.2g} = 50 tolerance sqrt(steps), which "
+                "rounding alone explains; choose a tighter tolerance, a higher precision or another "
+                "formulation"
+            )
+    if watch.nearest_singularity < _NEAR_SINGULAR:
+        found.append(
+            f"the Euler angles came near the singularity of {system.sequence} (factor "
+            f"{watch.nearest_singularity:.2g} at {watch.singularity_time:.6g} s), where they lose digits; "
+            'choose formulation = "quaternion"'
+        )
+    estimate = attitude_error(prepared, progress)
+    if estimate is not None and estimate > _LOST_DIGITS:
+        found.append(
+            f"by the round-off law the attitude is uncertain by {estimate:.2g} rad at the end; choose a "
+            "higher precision"
+        )
+    turns = float(system.rate_bound) * largest_spacing(prepared) / math.pi
+    joined = [r.name for r in system.recorded if r.continuity in ("unwrap", "nearest")]
+    if joined and turns > 1:
+        found.append(
+            f"{' and '.join(joined)} can't be joined with certainty: the body may turn by {turns * 180:.3g} "
+            "degrees between samples; sample more often, or choose the formulation that carries them"
+        )
+    return found
+
+
+def largest_spacing(prepared: Prepared) -> float:
+    """Between neighbouring samples, seconds."""
+    samples = prepared.scene.samples
+    if samples.times is not None:
+        pairs = zip(samples.times, samples.times[1:], strict=False)
+        return max((float(b - a) for a, b in pairs), default=0.0)
+    return float(samples.span / samples.intervals)
+
+
+def attitude_error(prepared: Prepared, progress: Progress) -> float | None:
+    """The round-off law's estimate at the end, rad; None where no attitude is carried."""
+    if prepared.system.requirements.formulation == "rates":
+        return None
+    duration = abs(progress.time - float(prepared.scene.start))
+    rate = float(prepared.system.rate_bound)
+    return round_off_law(prepared.effective_tolerance, progress.steps, rate, duration)
+
+
+def summarise(
+    prepared: Prepared,
+    progress: Progress,
+    watch: Watch,
+    *,
+    message: str,
+    initial: dict[str, list[float]],
+    seconds: dict[str, float],
+    cpu_seconds: float,
+    provenance: dict[str, Any],
+) -> dict[str, Any]:
+    """The content of ``summary.json``."""
+    scene, system = prepared.scene, prepared.system
+    estimate = attitude_error(prepared, progress)
+    return {
+        "name": scene.name,
+        "description": scene.description,
+        "status": progress.status.value,
+        "message": message,
+        "exit_code": progress.status.exit_code,
+        "warnings": warnings(prepared, progress, watch),
+        "samples": progress.next_sample,
+        "samples_planned": progress.samples,
+        "time_reached": progress.time,
+        "formulation": system.requirements.formulation,
+        "states": system.states,
+        "precision": prepared.precision.name,
+        "tolerance": prepared.effective_tolerance,
+        "cost": {
+            "steps": progress.steps,
+            "steps_redone": progress.redone_steps,
+            "smallest_step": _seconds(progress.smallest_step, system.scaling.time),
+            "largest_step": _seconds(progress.largest_step, system.scaling.time),
+            "seconds": seconds,
+            "cpu_seconds": cpu_seconds,
+        },
+        "invariants": invariant_table(prepared, watch, progress.steps, initial),
+        "accuracy": {
+            "requested": None,
+            "estimated_attitude_error": estimate,
+            "estimated_how": "round-off law (tolerance/2) sqrt(steps) |w| t / sqrt 3; motions that "
+            "amplify errors exponentially lie outside of it",
+            "certified": None,
+            "how": "not certified against an independent solution",
+        },
+        "body": {
+            "source": scene.body.source,
+            "principal_moments": [float(m) for m in scene.body.principal_moments],
+            "principal_axes": [[float(x) for x in axis] for axis in scene.body.principal_axes],
+            "mass": None if scene.body.mass is None else float(scene.body.mass),
+        },
+        "bit_for_bit": {
+            "claim": progress.status is Status.FINISHED,
+            "holds_for": "the same config, versions and CPU features as recorded in provenance",
+        },
+        "provenance": provenance,
+    }
+
+
+def _seconds(step: float, exponent: int) -> float | None:
+    value = math.ldexp(step, exponent) if math.isfinite(step) else math.inf
+    return value if math.isfinite(value) else None
