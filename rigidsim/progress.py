@@ -52,6 +52,7 @@ class TerminalObserver(Observer):
         self._bar.stop()
 
     def started(self, prepared: Prepared, folder: Path) -> None:
+        """See ``Observer``."""
         self._begin = time.perf_counter()
         last = float(prepared.scene.samples.last) - float(prepared.scene.start)
         self._start = float(prepared.scene.start)
@@ -59,6 +60,7 @@ class TerminalObserver(Observer):
         self._task = self._bar.add_task(prepared.scene.name, total=1.0, rate="")
 
     def progressed(self, progress: Progress) -> None:
+        """See ``Observer``."""
         if self._task is None:
             return
         fraction = min(1.0, (progress.time - self._start) / self._last) if self._last else 1.0
@@ -68,6 +70,7 @@ class TerminalObserver(Observer):
         )
 
     def phase(self, name: str) -> None:
+        """See ``Observer``."""
         if name in _PHASES and self._task is not None:
             self._bar.update(self._task, description=_PHASES[name], rate="")
 
@@ -86,6 +89,7 @@ class LineObserver(Observer):
         return None
 
     def started(self, prepared: Prepared, folder: Path) -> None:
+        """See ``Observer``."""
         self._begin = self._latest = time.perf_counter()
         self._name = prepared.scene.name
         self._start = float(prepared.scene.start)
@@ -93,6 +97,7 @@ class LineObserver(Observer):
         print(f"{self._name}: integrating into {folder}", file=sys.stderr, flush=True)
 
     def progressed(self, progress: Progress) -> None:
+        """See ``Observer``."""
         now = time.perf_counter()
         if now - self._latest < _LINE_EVERY:
             return
@@ -108,6 +113,7 @@ class LineObserver(Observer):
         )
 
     def phase(self, name: str) -> None:
+        """See ``Observer``."""
         if name in _PHASES:
             print(f"{self._name}: {_PHASES[name]}", file=sys.stderr, flush=True)
 

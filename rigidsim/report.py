@@ -80,7 +80,8 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
         f"tolerance {summary['tolerance']:.3g}"
     )
     out.print(
-        f"cost     {cost['steps']:,} steps, {summary['samples']:,} of {summary['samples_planned']:,} samples, "
+        f"cost     {cost['steps']:,} steps, "
+        f"{summary['samples']:,} of {summary['samples_planned']:,} samples, "
         f"{duration(seconds)} wall ({duration(cost['seconds']['engine'])} integrating), "
         f"{duration(cost['cpu_seconds'])} CPU"
     )

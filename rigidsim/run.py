@@ -192,8 +192,7 @@ def run(
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
     evaluator = Evaluator(prepared.system, prepared.precision, winding)
     attributes = _attributes(prepared, stepper)
-    variables = prepared.variables()
-    writer = segments.SegmentWriter(folder.segments, variables, attributes)
+    writer = segments.SegmentWriter(folder.segments, prepared.variables(), attributes)
     watch = summaries.Watch()
     interruption = _Interruption()
 
@@ -215,7 +214,8 @@ def run(
     advance = Advance(stepper, prepared.clock, winding, prepared.precision, sink, guards)
     with interruption.watching():
         progress = advance.run()
-        writer.flush()
+        if not progress.status.final:
+            writer.flush()
     clock.next("integrate_and_record")
     observer.progressed(progress)
     message = _message(prepared, progress, evaluator)
@@ -232,8 +232,10 @@ def run(
     summary["cost"]["seconds"]["engine"] = progress.integration_seconds
     try:
         if progress.status.final:
-            _complete(prepared, folder, variables, attributes, summary, clock, observer)
+            _complete(prepared, folder, writer, attributes, summary, clock, observer)
     except KeyboardInterrupt:
+        if not folder.dataset.exists():
+            writer.flush()
         summary |= {"status": Status.INTERRUPTED.value, "exit_code": Status.INTERRUPTED.exit_code}
         summary["message"] = "interrupted after the integration; all samples are saved as segments"
     summary["cost"]["cpu_seconds"] = time.process_time() - cpu
@@ -244,7 +246,7 @@ def run(
 def _complete(
     prepared: Prepared,
     folder: RunFolder,
-    variables: list[Any],
+    writer: segments.SegmentWriter,
     attributes: dict[str, Any],
     summary: dict[str, Any],
     clock: _Phases,
@@ -263,8 +265,7 @@ def _complete(
         "cpu_seconds": cost["cpu_seconds"],
         "finished_at": provenance.now(),
     }
-    segments.merge(folder.segments, folder.dataset, variables, final)
-    segments.remove(folder.segments)
+    writer.complete(folder.dataset, final)
     summary["dataset_sha256"] = provenance.file_sha256(folder.dataset)
     clock.next("dataset")
     output = prepared.scene.config.output

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -118,7 +119,7 @@ def largest_spacing(prepared: Prepared) -> float:
     """Between neighbouring samples, seconds."""
     samples = prepared.scene.samples
     if samples.times is not None:
-        pairs = zip(samples.times, samples.times[1:], strict=False)
+        pairs = pairwise(samples.times)
         return max((float(b - a) for a, b in pairs), default=0.0)
     return float(samples.span / samples.intervals)
 

@@ -1,0 +1,1 @@
+"""Symbolic mechanics in heyoka expressions: the least system that a scene needs."""

@@ -16,7 +16,7 @@ from rigidsim.model import rotations
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Expression
 from rigidsim.model.scaling import potential_amplitude
-from rigidsim.scene.context import apply, norm
+from rigidsim.scene.context import apply, dot, norm
 
 Dims = tuple[str, ...]
 BODY: Dims = ("body_axis",)
@@ -71,10 +71,8 @@ def momentum_scale(m: Mechanics) -> tuple[Any, str]:
 def rotational_scale(m: Mechanics) -> tuple[Any, str]:
     """Initial rotational energy, plus M g l about a fixed point."""
     scene, context = m.scene, m.scene.context
-    kinetic = sum(
-        (w * x for w, x in zip(scene.angular_velocity, apply(scene.body.inertia, scene.angular_velocity), strict=True)),
-        context.zero,
-    ) / 2  # fmt: skip
+    momentum = apply(scene.body.inertia, scene.angular_velocity)
+    kinetic = dot(scene.angular_velocity, momentum) / 2
     amplitude = potential_amplitude(scene)
     if kinetic + amplitude == 0:
         return context.one, "1 J (the body is at rest)"

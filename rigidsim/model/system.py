@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,9 @@ from rigidsim.model.scaling import Scaling, choose_scaling, largest_rates
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.context import apply, transpose
 from rigidsim.scene.scene import Scene
+
+_LARGEST_EXPONENT = 1000
+"""Of a recorded variable in SI: float64 ends at 2^1024, and the size of a variable is known roughly."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +156,8 @@ def build_system(scene: Scene, number: Number) -> System:
         exponents += [0] * 3
     position = velocity = None
     if requirements.flight:
-        assert scene.position is not None and scene.velocity is not None
+        assert scene.position is not None
+        assert scene.velocity is not None
         position = list(hy.make_vars("x", "y", "z"))
         velocity = list(hy.make_vars("vx", "vy", "vz"))
         names += ["x", "y", "z", "vx", "vy", "vz"]
@@ -170,6 +175,7 @@ def build_system(scene: Scene, number: Number) -> System:
     invariants = _invariants(mechanics)
     outputs += _drifts(invariants, context, number)
     angle_states = tuple(3 + i for i in attitude.angles) if attitude else ()
+    _refuse_out_of_range(initial, [*recorded, *invariants], number)
     return System(
         scene=scene,
         scaling=scaling,
@@ -204,6 +210,18 @@ def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> Non
                 'no rates; choose formulation = "quaternion" or another euler_sequence',
             )
         )
+
+
+def _refuse_out_of_range(
+    initial: list[Any], variables: Sequence[Recorded | Invariant], number: Number
+) -> None:
+    """Raise OverflowError for what neither the states nor the dataset's float64 numbers can hold."""
+    for value in initial:
+        number(value)
+    for variable in variables:
+        largest = max(variable.exponents, key=abs)
+        if abs(largest) > _LARGEST_EXPONENT:
+            raise OverflowError(f"{variable.name} would be about 2^{largest} {variable.units}")
 
 
 def _available(m: Mechanics, observable: Observable) -> bool:

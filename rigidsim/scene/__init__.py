@@ -1,0 +1,1 @@
+"""What the user described: typed config, units, bodies, loads, times, as exact numbers."""

@@ -77,8 +77,8 @@ def build_body(table: schema.Body, context: Any) -> RigidBody:
     """
     given = [name for name in SOURCES if getattr(table, name) is not None]
     if len(given) != 1:
-        found = " and ".join(given) if given else "none"
-        raise _fail("", f"given {found}; exactly one of {', '.join(SOURCES)} is allowed")
+        found = " and ".join(given) if given else "no source of inertia"
+        raise _fail("", f"given {found}; exactly one of {', '.join(SOURCES)} is needed")
     source = given[0]
     if source != "shape":
         _refuse_foreign(table, (), "which only a shape has", "")
@@ -216,12 +216,19 @@ def _solid(
     for key, count in shape.dimensions.items():
         value = getattr(table, key)
         values = value if isinstance(value, list) else [value]
-        if value is not None and len(values) != count:
+        if value is None:
+            lengths = "a positive length" if count == 1 else f"{count} positive lengths"
+            raise _fail(f"{place}{key}", f"missing; a {name} needs it: {lengths}")
+        if len(values) != count:
             raise _fail(f"{place}{key}", f"given {len(values)} lengths; a {name} has {count}")
-        dimensions[key] = [_positive(v, f"{place}{key}", "length", context) for v in values]
+        places = [f"{place}{key}" + (f"[{n}]" if count > 1 else "") for n in range(count)]
+        dimensions[key] = [
+            _positive(v, where, "length", context) for v, where in zip(values, places, strict=True)
+        ]
     for small, large in (("inner_radius", "outer_radius"), ("minor_radius", "major_radius")):
         if small in dimensions and dimensions[small][0] > dimensions[large][0]:
-            raise _fail(f"{place}{small}", f"given more than {large}; at most {large} is allowed")
+            given, limit = (context.nstr(dimensions[key][0], 12) for key in (small, large))
+            raise _fail(f"{place}{small}", f"given {given} m; at most {large} ({limit} m) is allowed")
     heavy = _positive(mass, f"{place}mass", "mass", context)
     inertia = diagonal([heavy * m for m in shape.moments(context, dimensions)])
     plain = {k: [float(x) for x in v] for k, v in dimensions.items()}

@@ -6,17 +6,20 @@ working precision; binary floating point never stands in between.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from typing import Any
 
 from rigidsim.scene import units
+from rigidsim.scene.messages import shown
 
 # Far past any physical quantity and any precision, and still quick to expand into integers.
 _LARGEST_DECIMAL_EXPONENT = 5000
 _LONGEST_TEXT = 5000
+_TOO_LONG = f"digits and exponent of a number may make at most {_LARGEST_DECIMAL_EXPONENT}"
 
 _DECIMAL = r"[+-]?(?:\d+(?:_\d+)*\.?(?:\d+(?:_\d+)*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER_AND_UNIT = re.compile(
@@ -54,25 +57,40 @@ ZERO = ExactNumber(Fraction(0))
 
 
 def _rational(text: str | Decimal) -> Fraction:
-    number = text if isinstance(text, Decimal) else Decimal(text.replace("_", ""))
+    try:
+        number = text if isinstance(text, Decimal) else Decimal(text.replace("_", ""))
+    except InvalidOperation:  # an exponent past what Decimal itself holds
+        raise ValueError(f"{_TOO_LONG}; write fewer digits or a larger unit") from None
     if not number.is_finite():
-        raise ValueError("given a number that is not finite; allowed are finite numbers")
+        raise ValueError("finite numbers are allowed")
     exponent = number.as_tuple().exponent
     assert isinstance(exponent, int)
     if number and abs(exponent) + len(number.as_tuple().digits) > _LARGEST_DECIMAL_EXPONENT:
-        raise ValueError(
-            f"given a number with an exponent or digits beyond {_LARGEST_DECIMAL_EXPONENT}; "
-            "write fewer digits or a larger unit"
-        )
+        raise ValueError(f"{_TOO_LONG}; write fewer digits or a larger unit")
     return Fraction(number)
 
 
 def _power(base: Fraction, exponent: Fraction) -> Fraction:
     if exponent.denominator != 1 or abs(exponent) > _LARGEST_DECIMAL_EXPONENT:
-        raise ValueError("a power in a number needs a whole exponent of moderate size, as in 2^-20")
+        raise ValueError(
+            f"a power in a number needs a whole exponent of at most {_LARGEST_DECIMAL_EXPONENT}, as in 2^-20"
+        )
     if base == 0 or max(abs(base.numerator), base.denominator) > 10**6:
         raise ValueError("a power in a number needs a base between 1e-6 and 1e6, as in 2^-20")
     return base ** int(exponent)
+
+
+def _arithmetic(match: re.Match[str]) -> Fraction:
+    """The number of a text, with its one division or power."""
+    rational = _rational(match["number"])
+    if match["operand"] is None:
+        return rational
+    operand = _rational(match["operand"])
+    if match["operator"] != "/":
+        return _power(rational, operand)
+    if operand == 0:
+        raise ValueError("a divisor other than zero is allowed")
+    return rational / operand
 
 
 def _from_text(text: str, unit: str) -> ExactNumber:
@@ -81,31 +99,26 @@ def _from_text(text: str, unit: str) -> ExactNumber:
     match = _NUMBER_AND_UNIT.fullmatch(text)
     if match is None:
         raise ValueError(
-            f'given "{text[:60]}"; a number, or a string of a number and a unit, is allowed, '
+            f"given {shown(text)}; a number, or a string of a number and a unit, is allowed, "
             f'such as 1.5, "1/3", "2^-20" or {example(unit)}'
         )
-    rational = _rational(match["number"])
-    if match["operand"] is not None:
-        operand = _rational(match["operand"])
-        if match["operator"] != "/":
-            rational = _power(rational, operand)
-        elif operand == 0:
-            raise ValueError(f'given "{text[:60]}", a division by zero')
-        else:
-            rational = rational / operand
+    try:
+        rational = _arithmetic(match)
+    except ValueError as error:
+        raise ValueError(f"given {shown(text)}; {error}") from None
     if match["unit"] is None:
         return ExactNumber(rational)
     try:
         factor, pi_power = units.conversion(match["unit"].strip(), unit)
     except units.UnitError as error:
-        raise ValueError(f'given "{text[:60]}": {error}; write for instance {example(unit)}') from None
+        raise ValueError(f"given {shown(text)}: {error}; write for instance {example(unit)}") from None
     return ExactNumber(rational * factor, pi_power)
 
 
 def example(unit: str) -> str:
     """An example of a number with a unit, for messages."""
     return {
-        "1": '"1"',
+        "1": '"1/3"',
         "rad": '"23.44 deg"',
         "rad/s": '"7.292115e-5 rad/s"',
         "s": '"430 day"',
@@ -129,12 +142,13 @@ def parse_number(value: Any, unit: str) -> ExactNumber:
     if isinstance(value, ExactNumber):
         return value
     if isinstance(value, bool) or not isinstance(value, int | float | Decimal | str):
-        kind = {"bool": "true/false", "list": "an array", "dict": "a table"}.get(
-            type(value).__name__, type(value).__name__
-        )
-        raise ValueError(f"given {kind}; a number is allowed, in {unit}, or {example(unit)}")
+        number = "a number" if unit == "1" else f"a number (in {unit})"
+        raise ValueError(f"given {shown(value)}; {number}, or a string such as {example(unit)}, is allowed")
     if isinstance(value, str):
         return _from_text(value, unit)
-    if isinstance(value, float) and value - value != 0.0:
+    if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"given {value}; finite numbers are allowed")
-    return ExactNumber(_rational(value) if isinstance(value, Decimal) else Fraction(value))
+    try:
+        return ExactNumber(_rational(value) if isinstance(value, Decimal) else Fraction(value))
+    except ValueError as error:
+        raise ValueError(f"given {shown(value)}; {error}") from None

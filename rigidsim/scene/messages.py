@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -19,10 +20,45 @@ _LATER: dict[tuple[str, ...], str] = {
 _LATER_VALUES: dict[tuple[str, ...], tuple[Any, str]] = {
     ("integrator", "method"): ("closed_form", "not in this version yet; allowed: taylor"),
     ("integrator", "hold_invariants"): (True, "not in this version yet; allowed: false"),
-    ("integrator", "formulation"): ("canonical", "not in this version yet"),
+    ("integrator", "formulation"): (
+        "canonical",
+        "not in this version yet; allowed: auto, rates, quaternion, euler_angles, rotation_matrix",
+    ),
     ("output", "lyapunov"): (True, "not in this version yet; allowed: false"),
 }
-_TABLES = ("body", "initial", "loads", "time", "integrator", "output", "limits")
+_LATER_LOADS = ("gravity_gradient", "central_gravity", "torque", "force", "viscous_torque")
+_TABLES = (
+    "body",
+    "initial",
+    "loads",
+    "time",
+    "integrator",
+    "output",
+    "limits",
+    "parameters",
+    "events",
+    "sweep",
+)
+_ARRAYS_OF_TABLES = ("loads", "events")
+UNION_TAGS = ("as a name", "as a point")
+"""Names of a union's alternatives; they are no part of the user's key."""
+
+
+def shown(value: Any) -> str:
+    """A value of a TOML file as the user would write it, shortened, for messages."""
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list):
+        inside = ", ".join(shown(x) for x in value[:4])
+        return f"[{inside}{', ...' if len(value) > 4 else ''}]"
+    if isinstance(value, str):
+        return f'"{value}"' if len(value) <= 60 else f'"{value[:57]}..."'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and value.bit_length() > 200:
+        value = Decimal(value).normalize()
+    text = str(value).lower().replace("infinity", "inf")
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def nearest(given: str, allowed: Iterable[str]) -> str:
@@ -38,10 +74,10 @@ def place(location: Iterable[str | int]) -> str:
         return "config"
     if parts[0] in _TABLES:
         head, rest = f"[{parts[0]}]", parts[1:]
-        if parts[0] == "loads":
-            head = "[[loads]]"
+        if parts[0] in _ARRAYS_OF_TABLES:
+            head = f"[[{parts[0]}]]"
             if rest and isinstance(rest[0], int):
-                head, rest = f"[[loads]] number {rest[0] + 1}", rest[1:]
+                head, rest = f"{head} number {rest[0] + 1}", rest[1:]
     else:
         head, rest = "", parts
     path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in rest).lstrip(".")
@@ -55,8 +91,17 @@ def later_features(table: Mapping[str, Any]) -> list[Problem]:
         if _value_at(table, path) is not None:
             problems.append(Problem(place(path), why + "; remove the key"))
     for path, (value, why) in _LATER_VALUES.items():
-        if _value_at(table, path) == value:
-            problems.append(Problem(place(path), f"given {value!r}: {why}"))
+        given = _value_at(table, path)
+        if type(given) is type(value) and given == value:
+            problems.append(Problem(place(path), f"given {shown(given)}: {why}"))
+    loads = table.get("loads")
+    for number, load in enumerate(loads if isinstance(loads, list) else []):
+        kind = _value_at(load, ("kind",))
+        if kind in _LATER_LOADS:
+            where = place(("loads", number, "kind"))
+            problems.append(
+                Problem(where, f"given {shown(kind)}: not in this version yet; allowed: uniform_gravity")
+            )
     return problems
 
 
@@ -89,17 +134,6 @@ def _first_model(annotation: Any) -> type[BaseModel] | None:
     return None
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
-    if isinstance(value, Mapping):
-        text = "a table"
-    elif isinstance(value, bool):
-        text = str(value).lower()
-    elif isinstance(value, str):
-        text = f'"{value}"'
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
 def _what(model: type[BaseModel], error: Mapping[str, Any]) -> str:
     kind, context = error["type"], error.get("ctx", {})
     location, given = tuple(error["loc"]), error["input"]
@@ -114,22 +148,22 @@ def _what(model: type[BaseModel], error: Mapping[str, Any]) -> str:
         allowed = context.get("expected", context.get("expected_tags", ""))
         allowed = allowed.replace("'", "").replace(" or ", ", ")
         names = [part.strip() for part in allowed.split(",")]
-        return f"given {_short(given)}{nearest(str(given), names)}; allowed: {', '.join(names)}"
-    if kind in ("too_short", "too_long"):
-        low, high = context.get("min_length"), context.get("max_length")
-        count = f"at least {low}" if high is None else f"exactly {high if low is None else low}"
-        return f"given {context['actual_length']} entries; {count} are needed"
+        return f"given {shown(given)}{nearest(str(given), names)}; allowed: {', '.join(names)}"
+    if kind == "too_short":  # arrays of fixed length report theirs themselves
+        return "given an empty array; at least one entry is needed"
+    if kind == "kind_of_value":
+        return f"given {shown(given)}; {error['msg']}"
     if kind in ("list_type", "model_type", "model_attributes_type"):
         wanted = "an array" if kind == "list_type" else "a table"
-        return f"given {_short(given)}; {wanted} is allowed"
+        return f"given {shown(given)}; {wanted} is allowed"
     if kind in ("int_type", "int_from_float"):
-        return f"given {_short(given)}; a whole number is allowed"
+        return f"given {shown(given)}; a whole number, without point or exponent, is allowed"
     if kind == "string_type":
-        return f"given {_short(given)}; a string is allowed"
+        return f"given {shown(given)}; a string is allowed"
     if kind == "bool_type":
-        return f"given {_short(given)}; true or false is allowed"
+        return f"given {shown(given)}; true or false is allowed"
     if kind == "greater_than_equal":
-        return f"given {_short(given)}; at least {context['ge']} is allowed"
+        return f"given {shown(given)}; at least {context['ge']} is allowed"
     return str(error["msg"])
 
 
@@ -137,12 +171,8 @@ def config_error(model: type[BaseModel], error: ValidationError) -> ConfigError:
     """All that the validator found, one problem per key, in the words of ``Problem``."""
     problems: dict[str, Problem] = {}
     for item in error.errors(include_url=False):
-        # the alternatives of a union each report; the branch's name is no part of the user's key
-        location = tuple(
-            part
-            for part in item["loc"]
-            if not (isinstance(part, str) and ("[" in part or part in ("str", "int", "none")))
-        )
+        # the alternatives of a union each report; their names are no part of the user's key
+        location = tuple(part for part in item["loc"] if part not in UNION_TAGS)
         where = place(location)
         problem = Problem(where, _what(model, {**item, "loc": location}))
         problems.setdefault(where, problem)

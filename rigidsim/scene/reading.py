@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -55,29 +57,38 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text, parse_float=_decimal)
     except (ValueError, RecursionError) as error:
-        raise ConfigError(Problem("TOML", f"can't be read: {error}"), source) from None
+        text = re.sub(r"\(('[^()]*'),?\)", _dotted, str(error))
+        raise ConfigError(Problem("TOML", f"can't be read: {text}"), source) from None
+
+
+def _dotted(key: re.Match[str]) -> str:
+    """tomllib shows a key as a Python tuple; the user wrote a dotted key."""
+    return '"' + key[1].strip("'").replace("', '", ".") + '"'
 
 
 def _apply(table: dict[str, Any], assignment: str) -> None:
     """One ``--set KEY=VALUE``: dotted key with optional [index], TOML value (a bare word is a string)."""
     key, equals, value_text = assignment.partition("=")
     where = f"--set {assignment[:60]}"
-    if not equals or not key.strip():
-        raise ConfigError(Problem(where, "write KEY=VALUE, such as time.end=10"))
+    if not equals or not key.strip() or "\n" in assignment:
+        raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
     try:
         value = tomllib.loads(f"value = {value_text}", parse_float=_decimal)["value"]
     except (ValueError, RecursionError):
         value = value_text.strip()
     steps: list[str | int] = []
     for part in key.strip().split("."):
-        name, *indices = part.replace("]", "").split("[")
-        steps.append(name)
-        try:
-            steps.extend(int(index) for index in indices)
-        except ValueError:
-            raise ConfigError(Problem(where, f'"{part}" has an index that is no number')) from None
+        match = re.fullmatch(r"([^\[\]]+)((?:\[\d{1,9}\])*)", part.strip())
+        if match is None:
+            raise ConfigError(
+                Problem(
+                    where, f'"{part}" is not a key, or a key with an index counted from 0, such as times[0]'
+                )
+            )
+        steps.append(match[1])
+        steps.extend(int(index) for index in re.findall(r"\d+", match[2]))
     target: Any = table
-    for step, following in zip(steps, steps[1:], strict=False):
+    for step, following in pairwise(steps):
         if isinstance(target, dict) and isinstance(step, str):
             target = target.setdefault(step, [] if isinstance(following, int) else {})
         elif isinstance(target, list) and isinstance(step, int) and 0 <= step < len(target):
@@ -108,14 +119,17 @@ def parse(text: str, *, source: str = "config", overrides: Sequence[str] = ()) -
     try:
         for assignment in overrides:
             _apply(table, assignment)
-        later = messages.later_features(table)
-        if later:
-            raise ConfigError(later)
-        config = Config.model_validate(table)
-    except ValidationError as error:
-        raise messages.config_error(Config, error).at(source) from None
     except ConfigError as error:
         raise error.at(source) from None
+    problems = messages.later_features(table)
+    try:
+        config = Config.model_validate(table)
+    except ValidationError as error:
+        named = {problem.where for problem in problems}
+        found = messages.config_error(Config, error).problems
+        problems += [problem for problem in found if problem.where not in named]
+    if problems:
+        raise ConfigError(problems, source)
     if overrides:
         text = text.rstrip("\n") + "\n" + "".join(f"#:set {line}\n" for line in overrides)
     return Experiment(text, config, source)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import attitude, schema
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.context import Matrix, Vector, apply, context_for, dot, transpose
+from rigidsim.scene.messages import shown
 from rigidsim.scene.reading import Experiment
 
 _MOST_SAMPLES = 10**12
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -91,18 +95,31 @@ def build_scene(experiment: Experiment) -> Scene:
     """
     config = experiment.config
     context = context_for(config.integrator.precision)
+    problems: list[Problem] = []
+
+    def attempt(part: Callable[..., T], *arguments: Any) -> T | None:
+        try:
+            return part(*arguments)
+        except ConfigError as error:
+            problems.extend(error.problems)
+            return None
+
+    body = attempt(build_body, config.body, context)
+    orientation = attempt(_initial_attitude, config, context)
+    times = attempt(_times, config, context)
+    attempt(_check_limits, config)
+    if body is None or orientation is None or times is None or problems:
+        raise ConfigError(problems, experiment.source)
+    quaternion, angles = orientation
+    start, end, samples = times
     try:
-        body = build_body(config.body, context)
         inverse = inverse_inertia(context, body)
-        quaternion, angles = _initial_attitude(config, context)
         gravity = _gravity(config, context)
         position, velocity = _translation(config, body, context)
         if gravity is not None and body.mass is None:
             off_center = any(x != 0 for x in body.center_of_mass)
             if position is not None or off_center:
                 raise _fail("body", "mass", "missing; uniform_gravity needs it")
-        start, end, samples = _times(config, context)
-        _check_limits(config)
         return Scene(
             name=config.name,
             description=config.description,
@@ -131,7 +148,11 @@ def _fail(table: str, key: str, text: str) -> ConfigError:
 def _initial_attitude(config: schema.Config, context: Any) -> tuple[Vector, Vector | None]:
     table = config.initial
     if table.quaternion is not None and table.euler_angles is not None:
-        raise _fail("initial", "euler_angles", "given beside quaternion; only one attitude is allowed")
+        raise _fail(
+            "initial",
+            "euler_angles",
+            "given beside quaternion; only one attitude is allowed: remove one of them",
+        )
     if table.euler_angles is not None:
         angles = [x.at(context) for x in table.euler_angles]
         sequence = config.integrator.euler_sequence
@@ -151,8 +172,12 @@ def _initial_rates(
 ) -> Vector:
     table = config.initial
     if (table.angular_velocity is None) == (table.angular_momentum is None):
-        given = "neither" if table.angular_velocity is None else "both"
-        raise _fail("initial", "angular_velocity", f"given {given} of it and angular_momentum; one is needed")
+        given, joined = ("neither", "nor") if table.angular_velocity is None else ("both", "and")
+        raise _fail(
+            "initial",
+            "angular_velocity",
+            f"given {given} this {joined} angular_momentum; exactly one is needed",
+        )
     if table.angular_velocity is not None:
         rates = [x.at(context) for x in table.angular_velocity]
         key = "angular_velocity"
@@ -164,7 +189,11 @@ def _initial_rates(
         key = "angular_momentum"
         for moment, axis in zip(body.principal_moments, body.principal_axes, strict=True):
             if moment == 0 and abs(dot(axis, momentum)) > max(abs(m) for m in momentum) * 1e-14:
-                raise _fail("initial", key, "has a part along the axis that has no moment of inertia")
+                raise _fail(
+                    "initial",
+                    key,
+                    "has a part along the axis that has no moment of inertia; make that part zero",
+                )
     for moment, axis in zip(body.principal_moments, body.principal_axes, strict=True):
         if moment == 0 and abs(dot(axis, rates)) > max(abs(r) for r in rates) * 1e-14:
             raise _fail(
@@ -192,7 +221,7 @@ def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[
     if any(x != 0 for x in body.center_of_mass):
         raise _fail(
             "body",
-            "reference",
+            "center_of_mass" if config.body.center_of_mass is not None else "reference",
             "a body with a position or velocity turns about its centre of mass, but the inertia is given "
             "about another point; give it about the centre of mass (remove reference or center_of_mass)",
         )
@@ -208,13 +237,13 @@ def _times(config: schema.Config, context: Any) -> tuple[Any, Any, SampleTimes]:
     table = config.time
     ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
     if len(ways) > 1:
-        raise _fail("time", ways[1], f"given beside {ways[0]}; one of samples, every, times is allowed")
+        raise _fail("time", ways[1], f"given beside {ways[0]}; only one of samples, every, times is allowed")
     start = table.start.at(context)
     if table.times is not None:
         times = [t.at(context) for t in table.times]
         if not times:
-            raise _fail("time", "times", "given an empty list; at least one time is needed")
-        for i, (a, b) in enumerate(zip(times, times[1:], strict=False)):
+            raise _fail("time", "times", "given an empty array; at least one time is needed")
+        for i, (a, b) in enumerate(pairwise(times)):
             if not a < b:
                 raise _fail(
                     "time",
@@ -222,10 +251,20 @@ def _times(config: schema.Config, context: Any) -> tuple[Any, Any, SampleTimes]:
                     f"given {context.nstr(b, 12)} after {context.nstr(a, 12)}; times must increase",
                 )
         if times[0] < start:
-            raise _fail("time", "times[0]", f"lies before start ({context.nstr(start, 12)} s)")
+            raise _fail(
+                "time",
+                "times[0]",
+                f"given {context.nstr(times[0], 12)} s; start ({context.nstr(start, 12)} s) or later is "
+                "allowed",
+            )
         end = table.end.at(context) if table.end is not None else times[-1]
         if times[-1] > end:
-            raise _fail("time", "times", f"the last lies after end ({context.nstr(end, 12)} s)")
+            raise _fail(
+                "time",
+                f"times[{len(times) - 1}]",
+                f"given {context.nstr(times[-1], 12)} s; end ({context.nstr(end, 12)} s) or earlier is "
+                "allowed",
+            )
         return start, end, SampleTimes(start, end - start, 0, times, len(times))
     if table.end is None:
         raise _fail("time", "end", "missing; it must be given, unless times are")
@@ -248,12 +287,19 @@ def _times(config: schema.Config, context: Any) -> tuple[Any, Any, SampleTimes]:
         # an end on the grid is a sample, also where the quotient was rounded just below a whole number
         intervals = int(context.floor(ratio + context.mpf(2) ** (60 - context.prec)))
         if intervals == 0:
-            raise _fail("time", "every", "longer than the whole run; at most end - start is allowed")
+            raise _fail(
+                "time",
+                "every",
+                f"given {context.nstr(step, 12)} s, longer than the whole run; at most end - start "
+                f"({context.nstr(end - start, 12)} s) is allowed",
+            )
         return start, end, SampleTimes(start, step * intervals, intervals, None, intervals + 1)
     count = table.samples if table.samples is not None else 1001
     if not 2 <= count <= _MOST_SAMPLES:
         raise _fail(
-            "time", "samples", f"given {count}; 2 to 1e12 are allowed (the first at start, the last at end)"
+            "time",
+            "samples",
+            f"given {shown(count)}; 2 to 1e12 are allowed (the first at start, the last at end)",
         )
     return start, end, SampleTimes(start, end - start, count - 1, None, count)
 

@@ -7,25 +7,31 @@ axis without inertia, ...) is checked where the scene is built.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     PlainValidator,
     StrictBool,
     StrictInt,
     StrictStr,
+    Tag,
     WithJsonSchema,
     field_validator,
 )
 from pydantic_core import PydanticCustomError
 
 from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.messages import nearest, shown
 from rigidsim.scene.shapes import SHAPES
 
-LARGEST_DIGITS = 1000
+# A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
+# room for numbers down to 1e-70.
+LARGEST_DIGITS = 250
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
 FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix")
 RECORDABLE = (
@@ -70,14 +76,40 @@ def quantity(unit: str) -> Any:
     return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(shown)]
 
 
+def _exactly(count: int) -> BeforeValidator:
+    def validate(value: Any) -> Any:
+        if isinstance(value, list) and len(value) != count:
+            raise _refuse(f"given {len(value)} {'entry' if len(value) == 1 else 'entries'}; "
+                          f"exactly {count} are needed")  # fmt: skip
+        return value
+
+    return BeforeValidator(validate)
+
+
 T = TypeVar("T")
-Triple = Annotated[list[T], Field(min_length=3, max_length=3)]
+Triple = Annotated[list[T], Field(min_length=3, max_length=3), _exactly(3)]
 """A vector of three."""
+Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
+"""A quaternion."""
+
+
+def _kind_of_reference(value: Any) -> str | None:
+    if isinstance(value, str):
+        return "as a name"
+    return "as a point" if isinstance(value, list) else None
+
 
 if TYPE_CHECKING:
-    Dimensionless = Metre = Kilogram = Second = Moment = Rate = Angle = Momentum = Speed = Acceleration = (
-        ExactNumber
-    )
+    Dimensionless: TypeAlias = ExactNumber
+    Metre: TypeAlias = ExactNumber
+    Kilogram: TypeAlias = ExactNumber
+    Second: TypeAlias = ExactNumber
+    Moment: TypeAlias = ExactNumber
+    Rate: TypeAlias = ExactNumber
+    Angle: TypeAlias = ExactNumber
+    Momentum: TypeAlias = ExactNumber
+    Speed: TypeAlias = ExactNumber
+    Acceleration: TypeAlias = ExactNumber
 else:
     Dimensionless = quantity("1")
     Metre = quantity("m")
@@ -122,8 +154,6 @@ class Solid(Table):
     @classmethod
     def _known_shape(cls, value: str | None) -> str | None:
         if value is not None and value not in SHAPES:
-            from rigidsim.scene.messages import nearest
-
             raise _refuse(f'given "{value}"{nearest(value, SHAPES)}; allowed: {", ".join(SHAPES)}')
         return value
 
@@ -134,7 +164,7 @@ class Part(Solid):
     shape: StrictStr
     mass: Kilogram
     position: Triple[Metre] = Field(default_factory=lambda: [ZERO] * 3)
-    quaternion: Annotated[list[Dimensionless], Field(min_length=4, max_length=4)] | None = None
+    quaternion: Four[Dimensionless] | None = None
 
 
 class Body(Solid):
@@ -147,7 +177,18 @@ class Body(Solid):
     preset: StrictStr | None = None
     mass: Kilogram | None = None
     center_of_mass: Triple[Metre] | None = None
-    reference: StrictStr | Triple[Metre] | None = None
+    reference: (
+        Annotated[
+            Annotated[StrictStr, Tag("as a name")] | Annotated[Triple[Metre], Tag("as a point")],
+            Discriminator(
+                _kind_of_reference,
+                custom_error_type="kind_of_value",
+                custom_error_message='"center_of_mass", a landmark of the shape such as "corner", or a point '
+                "[x, y, z] is allowed",
+            ),
+        ]
+        | None
+    ) = None
 
 
 class Initial(Table):
@@ -155,7 +196,7 @@ class Initial(Table):
 
     angular_velocity: Triple[Rate] | None = None
     angular_momentum: Triple[Momentum] | None = None
-    quaternion: Annotated[list[Dimensionless], Field(min_length=4, max_length=4)] | None = None
+    quaternion: Four[Dimensionless] | None = None
     euler_angles: Triple[Angle] | None = None
     position: Triple[Metre] | None = None
     velocity: Triple[Speed] | None = None
@@ -205,7 +246,7 @@ class Integrator(Table):
         if isinstance(value, str) and value in PRECISION_NAMES:
             return value
         raise _refuse(
-            f"given {value!r}; allowed: {', '.join(PRECISION_NAMES)}, "
+            f"given {shown(value)}; allowed: {', '.join(PRECISION_NAMES)}, "
             f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
         )
 
@@ -219,7 +260,7 @@ class Integrator(Table):
         except ValueError as error:
             raise _refuse(f'{error}; or "auto"') from None
         if not 0 < number.rational <= 1:
-            raise _refuse(f'given {value}; allowed: above 0 and at most 1, or "auto"')
+            raise _refuse(f'given {shown(value)}; allowed: above 0 and at most 1, or "auto"')
         return number
 
 
@@ -234,14 +275,12 @@ class Output(Table):
     @field_validator("record")
     @classmethod
     def _recordable(cls, value: list[str] | None) -> list[str] | None:
-        from rigidsim.scene.messages import nearest
-
         for name in value or []:
             if name not in RECORDABLE:
                 near = nearest(name, RECORDABLE)
                 raise _refuse(f'given "{name}"{near}; allowed: {", ".join(RECORDABLE)}')
         if value is not None and not value:
-            raise _refuse("given an empty list; name at least one variable, or leave the key out")
+            raise _refuse("given an empty array; name at least one variable, or leave the key out")
         if value is not None and len(set(value)) < len(value):
             raise _refuse("a variable is named twice; name each once")
         return value

@@ -67,7 +67,7 @@ class UnitError(ValueError):
 def _registry() -> Any:
     import pint  # only configs that write units pay for it
 
-    registry = pint.UnitRegistry(None, non_int_type=Fraction)
+    registry: Any = pint.UnitRegistry(None, non_int_type=Fraction)
     registry.load_definitions(_DEFINITIONS)
     return registry
 
@@ -85,8 +85,8 @@ def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
         quantity = _registry().Quantity(Fraction(1), unit).to_root_units()
     except pint.UndefinedUnitError as error:
         raise UnitError(f'unknown unit "{error.args[0]}"; {known_units()}') from None
-    except Exception as error:  # pint and its tokenizer raise many kinds on malformed text
-        raise UnitError(f'"{text}" is not a unit ({error})') from None
+    except Exception:  # pint and its tokenizer raise many kinds on malformed text
+        raise UnitError(f'"{text}" is not a unit') from None
     powers = {str(name): Fraction(power) for name, power in quantity._units.items()}
     pi_power = powers.pop("pi", Fraction(0))
     powers.pop("radian", None)
@@ -114,6 +114,8 @@ def conversion(text: str, expected: str) -> tuple[Fraction, int]:
     """
     factor, pi_power, dimensions = _to_si(text)
     wanted_factor, _, wanted = _to_si(expected) if expected != "1" else (Fraction(1), 0, {})
+    if dimensions != wanted and expected == "1":
+        raise UnitError(f'"{text}" is a unit, where only a number without one is allowed')
     if dimensions != wanted:
         raise UnitError(f'"{text}" is not a unit of the dimension asked for, which is {expected}')
     return factor / wanted_factor, pi_power

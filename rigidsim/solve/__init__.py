@@ -1,0 +1,1 @@
+"""Numbers: precisions, the advance loop, sampling, evaluation."""

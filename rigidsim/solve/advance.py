@@ -19,10 +19,15 @@ from rigidsim.solve.winding import INTERVAL, Winding
 _CHUNK_SECONDS = 0.1
 _BLOCK_STEPS = 4096
 _WORTH_A_BLOCK = 64  # steps; fewer are cheaper one by one
-_SPARSE = 20.0  # steps per sample from which skipping pays
+_SPARSE = 12.0  # steps per sample from which skipping pays
+_FADING = 0.98  # of the longest step, per chunk
+_LOOK_AHEAD = 16  # samples
 _MARGIN = 0.9  # of the predicted steps to the next sample that are skipped at once
 _HOPELESS_STEPS = 1e15
+_LONG_GAP = 200.0  # steps over which the mean step is a good guide
+_MEAN_MARGIN = 0.85
 _ROWS_AT_ONCE = 8192
+_PATIENCE = 2.0  # seconds until samples of a slow run are handed over
 
 
 @dataclass
@@ -78,11 +83,14 @@ class Advance:
     check: Check
     progress: Progress = field(init=False)
     _pace: float = field(default=0.0, init=False)  # steps per second, measured
+    _longest: float = field(default=0.0, init=False)  # step of late, internal units
+    _mean: float = field(default=0.0, init=False)  # step over the latest long skip; 0 where unknown
 
     def __post_init__(self) -> None:
         self.progress = Progress(self.clock.count)
         self._buffer: list[tuple[np.ndarray, np.ndarray]] = []
         self._buffered = 0
+        self._flushed = time.perf_counter()
         self._last = float(self.clock.at(self.clock.count - 1))
 
     def run(self) -> Progress:
@@ -111,11 +119,12 @@ class Advance:
                 self._flush()
                 progress.status = Status.NON_FINITE
                 return progress
-            if self._buffered >= _ROWS_AT_ONCE:
+            if self._buffered >= _ROWS_AT_ONCE or time.perf_counter() - self._flushed > _PATIENCE:
                 self._flush()
             if self._hopeless():
                 self._flush()
                 progress.status = Status.COLLAPSED
+                progress.last_good = self.stepper.mark()
                 return progress
         self._flush()
         progress.status = Status.FINISHED
@@ -128,19 +137,29 @@ class Advance:
     def _go_on(self) -> bool:
         """One chunk: choose how, and never pass a wrap of angles or the patience of a user."""
         upcoming = self.clock.at(self.progress.next_sample + self._buffered)
-        step = self.stepper.largest
+        # steps of a tumbling body vary a lot: predict with the longest of late, which fades slowly
+        self._longest = step = max(self.stepper.largest, _FADING * self._longest)
         gap = float(upcoming) - float(self.stepper.time)
         patience = max(1, int(self._pace * _CHUNK_SECONDS))
         wrap_in = INTERVAL - self.stepper.steps % INTERVAL if self.winding.positions else patience
         expected = gap / step if step > 0 else 0.0
         if expected > _SPARSE:
-            count = int(min(_MARGIN * expected - 2, patience, wrap_in))
-            return self._wrapped(self._skip(count, upcoming))
-        if self.precision.cheap and not self.winding.positions and step > 0:
+            count = _MARGIN * expected - 2
+            if self._mean > 0 and gap / self._mean > _LONG_GAP:
+                count = max(count, _MEAN_MARGIN * gap / self._mean)
+            return self._wrapped(self._skip(int(min(count, patience, wrap_in)), upcoming))
+        if step > 0 and self.precision.cheap and not self.winding.positions and self._dense(step):
             left = int((self._last - float(self.stepper.time)) / step)
             if left >= _WORTH_A_BLOCK:
                 return self._block(min(_BLOCK_STEPS, max(patience, _WORTH_A_BLOCK), left))
-        return self._step_by_step(min(patience, wrap_in))
+        return self._step_by_step(min(patience, wrap_in), upcoming)
+
+    def _dense(self, step: float) -> bool:
+        """Whether the next samples lie so close that skipping to each wouldn't pay."""
+        first = self.progress.next_sample + self._buffered
+        ahead = min(first + _LOOK_AHEAD, self.clock.count - 1)
+        span = float(self.clock.at(ahead)) - float(self.stepper.time)
+        return span / step <= _SPARSE * max(ahead - first, 1)
 
     def _wrapped(self, fine: bool) -> bool:
         if fine and self.winding.positions and self.stepper.steps % INTERVAL == 0:
@@ -154,17 +173,19 @@ class Advance:
     def _skip(self, count: int, upcoming: Any) -> bool:
         """Many steps towards a sample; if they went past it, back and again, nearer."""
         mark, before = self.stepper.mark(), self.stepper.steps
+        begin = float(self.stepper.time)
         fine = self.stepper.skip(count)
         if not fine:
             return self._find_last_good(mark, before)
         if self.stepper.time > upcoming:
             self.progress.redone_steps += self.stepper.steps - before
-            largest = self.stepper.largest
+            self._longest = 1.5 * max(self._longest, self.stepper.largest)
+            self._mean = 0.0
             self.stepper.back_to(mark, before)
-            self.stepper.largest = largest * 1.5  # expect longer steps next time
             return True
         self._note_steps()
-        self.progress.last_good = None
+        if count >= _LONG_GAP / 2:
+            self._mean = (float(self.stepper.time) - begin) / count
         return True
 
     def _block(self, count: int) -> bool:
@@ -184,21 +205,26 @@ class Advance:
             self.stepper.skip(max(needed, 1))
         return True
 
-    def _step_by_step(self, count: int) -> bool:
+    def _step_by_step(self, count: int, upcoming: Any) -> bool:
+        """Single steps up to the first that reaches a sample, and on while each reaches one."""
+        mark, before = self.stepper.mark(), self.stepper.steps
         for _ in range(count):
-            mark, before = self.stepper.mark(), self.stepper.steps
             if not self.stepper.step():
-                self.stepper.back_to(mark, before)
-                self.progress.last_good = mark
-                return False
+                return self._find_last_good(mark, before)
             self._note_steps()
-            first = self.progress.next_sample + self._buffered
-            if self.clock.at(first) <= self.stepper.time:
+            if upcoming <= self.stepper.time:
+                first = self.progress.next_sample + self._buffered
                 times = self._times_until(first, self.stepper.time)
                 self._keep(times, np.array([self.stepper.dense(t) for t in times]))
-            self._wrapped(True)
-            if self.progress.next_sample + self._buffered >= self.clock.count:
-                break
+                self._wrapped(True)
+                if first + len(times) >= self.clock.count:
+                    break
+                upcoming = self.clock.at(first + len(times))
+                if float(upcoming) - float(self.stepper.time) > _SPARSE * self.stepper.largest:
+                    break
+                mark, before = self.stepper.mark(), self.stepper.steps
+            else:
+                self._wrapped(True)
         return True
 
     def _find_last_good(self, mark: Mark, before: int) -> bool:
@@ -235,6 +261,7 @@ class Advance:
 
     def _flush(self) -> None:
         """Hand the buffered samples over, in blocks of bounded size."""
+        self._flushed = time.perf_counter()
         if not self._buffer:
             return
         times, states, turns = (np.concatenate(c) for c in zip(*self._buffer, strict=True))

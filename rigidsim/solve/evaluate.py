@@ -12,6 +12,8 @@ from rigidsim.model.system import Recorded, System
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.winding import Winding
 
+_GROUP = 64  # rows; a multiple of every SIMD width
+
 
 @dataclass
 class Memory:
@@ -44,7 +46,7 @@ class Evaluator:
         components = [x for invariant in system.invariants for x in invariant.expressions]
         self._invariants = self._compile(components)
         initial = precision.array(system.initial)
-        self.initial = self._invariants(initial)
+        self.initial = self._rowwise(self._invariants, initial[None, :])[:, 0] if components else initial[:0]
         self._parameters = len(components)
         factor = system.singular_factor
         self._singular = None if factor is None else self._compile([factor])
@@ -53,8 +55,22 @@ class Evaluator:
         """What vanishes in the formulation's singularity, at states (n, states); None without one."""
         if self._singular is None:
             return None
-        values = self._singular(np.ascontiguousarray(states.T))
-        return np.asarray(values[0])
+        return self._rowwise(self._singular, states)[0]
+
+    @staticmethod
+    def _rowwise(function: Any, states: np.ndarray, constants: np.ndarray | None = None) -> np.ndarray:
+        """Evaluate at each row of states (n, states); returns (outputs, n).
+
+        heyoka takes rows several at a time and the rest one by one, which differs in the last bit. Rows
+        are padded to whole groups, so that a row's bits don't depend on the block that it came in.
+        """
+        count = len(states)
+        padded = -(-count // _GROUP) * _GROUP
+        if padded > count:
+            states = np.concatenate([states, np.repeat(states[-1:], padded - count, axis=0)])
+        # compiled code for expressions without parameters refuses an array of them
+        arguments = {} if constants is None else {"pars": np.repeat(constants[:, None], padded, axis=1)}
+        return np.asarray(function(np.ascontiguousarray(states.T), **arguments))[:, :count]
 
     def _compile(self, expressions: list[Any]) -> Any:
         return hy.cfunc(
@@ -75,12 +91,8 @@ class Evaluator:
             For each recorded variable float64 parts of shape (n, components) in SI (see
             ``Precision.parts``), and for each invariant its drift, (n, 1), one part.
         """
-        count = len(states)
-        pars = np.repeat(self.initial[:, None], count, axis=1)
         assert self._outputs is not None
-        # compiled code for expressions without parameters refuses an array of them
-        arguments = {"pars": pars} if self._parameters else {}
-        values = self._outputs(np.ascontiguousarray(states.T), **arguments)
+        values = self._rowwise(self._outputs, states, self.initial if self._parameters else None)
         result: dict[str, list[np.ndarray]] = {}
         for variable in self._system.recorded:
             block = values[variable.first : variable.first + variable.count].T

@@ -47,7 +47,7 @@ class Stepper:
             compact_mode=precision.compact,
             **options,
         )
-        far = _FAR if not precision.scalar == np.float32 else 1e37
+        far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
         self.steps = 0
         self.smallest = self.largest = 0.0

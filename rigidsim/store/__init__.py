@@ -1,0 +1,1 @@
+"""Files: segments, the labelled dataset, the run folder, provenance."""

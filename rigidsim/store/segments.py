@@ -21,6 +21,7 @@ from rigidsim.store.variables import Variable
 
 SEGMENT_BYTES = 32_000_000
 SEGMENT_SECONDS = 30.0
+_CHUNKS_AT_ONCE = 16
 
 
 class SegmentWriter:
@@ -65,18 +66,38 @@ class SegmentWriter:
         """Write what is collected; on return it is saved."""
         if not self._blocks:
             return
-        merged = {
+        attributes = {**self._attributes, "segment": self.count, "first_sample": self.saved_rows}
+        content = netcdf.image(self._variables, self._collected(), self._rows, attributes)
+        netcdf.write_bytes(self._folder / f"{self.count:08d}.h5", content)
+        self.count += 1
+        self.saved_rows += self._rows
+        self._blocks, self._rows = [], 0
+
+    def _collected(self) -> netcdf.Block:
+        return {
             v.name: [
                 np.concatenate([block[v.name][part] for block in self._blocks]) for part in range(v.parts)
             ]
             for v in self._variables
         }
-        attributes = {**self._attributes, "segment": self.count, "first_sample": self.saved_rows}
-        content = netcdf.image(self._variables, merged, self._rows, attributes)
-        netcdf.write_bytes(self._folder / f"{self.count:08d}.h5", content)
-        self.count += 1
-        self.saved_rows += self._rows
-        self._blocks, self._rows = [], 0
+
+    def complete(self, target: Path, attributes: Mapping[str, Any]) -> int:
+        """Stream all segments, and what is still in memory, into one compressed dataset.
+
+        The dataset appears atomically; then the segments go. Returns its rows.
+        """
+        paths = segment_paths(self._folder)
+        rows = self.saved_rows + self._rows
+        with netcdf.atomic(target) as temporary:
+            with h5netcdf.File(temporary, "w") as file:
+                netcdf.declare(file, self._variables, rows, attributes, compressed=True)
+                first = 0
+                for path in paths:
+                    first += _copy(path, file, self._variables, first)
+                if self._blocks:
+                    netcdf.fill(file, self._variables, self._collected(), first, self._rows)
+        remove(self._folder)
+        return rows
 
 
 def segment_paths(folder: Path) -> list[Path]:
@@ -92,37 +113,19 @@ def segment_paths(folder: Path) -> list[Path]:
     return paths
 
 
-def merge(folder: Path, target: Path, variables: Sequence[Variable], attributes: Mapping[str, Any]) -> int:
-    """Stream all segments into one compressed dataset, which appears atomically; returns its rows."""
-    paths = segment_paths(folder)
-    sizes = []
-    for path in paths:
-        with h5netcdf.File(path, "r") as file:
-            sizes.append(file.dimensions["time"].size)
-    rows = sum(sizes)
-    with netcdf.atomic(target) as temporary:
-        with h5netcdf.File(temporary, "w") as file:
-            netcdf.declare(file, variables, rows, attributes, compressed=True)
-            first = 0
-            for path, size in zip(paths, sizes, strict=True):
-                _copy(path, file, variables, first, size)
-                first += size
-    return rows
-
-
-def _copy(path: Path, file: Any, variables: Sequence[Variable], first: int, rows: int) -> None:
-    """Chunk by chunk along the target's chunks, so that none is compressed twice."""
+def _copy(path: Path, file: Any, variables: Sequence[Variable], first: int) -> int:
+    """Copy one segment piece by piece, along the target's chunks so that none is compressed twice."""
     with h5netcdf.File(path, "r") as segment:
+        rows = int(segment.dimensions["time"].size)
         start = 0
         while start < rows:
             to_boundary = netcdf.CHUNK_ROWS - (first + start) % netcdf.CHUNK_ROWS
-            stop = min(
-                rows, start + max(to_boundary, 16 * netcdf.CHUNK_ROWS - netcdf.CHUNK_ROWS + to_boundary)
-            )
+            stop = min(rows, start + to_boundary + (_CHUNKS_AT_ONCE - 1) * netcdf.CHUNK_ROWS)
             for variable in variables:
                 for name in variable.part_names():
                     file.variables[name][first + start : first + stop] = segment.variables[name][start:stop]
             start = stop
+    return rows
 
 
 def remove(folder: Path) -> None:

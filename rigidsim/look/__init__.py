@@ -1,0 +1,19 @@
+"""Pictures of a recorded run: rerun timeline, figures, viewer.
+
+Importing this package loads nothing heavy.
+
+| module | holds |
+| --- | --- |
+| `timeline` | `write_timeline`: dataset to `timeline.rrd` |
+| `blueprint` | the page that the viewer opens with |
+| `stage` | the three-dimensional scene as numbers: body, arrows, tracks |
+| `drawing` | that scene and the plots as rerun entities |
+| `plots` | which variable goes into which plot |
+| `clock` | seconds to the viewer's integer timelines |
+| `page` | the summary page |
+| `figures` | `save_figure`: dataset to PNG or SVG |
+| `panels` | the single panels of that figure |
+| `viewer` | `open_viewer`, `screenshot` |
+| `solids` | triangle meshes of bodies |
+| `thinning` | reading a bounded number of rows of a dataset of any length |
+"""

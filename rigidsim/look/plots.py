@@ -1,0 +1,179 @@
+"""Which variable goes into which plot: decided from names, dimensions and units alone.
+
+A new observable or invariant needs no line here: it gets a plot of its own, or joins the plot of
+the scalars that share its unit.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray
+
+Color = tuple[int, int, int]
+
+RED: Color = (235, 97, 89)
+GREEN: Color = (104, 190, 110)
+BLUE: Color = (92, 148, 235)
+GREY: Color = (170, 170, 175)
+_VECTOR = (RED, GREEN, BLUE)
+_PALETTE: tuple[Color, ...] = (
+    (240, 190, 60),
+    (80, 200, 215),
+    (225, 115, 190),
+    (150, 200, 90),
+    (165, 135, 235),
+    (235, 140, 80),
+    (120, 165, 200),
+    (200, 200, 120),
+)
+_MOST_SERIES = 16  # of one variable, so that a recorded matrix history stays readable
+
+
+@dataclass(frozen=True)
+class Series:
+    """One variable as it is plotted.
+
+    Attributes:
+        name: variable of the dataset.
+        labels: names of its curves, one per component.
+        colors: one per component.
+        values: (rows, components) float64.
+    """
+
+    name: str
+    labels: list[str]
+    colors: list[Color]
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One plot: a title with the unit, a place on the page and its variables.
+
+    `place` is one of "drift", "rates", "attitude", "more".
+    """
+
+    key: str
+    title: str
+    place: str
+    series: list[Series] = field(default_factory=list)
+
+
+def plan_plots(dataset: xarray.Dataset) -> list[Plot]:
+    """Plots for every numeric variable along time, in the order in which they are shown.
+
+    Drifts become log10 of their magnitude in a common plot. Scalars of the same unit share a
+    plot; a vector has its own.
+    """
+    plots: dict[str, Plot] = {}
+    variables = list(_variables(dataset))
+    floor = drift_floor([_columns(v) for v in variables if str(v.name).endswith("_drift")])
+    for variable in variables:
+        name = str(variable.name)
+        unit = str(variable.attrs.get("units", ""))
+        vector = variable.ndim > 1
+        if name.endswith("_drift"):
+            key, title, place = "drift", "Drift of invariants, log10", "drift"
+        elif vector:
+            # The name, not the long name: it is short, and what the user meets in the dataset.
+            key, place = name, _place(name)
+            title = _with_unit(name.replace("_", " "), unit)
+        else:
+            key, place = f"scalars {unit}", "more"
+            title = _with_unit(name.replace("_", " "), unit)
+        plot = plots.setdefault(key, Plot(key, title[:1].upper() + title[1:], place))
+        plot.series.append(_series(variable, len(plot.series), floor))
+    return sorted(plots.values(), key=lambda plot: _ORDER.index(plot.place))
+
+
+def drift_floor(drifts: list[NDArray[np.float64]]) -> float:
+    """What a drift of exactly zero is drawn at: a tenth of the low end of all that isn't zero.
+
+    A zero has no logarithm. A fixed floor would flatten the curves of double precision or stand above
+    those of quadruple precision.
+    """
+    magnitude = np.abs(np.concatenate([values.ravel() for values in drifts])) if drifts else np.empty(0)
+    nonzero = magnitude[np.isfinite(magnitude) & (magnitude > 0)]
+    return max(float(np.percentile(nonzero, 2)) / 10, 1e-300) if len(nonzero) else 1e-20
+
+
+_ORDER = ("drift", "rates", "attitude", "more")
+
+
+def _place(name: str) -> str:
+    if name == "angular_velocity":
+        return "rates"
+    return "attitude" if name in ("euler_angles", "quaternion") else "more"
+
+
+def pretty_unit(unit: str) -> str:
+    """A unit as people write it: `kg m2 s-1` (UDUNITS) and `kg m^2/s` both give `kg m²/s`."""
+    above: list[str] = []
+    below: list[str] = []
+    top, *bottom = unit.split("/")
+    for part in (top, *bottom):
+        for base, power in re.findall(r"([^\W\d_]+|1)\^?(-?\d+)?", part):
+            exponent = int(power or 1) * (1 if part is top else -1)
+            digits = str(abs(exponent)).translate(_SUPERSCRIPTS) if abs(exponent) != 1 else ""
+            if base != "1":
+                (above if exponent > 0 else below).append(base + digits)
+    numerator = " ".join(above) or ("1" if below else "")
+    return "/".join([numerator, *below])
+
+
+_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _with_unit(text: str, unit: str) -> str:
+    return f"{text} [{pretty_unit(unit)}]" if pretty_unit(unit) else text
+
+
+def _variables(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:
+    # Angles before quaternions, because people read them; the rest as recorded.
+    names = sorted(map(str, dataset.data_vars), key=lambda name: name != "euler_angles")
+    for name in names:
+        variable = dataset[name]
+        if "time" in variable.dims and variable.dtype.kind in "fiub":
+            yield variable.transpose("time", ...)
+
+
+def _columns(variable: xarray.DataArray) -> NDArray[np.float64]:
+    values = np.asarray(variable.values, dtype=np.float64).reshape(variable.shape[0], -1)
+    return values[:, :_MOST_SERIES]
+
+
+def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
+    name = str(variable.name)
+    values = _columns(variable)
+    count = values.shape[1]
+    if name.endswith("_drift"):
+        labels = [name.removesuffix("_drift").replace("_", " ")]
+        values = np.log10(np.maximum(np.abs(values), floor))
+    elif variable.ndim == 1:
+        labels = [name.replace("_", " ")]
+    else:
+        labels = []
+    if variable.ndim == 2 and variable.dims[1] in variable.coords:
+        components = [str(label) for label in variable.coords[variable.dims[1]].values[:count]]
+        labels = [f"{labels[0]} {c}" for c in components] if labels else components
+    if len(labels) != count:
+        base = labels[0] if labels else name.replace("_", " ")
+        labels = [f"{base} {k}" for k in range(count)]
+    return Series(name, labels, _colors(variable, count, position), values)
+
+
+def _colors(variable: xarray.DataArray, count: int, position: int) -> list[Color]:
+    dimension = variable.dims[1] if variable.ndim == 2 else ""
+    if dimension in ("body_axis", "space_axis") and count == 3:
+        return list(_VECTOR)
+    if dimension == "quaternion_component" and count == 4:
+        return [GREY, *_VECTOR]
+    return [_PALETTE[(position + k) % len(_PALETTE)] for k in range(count)]

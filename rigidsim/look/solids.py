@@ -1,0 +1,321 @@
+"""Triangle meshes of the solids that bodies are made of, coloured so that a rotation shows.
+
+Every mesh is a list of separate triangles (no shared vertices), so that neighbouring patches keep
+sharp colours; normals point outwards and are smooth where the solid is.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SEGMENTS = 64  # around the axis; a multiple of 8, so that colour sectors end on an edge
+MINOR_SEGMENTS = 32  # around a tube or from pole to pole
+THINNESS = 0.02  # thickness of an ideally thin solid, of its largest dimension
+
+# Faces of a cuboid carry the colour of the body axis that they face; the negative side is darker.
+_AXIS_COLORS = ((214, 84, 76), (92, 172, 98), (78, 128, 205))
+_DARKER = 0.62
+_LIGHT = (232, 224, 206)
+_UPPER = (70, 118, 190)
+_LOWER = (200, 96, 62)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A closed triangle mesh.
+
+    Attributes:
+        vertices: (3 T, 3), metres, three per triangle and shared with none.
+        triangles: (T, 3) indices into `vertices`, anticlockwise as seen from outside.
+        normals: (3 T, 3), outward unit normals of the smooth surface.
+        colors: (3 T, 3) uint8, red green blue, constant over a triangle.
+    """
+
+    vertices: Array
+    triangles: NDArray[np.uint32]
+    normals: Array
+    colors: NDArray[np.uint8]
+
+    def moved(self, rotation: Array, shift: Array) -> Mesh:
+        """The mesh rotated by `rotation` (3, 3), then moved by `shift` (3,), metres."""
+        return Mesh(
+            self.vertices @ rotation.T + shift,
+            self.triangles,
+            self.normals @ rotation.T,
+            self.colors,
+        )
+
+    def scaled(self, factor: float) -> Mesh:
+        """The mesh with all lengths multiplied by `factor` > 0."""
+        return Mesh(self.vertices * factor, self.triangles, self.normals, self.colors)
+
+    def volume(self) -> float:
+        """Enclosed volume in m^3 (divergence theorem), positive when normals point outwards."""
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+    def reach(self) -> float:
+        """Largest distance of a vertex from the origin, metres."""
+        return float(np.sqrt((self.vertices**2).sum(axis=1).max()))
+
+
+def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
+    """Mesh of one solid about its own centre of mass, in its own axes.
+
+    Args:
+        solid: a name in `SOLIDS`.
+        dimensions: metres; cuboid `size` [3]; plate `size` [2] (normal z); ellipsoid
+            `semi_axes` [3]; sphere, spherical_shell `radius`; cylinder, cone `radius`, `height`
+            (axis z, apex of the cone towards -z); rod `length` (along z); disk, ring `radius`
+            (normal z); torus `major_radius`, `minor_radius` (axis z); tube `inner_radius`,
+            `outer_radius`, `height`; point `radius`.
+
+    Raises:
+        ValueError: an unknown solid, a dimension that is missing, negative or not finite, or a solid
+            without any extent.
+
+    A dimension of zero is drawn as a fiftieth of the largest one.
+    """
+    if solid not in SOLIDS:
+        raise ValueError(f"drawing: unknown solid {solid!r}; known are {', '.join(sorted(SOLIDS))}")
+    keys, build = SOLIDS[solid]
+    values = []
+    for key, length in keys:
+        if key not in dimensions:
+            raise ValueError(f"drawing: {solid} needs dimension {key!r}, given {list(dimensions)}")
+        value = np.asarray(dimensions[key], dtype=float)
+        if value.size != length or not (np.isfinite(value).all() and (value >= 0).all()):
+            raise ValueError(
+                f"drawing: {solid} {key} must be {length} finite number(s) >= 0, given {dimensions[key]!r}"
+            )
+        values.append(value.reshape(length))
+    largest = max(value.max() for value in values)
+    if largest == 0:
+        raise ValueError(f"drawing: {solid} has no extent, given {dict(dimensions)}")
+    # Ideal rods and plates have no thickness; a picture of them needs some.
+    values = [np.maximum(value, THINNESS * largest) for value in values]
+    arguments = [value if value.size > 1 else float(value[0]) for value in values]
+    return build(*arguments)
+
+
+def body_meshes(drawing: str | None) -> list[Mesh]:
+    """Meshes of a body from the dataset's `drawing` attribute, placed in body axes.
+
+    Args:
+        drawing: JSON list of {"solid", "dimensions", "position", "quaternion"}: position of the
+            solid's centre of mass in body axes from the reference point, metres; quaternion
+            [w, x, y, z] turns the solid's axes to body axes. None or an empty list: a unit cube.
+
+    Returns:
+        One mesh per solid, metres. The radius of a `point` is chosen so that its volume goes
+        with its `mass_fraction` and the largest is a sixth of the body's reach.
+
+    Raises:
+        ValueError: JSON that is not such a list, or see `solid_mesh`.
+    """
+    solids = _parse(drawing)
+    placed = [_placement(entry) for entry in solids]
+    extended = [
+        None
+        if entry["solid"] == "point"
+        else solid_mesh(entry["solid"], entry.get("dimensions", {})).moved(*place)
+        for entry, place in zip(solids, placed, strict=True)
+    ]
+    reach = max(
+        mesh.reach() if mesh is not None else float(np.linalg.norm(shift))
+        for mesh, (_, shift) in zip(extended, placed, strict=True)
+    )
+    reach = reach or 1.0  # a single point at the reference point has no size of its own
+    meshes = []
+    for entry, place, mesh in zip(solids, placed, extended, strict=True):
+        if mesh is None:
+            fraction = float(entry.get("dimensions", {}).get("mass_fraction", 1.0))
+            radius = reach * max(np.cbrt(np.clip(fraction, 0.0, 1.0)) / 6, 0.03)
+            mesh = _ball(radius, radius, radius, segments=32, rings=16).moved(*place)
+        meshes.append(mesh)
+    return meshes
+
+
+def point_positions(drawing: str | None) -> Array:
+    """Positions (P, 3) of the point masses of a `drawing`, body axes, metres; P may be 0."""
+    points = [_placement(e)[1] for e in _parse(drawing) if e["solid"] == "point"]
+    return np.array(points, dtype=float).reshape(-1, 3)
+
+
+def rotation_matrix(quaternion: Sequence[float] | Array) -> Array:
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4) [w, x, y, z] of any norm > 0."""
+    q = np.asarray(quaternion, dtype=float)
+    w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _parse(drawing: str | None) -> list[dict[str, Any]]:
+    if not drawing:
+        return [{"solid": "cuboid", "dimensions": {"size": [1.0, 1.0, 1.0]}}]
+    try:
+        solids = json.loads(drawing)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"drawing: not JSON ({error})") from None
+    if not isinstance(solids, list) or not all(
+        isinstance(entry, dict) and "solid" in entry for entry in solids
+    ):
+        raise ValueError('drawing: must be a JSON list of objects with a "solid"')
+    return solids or _parse(None)
+
+
+def _placement(entry: Mapping[str, Any]) -> tuple[Array, Array]:
+    turn = entry.get("quaternion")  # absent or null: axes parallel to the body axes
+    shift = np.asarray(entry.get("position") or (0.0, 0.0, 0.0), dtype=float)
+    return rotation_matrix(turn if turn is not None else (1.0, 0.0, 0.0, 0.0)), shift
+
+
+def _soup(corners: Array, normals: Array, colors: NDArray[np.uint8]) -> Mesh:
+    """Separate triangles from corners and normals (T, 3, 3) and one colour each (T, 3)."""
+    # Triangles that shrink to a line where a profile meets the axis carry no area.
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    keep = area > 1e-12 * area.max()
+    count = int(keep.sum())
+    return Mesh(
+        corners[keep].reshape(-1, 3),
+        np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
+        normals[keep].reshape(-1, 3),
+        np.repeat(colors[keep], 3, axis=0),
+    )
+
+
+def _box(a: float, b: float, c: float) -> Mesh:
+    corners, normals, colors = [], [], []
+    half = np.array([a, b, c]) / 2
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for sign in (1, -1):
+            quad = np.zeros((4, 3))
+            quad[:, axis] = sign * half[axis]
+            quad[:, u] = half[u] * np.array([-1, 1, 1, -1])
+            quad[:, v] = half[v] * np.array([-1, -1, 1, 1])
+            if sign < 0:
+                quad = quad[::-1]
+            normal = np.zeros(3)
+            normal[axis] = sign
+            shade = np.array(_AXIS_COLORS[axis]) * (1.0 if sign > 0 else _DARKER)
+            for pick in ((0, 1, 2), (0, 2, 3)):
+                corners.append(quad[list(pick)])
+                normals.append(np.tile(normal, (3, 1)))
+                colors.append(shade.astype(np.uint8))
+    return _soup(np.array(corners), np.array(normals), np.array(colors))
+
+
+def _revolve(profile: Array, normals: Array, segments: int = SEGMENTS) -> Mesh:
+    """Surface of revolution about z.
+
+    `profile` and `normals` are (P, 2, 2): P straight pieces from one (radius, z) to the next, run
+    so that the outside is on their right, with the (radial, axial) normal at both of their ends.
+    """
+    angle = np.linspace(0.0, 2 * np.pi, segments + 1)
+    angle[-1] = 0.0  # the seam closes exactly
+    turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def swept(pair: Array) -> Array:  # (P, 2) to (P, segments + 1, 3)
+        flat = pair[:, None, 0, None] * turn[None]
+        height = np.broadcast_to(pair[:, None, 1, None], (*flat.shape[:2], 1))
+        return np.concatenate([flat, height], axis=2)
+
+    def quads(pairs: Array) -> tuple[Array, Array, Array, Array]:
+        start, stop = swept(pairs[:, 0]), swept(pairs[:, 1])
+        return start[:, :-1], start[:, 1:], stop[:, 1:], stop[:, :-1]
+
+    def split(a: Array, b: Array, c: Array, d: Array) -> Array:
+        both = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)])
+        return both.reshape(-1, 3, 3)
+
+    corners = split(*quads(profile))
+    sector = (np.arange(segments) * 8 // segments) % 2
+    upper = profile[..., 1].mean(axis=1) > 1e-9 * np.abs(profile).max()
+    hue = np.where(upper[:, None], np.array(_UPPER), np.array(_LOWER))
+    colors = np.where(sector[None, :, None] == 0, hue[:, None], np.array(_LIGHT)[None, None])
+    colors = np.tile(colors.reshape(-1, 3), (2, 1)).astype(np.uint8)
+    return _soup(corners, split(*quads(normals)), colors)
+
+
+def _polygon(points: Sequence[tuple[float, float]], segments: int = SEGMENTS) -> Mesh:
+    """Revolved polyline with flat pieces, each split at half height for its two colours."""
+    nodes = np.array(points, dtype=float)
+    start, stop = nodes[:-1], nodes[1:]
+    middle = (start + stop) / 2
+    pieces = np.concatenate([np.stack([start, middle], 1), np.stack([middle, stop], 1)])
+    along = pieces[:, 1] - pieces[:, 0]
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    return _revolve(pieces, np.repeat(outward[:, None], 2, axis=1), segments)
+
+
+def _round(center: float, radius: float, start: float, stop: float, rings: int) -> Array:
+    """Arc pieces (rings, 2, 2) of a circle about (center, 0), angles from the radial axis."""
+    angle = np.linspace(start, stop, rings + 1)
+    nodes = np.stack([center + radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    nodes[np.abs(nodes) < 1e-15 * (center + radius)] = 0.0
+    return np.stack([nodes[:-1], nodes[1:]], axis=1)
+
+
+def _ball(a: float, b: float, c: float, segments: int = SEGMENTS, rings: int = MINOR_SEGMENTS) -> Mesh:
+    arc = _round(0.0, 1.0, -np.pi / 2, np.pi / 2, rings)
+    unit = _revolve(arc, arc, segments)
+    axes = np.array([a, b, c])
+    normals = unit.normals / axes
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Mesh(unit.vertices * axes, unit.triangles, normals, unit.colors)
+
+
+def _cylinder(radius: float, height: float) -> Mesh:
+    h = height / 2
+    return _polygon([(0, -h), (radius, -h), (radius, h), (0, h)])
+
+
+def _cone(radius: float, height: float) -> Mesh:
+    # The centre of mass is 3/4 of the height from the apex, which points to -z.
+    apex, base = -0.75 * height, 0.25 * height
+    return _polygon([(0, apex), (radius, base), (0, base)])
+
+
+def _torus(major: float, minor: float) -> Mesh:
+    arc = _round(major, minor, -np.pi, np.pi, MINOR_SEGMENTS)
+    normals = (arc - np.array([major, 0.0])) / minor
+    return _revolve(arc, normals)
+
+
+def _tube(inner: float, outer: float, height: float) -> Mesh:
+    if inner > outer:
+        raise ValueError(f"drawing: tube inner_radius {inner:g} exceeds outer_radius {outer:g}")
+    inner = min(inner, (1 - THINNESS) * outer)  # a wall without thickness is drawn with some
+    h = height / 2
+    return _polygon([(inner, -h), (outer, -h), (outer, h), (inner, h), (inner, -h)])
+
+
+SOLIDS: dict[str, tuple[tuple[tuple[str, int], ...], Callable[..., Mesh]]] = {
+    "cuboid": ((("size", 3),), lambda s: _box(*s)),
+    "plate": ((("size", 2),), lambda s: _box(s[0], s[1], THINNESS * max(s))),
+    "ellipsoid": ((("semi_axes", 3),), lambda s: _ball(*s)),
+    "sphere": ((("radius", 1),), lambda r: _ball(r, r, r)),
+    "spherical_shell": ((("radius", 1),), lambda r: _ball(r, r, r)),
+    "point": ((("radius", 1),), lambda r: _ball(r, r, r, segments=32, rings=16)),
+    "cylinder": ((("radius", 1), ("height", 1)), _cylinder),
+    "cone": ((("radius", 1), ("height", 1)), _cone),
+    "rod": ((("length", 1),), lambda h: _cylinder(THINNESS * h, h)),
+    "disk": ((("radius", 1),), lambda r: _cylinder(r, 2 * THINNESS * r)),
+    "ring": ((("radius", 1),), lambda r: _torus(r, 2 * THINNESS * r)),
+    "torus": ((("major_radius", 1), ("minor_radius", 1)), _torus),
+    "tube": ((("inner_radius", 1), ("outer_radius", 1), ("height", 1)), _tube),
+}

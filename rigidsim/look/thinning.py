@@ -1,0 +1,71 @@
+"""Reading a bounded number of rows from a dataset of any length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
+    """Indices (R,) into `count` rows, evenly strided, R <= `rows`, with the first and the last.
+
+    Args:
+        count: number of rows there are, >= 1.
+        rows: number of rows wanted at most, >= 2.
+
+    Raises:
+        ValueError: `count` or `rows` out of range.
+    """
+    if count < 1:
+        raise ValueError("the dataset has no samples: nothing to show")
+    if rows < 2:
+        raise ValueError(f"rows must be at least 2 (the first and the last), given {rows}")
+    indices = np.arange(0, count, _stride(count, rows), dtype=np.int64)
+    return indices if indices[-1] == count - 1 else np.append(indices, count - 1)
+
+
+def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
+    """The rows of `thinned_indices`, in memory; residuals `<variable>_lo` are left out.
+
+    Only variables that have a time dimension, and of those only the rows asked for, are read:
+    memory goes with `rows`, not with the length of the run.
+
+    Raises:
+        ValueError: no `time` dimension or coordinate, or see `thinned_indices`.
+    """
+    if "time" not in dataset.dims or "time" not in dataset.coords:
+        raise ValueError("the dataset has no time coordinate: nothing to show along time")
+    count = dataset.sizes["time"]
+    indices = thinned_indices(count, rows)
+    names = [
+        str(name)
+        for name, variable in dataset.data_vars.items()
+        if "time" in variable.dims and variable.dtype.kind in "fiub" and not _is_residual(str(name), dataset)
+    ]
+    wanted = dataset[names]
+    stride = _stride(count, rows)
+    # A slice is a strided read in HDF5; a list of indices would be read index by index.
+    strided = wanted.isel(time=slice(None, None, stride)).load()
+    if (count - 1) % stride == 0:
+        return strided
+    import xarray
+
+    last = wanted.isel(time=slice(count - 1, count)).load()
+    joined = xarray.concat([strided, last], dim="time", data_vars="all", combine_attrs="override")
+    if joined.sizes["time"] != len(indices):  # concat must neither merge nor sort
+        raise AssertionError("thinning lost rows")
+    return joined.transpose("time", ...)
+
+
+def _stride(count: int, rows: int) -> int:
+    return max(1, -(-(count - 1) // (rows - 1)))
+
+
+def _is_residual(name: str, dataset: xarray.Dataset) -> bool:
+    base, _, tail = name.rpartition("_")
+    return tail in ("lo", "lo2") and base in dataset

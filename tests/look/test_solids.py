@@ -1,0 +1,159 @@
+"""Meshes against the closed forms of the polyhedra that they are."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from rigidsim.look.solids import (
+    MINOR_SEGMENTS,
+    SEGMENTS,
+    SOLIDS,
+    THINNESS,
+    body_meshes,
+    rotation_matrix,
+    solid_mesh,
+)
+
+# Area of the regular polygon inscribed in the unit circle, over pi.
+POLYGON = SEGMENTS / (2 * np.pi) * np.sin(2 * np.pi / SEGMENTS)
+TUBE_POLYGON = MINOR_SEGMENTS / (2 * np.pi) * np.sin(2 * np.pi / MINOR_SEGMENTS)
+
+# solid, dimensions, exact volume of its polyhedron, half extents
+CASES = {
+    "cuboid": ({"size": [1, 2, 3]}, 6.0, (0.5, 1.0, 1.5)),
+    "plate": ({"size": [1, 2]}, 2 * 2 * THINNESS, (0.5, 1.0, THINNESS)),
+    "cylinder": ({"radius": 2, "height": 3}, 12 * np.pi * POLYGON, (2, 2, 1.5)),
+    "rod": ({"length": 2}, np.pi * 8 * THINNESS**2 * POLYGON, (2 * THINNESS, 2 * THINNESS, 1)),
+    "disk": ({"radius": 1}, 2 * np.pi * 2 * THINNESS / 2 * POLYGON, (1, 1, THINNESS)),
+    "tube": (
+        {"inner_radius": 1, "outer_radius": 2, "height": 3},
+        9 * np.pi * POLYGON,
+        (2, 2, 1.5),
+    ),
+    # Pappus, for the inscribed polygon of the tube, turned about the axis in SEGMENTS steps.
+    "torus": (
+        {"major_radius": 2, "minor_radius": 0.5},
+        2 * np.pi * 2 * np.pi * 0.25 * TUBE_POLYGON * POLYGON,
+        (2.5, 2.5, 0.5),
+    ),
+}
+
+
+@pytest.mark.parametrize("solid", CASES)
+def test_volume_and_extent_are_those_of_the_polyhedron(solid: str) -> None:
+    dimensions, volume, half = CASES[solid]
+    mesh = solid_mesh(solid, dimensions)
+    assert mesh.volume() == pytest.approx(volume, rel=1e-12)
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), half, rtol=1e-12)
+    np.testing.assert_allclose(mesh.vertices.min(axis=0), -np.array(half), rtol=1e-12)
+
+
+def test_ellipsoid_volume_is_four_thirds_pi_abc_to_the_order_of_its_facets() -> None:
+    mesh = solid_mesh("ellipsoid", {"semi_axes": [1, 2, 3]})
+    # An inscribed polyhedron lies inside by about (facet angle)^2: 2 (pi / rings)^2 / 4 at most.
+    deficit = 1 - mesh.volume() / (4 / 3 * np.pi * 6)
+    assert 0 < deficit < (np.pi / MINOR_SEGMENTS) ** 2 / 2 + (2 * np.pi / SEGMENTS) ** 2 / 2
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), (1, 2, 3), rtol=1e-12)
+
+
+def test_cone_stands_on_its_centre_of_mass_with_the_apex_below() -> None:
+    mesh = solid_mesh("cone", {"radius": 1, "height": 4})
+    assert mesh.volume() == pytest.approx(4 / 3 * np.pi * POLYGON, rel=1e-12)
+    assert mesh.vertices[:, 2].min() == -3.0
+    assert mesh.vertices[:, 2].max() == 1.0
+    # Centre of mass of the solid from its surface: tetrahedra from the origin.
+    corners = mesh.vertices[mesh.triangles]
+    weights = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    center = (weights[:, None] * corners.sum(axis=1) / 4).sum(axis=0) / weights.sum()
+    np.testing.assert_allclose(center, 0, atol=1e-12)
+
+
+EXAMPLES = {name: case[0] for name, case in CASES.items()} | {
+    "ellipsoid": {"semi_axes": [1, 2, 3]},
+    "sphere": {"radius": 2},
+    "spherical_shell": {"radius": 2},
+    "point": {"radius": 0.1},
+    "cone": {"radius": 1, "height": 4},
+    "ring": {"radius": 1},
+}
+
+
+def test_every_solid_has_an_example_here() -> None:
+    assert set(EXAMPLES) == set(SOLIDS)
+
+
+@pytest.mark.parametrize("solid", EXAMPLES)
+def test_surface_is_closed_and_normals_point_outwards(solid: str) -> None:
+    mesh = solid_mesh(solid, EXAMPLES[solid])
+    corners = mesh.vertices[mesh.triangles]
+    # Every edge is run once in each direction: closed, and all triangles turned the same way.
+    keys = np.round(corners / mesh.reach(), 9) + 0.0
+    edges: Counter[tuple[tuple[float, ...], tuple[float, ...]]] = Counter()
+    for triangle in keys:
+        a, b, c = (tuple(map(float, corner)) for corner in triangle)
+        edges.update([(a, b), (b, c), (c, a)])
+    assert all(edges[(b, a)] == count == 1 for (a, b), count in edges.items())
+    assert mesh.volume() > 0
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, rtol=1e-9)
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    along = np.einsum("tij,tj->ti", mesh.normals[mesh.triangles], facing)
+    assert (along > 0).all()
+
+
+@pytest.mark.parametrize("solid", EXAMPLES)
+def test_rotation_shows_by_more_than_one_colour(solid: str) -> None:
+    colors = solid_mesh(solid, EXAMPLES[solid]).colors
+    assert len(np.unique(colors, axis=0)) >= 3
+
+
+def test_composite_is_placed_in_body_axes() -> None:
+    turn = [np.sqrt(0.5), 0, np.sqrt(0.5), 0]  # a quarter about y: z to x
+    drawing = [
+        {"solid": "rod", "dimensions": {"length": 2.0}, "position": [5, 0, 0], "quaternion": turn},
+        {"solid": "point", "dimensions": {"mass_fraction": 0.001}, "position": [0, 0, 9]},
+        {"solid": "point", "dimensions": {"mass_fraction": 0.512}, "position": [0, 0, -9]},
+    ]
+    rod, light, heavy = body_meshes(json.dumps(drawing))
+    assert rod.vertices[:, 0].min() == pytest.approx(4)
+    assert rod.vertices[:, 0].max() == pytest.approx(6)
+    np.testing.assert_allclose(light.vertices.mean(axis=0), (0, 0, 9), atol=1e-2)
+    assert np.ptp(heavy.vertices[:, 0]) == pytest.approx(9 * 2 * 0.8 / 6, rel=1e-3)
+    assert 0 < np.ptp(light.vertices[:, 0]) < np.ptp(heavy.vertices[:, 0])
+
+
+def test_ideally_thin_body_is_drawn_with_some_thickness() -> None:
+    mesh = solid_mesh("cuboid", {"size": [3.0, 0.0, 1.0]})
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (3, 3 * THINNESS, 1))
+    with pytest.raises(ValueError, match="no extent"):
+        solid_mesh("cuboid", {"size": [0, 0, 0]})
+
+
+def test_missing_drawing_is_a_unit_cube() -> None:
+    (mesh,) = body_meshes(None)
+    assert mesh.volume() == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("drawing", "message"),
+    [
+        ("{", "not JSON"),
+        ('{"solid": "sphere"}', "JSON list"),
+        ('[{"solid": "sfere"}]', "unknown solid 'sfere'; known are cone, cuboid"),
+        ('[{"solid": "sphere", "dimensions": {}}]', "sphere needs dimension 'radius'"),
+        ('[{"solid": "sphere", "dimensions": {"radius": -1}}]', r"1 finite number\(s\) >= 0"),
+        ('[{"solid": "cuboid", "dimensions": {"size": [1, 2]}}]', r"3 finite number\(s\) >= 0"),
+    ],
+)
+def test_unreadable_drawing_is_refused_with_what_is_wrong(drawing: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        body_meshes(drawing)
+
+
+def test_rotation_matrix_turns_body_to_space() -> None:
+    quarter = rotation_matrix([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])  # about Z: x to Y
+    np.testing.assert_allclose(quarter @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(rotation_matrix([3.0, 0, 0, 3.0]), quarter, atol=1e-15)
