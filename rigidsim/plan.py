@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.prepare import Prepared, prepare
+from rigidsim.prepare import Prepared, motion_growth, prepare
 from rigidsim.scene.reading import Experiment
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.stepper import Stepper
@@ -47,7 +47,7 @@ def plan(experiment: Experiment) -> dict[str, Any]:
     record = samples * pilot["seconds_per_sample"]
     system = prepared.system
     rate = float(system.rate_bound)
-    attitude = system.requirements.formulation != "rates"
+    growth = motion_growth(prepared)
     return {
         "name": prepared.scene.name,
         "formulation": system.requirements.formulation,
@@ -77,9 +77,10 @@ def plan(experiment: Experiment) -> dict[str, Any]:
             "timeline_bytes": rows_shown * _TIMELINE_ROW_BYTES
             if prepared.scene.config.output.timeline
             else 0.0,
-            "attitude_error_rad": round_off_law(prepared.effective_tolerance, int(steps), rate, duration)
-            if attitude
-            else None,
+            "attitude_error_rad": None
+            if growth is None
+            else round_off_law(prepared.effective_tolerance, int(steps), rate, duration) * growth.factor,
+            "amplification": None if growth is None else growth.factor,
         },
         "body": {
             "source": prepared.scene.body.source,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.reading import Experiment
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.solve.growth import Growth, measure_growth
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.store.variables import Variable, time_variable
@@ -96,3 +97,22 @@ def prepare(experiment: Experiment) -> Prepared:
         )
         raise ConfigError(problem, experiment.source) from None
     return Prepared(experiment, scene, precision, system, clock, tolerance)
+
+
+def motion_growth(prepared: Prepared) -> Growth | None:
+    """How strongly the motion itself amplifies errors (some 30 ms); None where no attitude is carried.
+
+    Measured in quaternions, whatever the run's formulation: a chart's own singularity is another matter.
+    """
+    if prepared.system.requirements.formulation == "rates":
+        return None
+    config = prepared.scene.config
+    integrator = config.integrator.model_copy(update={"formulation": "quaternion"})
+    output = config.output.model_copy(update={"record": ["quaternion"]})
+    plain = replace(
+        prepared.scene, config=config.model_copy(update={"integrator": integrator, "output": output})
+    )
+    double = precision_of("double")
+    system = build_system(plain, double.number)
+    clock, last = prepared.clock, prepared.clock.count - 1
+    return measure_growth(system, double, float(clock.at(0)), float(clock.at(last)))

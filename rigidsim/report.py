@@ -100,9 +100,9 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
     out.print(table)
     estimate = accuracy["estimated_attitude_error"]
     if estimate is not None:
-        out.print(
-            f"attitude about {estimate:.1e} rad uncertain at the end by the round-off law; {accuracy['how']}"
-        )
+        factor = accuracy["amplification"]
+        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
+        out.print(f"attitude uncertain by about {estimate:.1e} rad at the end (round-off law{unstable})")
     for warning in summary["warnings"]:
         out.print(Text(f"warning  {warning}", style="bold red"))
     out.print(f"folder   {folder}")
@@ -139,4 +139,8 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     )
     error = predicted["attitude_error_rad"]
     if error is not None and math.isfinite(error):
-        out.print(f"accuracy   attitude about {error:.1e} rad uncertain at the end, by the round-off law")
+        factor = predicted["amplification"]
+        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
+        out.print(
+            f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
+        )

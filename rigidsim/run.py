@@ -16,7 +16,7 @@ import numpy as np
 
 import rigidsim.summary as summaries
 from rigidsim.errors import RunFolderError
-from rigidsim.prepare import Prepared, prepare
+from rigidsim.prepare import Prepared, motion_growth, prepare
 from rigidsim.scene.reading import Experiment, load
 from rigidsim.solve.advance import Advance, Progress
 from rigidsim.solve.evaluate import Evaluator
@@ -191,6 +191,7 @@ def run(
     winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
     evaluator = Evaluator(prepared.system, prepared.precision, winding)
+    growth = motion_growth(prepared)
     attributes = _attributes(prepared, stepper)
     writer = segments.SegmentWriter(folder.segments, prepared.variables(), attributes)
     watch = summaries.Watch()
@@ -223,6 +224,7 @@ def run(
         prepared,
         progress,
         watch,
+        growth,
         message=message,
         initial=evaluator.initial_invariants(),
         seconds=clock.seconds,

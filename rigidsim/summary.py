@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from rigidsim.prepare import Prepared
 from rigidsim.solve.advance import Progress
+from rigidsim.solve.growth import Growth
 from rigidsim.solve.status import Status
 
 DRIFT_FACTOR = 50.0
@@ -54,7 +56,7 @@ def round_off_law(tolerance: float, steps: int, rate: float, duration: float) ->
     """Attitude error (rad) of a good integration: (eps / 2) sqrt(steps) |w| t / sqrt 3.
 
     Rounding lets the frequencies wander as a random walk, and the phase integrates the walk (Brouwer 1937).
-    Motions that amplify errors exponentially lie outside of it.
+    Motions near an unstable axis amplify errors further: see ``rigidsim.solve.growth``.
     """
     return tolerance / 2 * math.sqrt(max(steps, 1)) * rate * duration / math.sqrt(3)
 
@@ -81,7 +83,7 @@ def invariant_table(
     return table
 
 
-def warnings(prepared: Prepared, progress: Progress, watch: Watch) -> list[str]:
+def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growth | None) -> list[str]:
     """Reasons not to trust the result; empty for a sound run."""
     found = []
     system = prepared.system
@@ -99,11 +101,17 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch) -> list[str]:
             f"{watch.nearest_singularity:.2g} at {watch.singularity_time:.6g} s), where they lose digits; "
             'choose formulation = "quaternion"'
         )
-    estimate = attitude_error(prepared, progress)
+    scene = prepared.scene
+    if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
+        found.append(
+            "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] reference "
+            "or center_of_mass for a top, or [initial] position for free flight"
+        )
+    estimate = attitude_error(prepared, progress, growth)
     if estimate is not None and estimate > _LOST_DIGITS:
         found.append(
-            f"by the round-off law the attitude is uncertain by {estimate:.2g} rad at the end; choose a "
-            "higher precision"
+            f"the attitude is uncertain by about {estimate:.2g} rad at the end, so its digits are gone; "
+            "choose a higher precision or a nearer end"
         )
     turns = float(system.rate_bound) * largest_spacing(prepared) / math.pi
     joined = [r.name for r in system.recorded if r.continuity in ("unwrap", "nearest")]
@@ -124,19 +132,21 @@ def largest_spacing(prepared: Prepared) -> float:
     return float(samples.span / samples.intervals)
 
 
-def attitude_error(prepared: Prepared, progress: Progress) -> float | None:
-    """The round-off law's estimate at the end, rad; None where no attitude is carried."""
-    if prepared.system.requirements.formulation == "rates":
+def attitude_error(prepared: Prepared, progress: Progress, growth: Growth | None) -> float | None:
+    """Estimate at the end, rad: the round-off law times the motion's growth; None without an attitude."""
+    if growth is None:
         return None
     duration = abs(progress.time - float(prepared.scene.start))
     rate = float(prepared.system.rate_bound)
-    return round_off_law(prepared.effective_tolerance, progress.steps, rate, duration)
+    estimate = round_off_law(prepared.effective_tolerance, progress.steps, rate, duration) * growth.factor
+    return estimate if math.isfinite(estimate) else sys.float_info.max
 
 
 def summarise(
     prepared: Prepared,
     progress: Progress,
     watch: Watch,
+    growth: Growth | None,
     *,
     message: str,
     initial: dict[str, list[float]],
@@ -146,14 +156,14 @@ def summarise(
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     scene, system = prepared.scene, prepared.system
-    estimate = attitude_error(prepared, progress)
+    estimate = attitude_error(prepared, progress, growth)
     return {
         "name": scene.name,
         "description": scene.description,
         "status": progress.status.value,
         "message": message,
         "exit_code": progress.status.exit_code,
-        "warnings": warnings(prepared, progress, watch),
+        "warnings": warnings(prepared, progress, watch, growth),
         "samples": progress.next_sample,
         "samples_planned": progress.samples,
         "time_reached": progress.time,
@@ -173,8 +183,11 @@ def summarise(
         "accuracy": {
             "requested": None,
             "estimated_attitude_error": estimate,
-            "estimated_how": "round-off law (tolerance/2) sqrt(steps) |w| t / sqrt 3; motions that "
-            "amplify errors exponentially lie outside of it",
+            "estimated_how": "round-off law (tolerance/2) sqrt(steps) |w| t / sqrt 3, times amplification",
+            "amplification": None if growth is None else min(growth.factor, sys.float_info.max),
+            "amplification_seconds": None if growth is None else growth.seconds,
+            "amplification_how": "growth of small offsets over the linear growth of a stable motion, "
+            "measured on the beginning of the motion; 1 for a stable one",
             "certified": None,
             "how": "not certified against an independent solution",
         },

@@ -112,7 +112,7 @@ def _axial(m: Mechanics) -> str | None:
 
 
 def _linear(m: Mechanics) -> str | None:
-    return "no force acts" if m.scene.gravity is None and m.velocity is not None else None
+    return "no force acts" if m.numbers.up is None and m.velocity is not None else None
 
 
 def _along_symmetry_axis(m: Mechanics) -> list[Expression]:

@@ -131,7 +131,7 @@ def parse(text: str, *, source: str = "config", overrides: Sequence[str] = ()) -
     if problems:
         raise ConfigError(problems, source)
     if overrides:
-        text = text.rstrip("\n") + "\n" + "".join(f"#:set {line}\n" for line in overrides)
+        text = text.rstrip("\n") + "\n" + "".join(f"#:set {line.strip()}\n" for line in overrides)
     return Experiment(text, config, source)
 
 

@@ -95,6 +95,11 @@ class Stepper:
         outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(self._far, max_steps=count)
         return self._account(outcome, smallest, largest, taken)
 
+    def to(self, time: float) -> bool:
+        """Go exactly to a time, with a shortened last step: for comparisons, never for a run's samples."""
+        outcome = self._integrator.propagate_until(time, max_steps=100_000)[0]
+        return bool(outcome == hy.taylor_outcome.time_limit)
+
     def block(self, count: int) -> tuple[bool, Any]:
         """``count`` steps with dense output: whether all went well, and a function of times (n,) that
         returns states (n, states).

@@ -1,0 +1,85 @@
+"""Euler angles as states: small inside, continuous outside, the same attitude as the quaternion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import angle_between, law, run_text
+
+from rigidsim.scene.schema import EULER_SEQUENCES
+
+FREE = """
+name = "free"
+[body]
+principal_moments = [1, 1, 1.5]
+[initial]
+angular_velocity = [0.1, 0.15, 2]
+quaternion = [0.7, 0.4, 0.5, 0.3]
+[time]
+end = 60
+samples = 1201
+"""
+
+
+@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+def test_each_sequence_gives_the_attitude_of_the_quaternion(sequence: str, runs: Path) -> None:
+    record = 'output.record=["angular_velocity", "quaternion", "euler_angles"]'
+    common = [record, f'integrator.euler_sequence="{sequence}"']
+    plain = run_text(FREE, runs, 'name="q"', *common)
+    angles = run_text(FREE, runs, 'name="e"', 'integrator.formulation="euler_angles"', *common)
+    error = angle_between(plain.dataset["quaternion"].values, angles.dataset["quaternion"].values)
+    # both formulations within three times the law, the angles' own with the amplification of their chart:
+    # an error of the outer angles grows like 1/|singular factor|, whose smallest value the sample shows
+    middle = angles.dataset["euler_angles"].values[:, 1]
+    factor = np.abs(np.sin(middle) if sequence[0] == sequence[2] else np.cos(middle)).min()
+    steps = angles.summary["cost"]["steps"]
+    assert error.max() <= 3 * law(2.0**-52, steps, 2.01, 60) * (1 + 1 / factor)
+    # angles found from the quaternion agree with those integrated, full turns included
+    difference = plain.dataset["euler_angles"].values - angles.dataset["euler_angles"].values
+    difference -= difference[0]  # the charts may start on different branches
+    assert np.abs(difference).max() <= 6 * law(2.0**-52, steps, 2.01, 60) * (1 + 1 / factor**2)
+
+
+def test_angles_grow_through_full_turns_without_a_jump(runs: Path) -> None:
+    run = run_text(FREE, runs, 'integrator.formulation="euler_angles"', "time.end=600", "time.samples=12001")
+    angles = run.dataset["euler_angles"].values
+    assert np.abs(angles[-1]).max() > 100  # many turns
+    # the largest rate of an angle is |w| / |sin theta|; samples are 0.05 s apart
+    smallest = np.abs(np.sin(angles[:, 1])).min()
+    assert np.abs(np.diff(angles, axis=0)).max() < 2.01 / smallest * 0.05 * 2
+    q = run.dataset["quaternion"].values
+    assert (np.einsum("ij,ij->i", q[1:], q[:-1]) > 0.9).all()
+
+
+def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(
+    runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """heyoka's step control is relative to the largest component: unwrapped angles loosen it."""
+    from rigidsim.solve import advance
+    from rigidsim.solve.winding import Winding
+
+    setting = ['integrator.formulation="euler_angles"', "time.end=20000", "time.samples=101"]
+    wrapped = run_text(FREE, runs, 'name="w"', *setting)
+    with monkeypatch.context() as patch:
+        patch.setattr(Winding, "wrap", lambda self, state: None)
+        growing = run_text(FREE, runs, 'name="g"', *setting)
+    assert advance.INTERVAL == 32
+    assert growing.summary["cost"]["steps"] < 0.8 * wrapped.summary["cost"]["steps"]
+    exact = run_text(FREE, runs, 'name="x"', "time.end=20000", "time.samples=101")
+    reference = exact.dataset["quaternion"].values
+
+    def error(run) -> float:
+        return float(angle_between(run.dataset["quaternion"].values, reference).max())
+
+    assert error(wrapped) < 0.1 * error(growing)
+
+
+def test_passing_close_to_the_singularity_is_said(runs: Path) -> None:
+    """Theta of a wobbling top nearly reaches zero: the angles lose digits and the summary warns."""
+    text = FREE.replace("quaternion = [0.7, 0.4, 0.5, 0.3]", "euler_angles = [0.0, 1e-4, 0.0]")
+    run = run_text(text, runs, 'integrator.formulation="euler_angles"')
+    assert any("singularity of zxz" in warning for warning in run.summary["warnings"])
+    far = run_text(FREE, runs, 'integrator.formulation="euler_angles"')
+    assert not far.summary["warnings"]

@@ -1,0 +1,86 @@
+"""Samples lie where they were asked for, however they are asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import run_text
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.prepare import prepare
+
+SPIN = """
+name = "spin"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.5, 0.25, 1]
+[time]
+"""
+
+
+def times(text: str, precision: str = "double") -> np.ndarray:
+    prepared = prepare(rigidsim.parse(SPIN + text + f'\n[integrator]\nprecision = "{precision}"'))
+    clock = prepared.clock
+    return np.ldexp(clock.internal(0, clock.count).astype(float), clock.exponent)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    end=st.floats(1e-3, 1e6),
+    count=st.integers(2, 5000),
+    start=st.floats(-1e3, 1e3).map(lambda x: round(x, 3)),
+)
+def test_a_grid_is_i_times_the_step_within_two_roundings(end: float, count: int, start: float) -> None:
+    found = times(f"start = {start!r}\nend = {start + end!r}\nsamples = {count}")
+    expected = np.linspace(start, start + end, count, dtype=np.longdouble)
+    assert found[0] == start
+    assert found[-1] == start + end
+    # product, quotient and sum are each rounded once
+    allowed = 2.0**-52 * (abs(start) + np.abs(expected - start)) * 2
+    assert (np.abs(found - expected) <= allowed).all()
+
+
+def test_every_and_samples_mean_the_same_grid() -> None:
+    assert np.array_equal(times("end = 100\nevery = 0.1"), times("end = 100\nsamples = 1001"))
+    assert times("end = 1.05\nevery = 0.1")[-1] == 1.0  # an end off the grid isn't sampled
+
+
+def test_a_list_is_kept_as_written() -> None:
+    assert times("times = [0, 0.1, 0.25, 7]").tolist() == [0, 0.1, 0.25, 7]
+    assert times('times = ["1 h", "1 d"]').tolist() == [3600, 86400]
+
+
+def test_blocks_of_the_grid_are_the_grid() -> None:
+    prepared = prepare(rigidsim.parse(SPIN + "end = 3\nsamples = 1000"))
+    whole = prepared.clock.internal(0, 1000)
+    pieces = [prepared.clock.internal(i, min(i + 77, 1000)) for i in range(0, 1000, 77)]
+    assert np.array_equal(np.concatenate(pieces), whole)
+    assert prepared.clock.at(999) == whole[999]
+
+
+@pytest.mark.parametrize("start", ["0", "1e6", "-50"])
+def test_the_motion_begins_at_start(start: str, runs: Path) -> None:
+    text = SPIN + f"start = {start}\nend = {float(start) + 10}\nsamples = 11"
+    ours = run_text(text, runs, 'name="a"').dataset
+    plain = run_text(SPIN + "start = 0\nend = 10\nsamples = 11", runs, 'name="b"').dataset
+    # an autonomous scene doesn't care; sample times of 1e6 s are rounded to 1e-10 s
+    assert np.abs(ours["quaternion"].values - plain["quaternion"].values).max() < 1e-9
+    assert float(ours["time"][0]) == float(start)
+
+
+def test_samples_that_a_precision_can_not_tell_apart_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"\[time\].*samples .* are closer together than single"):
+        times("start = 1e6\nend = 1000001\nevery = 0.01", "single")
+    assert len(times("start = 1e6\nend = 1000001\nevery = 0.01", "double")) == 101
+
+
+def test_one_sample_only(runs: Path) -> None:
+    run = run_text(SPIN + "times = [5]", runs)
+    assert run.dataset.sizes["time"] == 1
+    assert run.status == "finished"

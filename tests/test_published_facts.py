@@ -1,0 +1,254 @@
+"""What this field knows in closed form or in print, recovered from datasets."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from support import CONFIGS, EPSILON, angle_between, law, run_text, wide
+
+import rigidsim
+from rigidsim.prepare import prepare
+
+BY_NAME = {path.stem: path for path in CONFIGS}
+
+
+def ready(name: str, out: Path, *overrides: str) -> rigidsim.Run:
+    experiment = rigidsim.load(BY_NAME[name], overrides=["output.timeline=false", *overrides])
+    return rigidsim.run(experiment, out=out, force=True)
+
+
+def body_frequency(run: rigidsim.Run) -> float:
+    """Angular frequency of the rotation pole around the body's z axis, from first to last sample."""
+    w = run.dataset["angular_velocity"].values
+    phase = np.unwrap(np.arctan2(w[:, 1], w[:, 0]))
+    time = run.dataset["time"].values
+    return float((phase[-1] - phase[0]) / (time[-1] - time[0]))
+
+
+def test_free_symmetric_top_has_harmonic_body_rates(runs: Path) -> None:
+    run = ready("free_symmetric_top", runs)
+    assert body_frequency(run) == pytest.approx((3 - 2) / 2 * 1.0, rel=1e-9)
+    w = run.dataset["angular_velocity"].values
+    assert (w[:, 2] == w[0, 2]).all()
+
+
+def test_rigid_earth_nutates_in_304_days_and_not_in_chandlers_430(runs: Path) -> None:
+    run = ready("earth_free_nutation", runs)
+    period = 2 * math.pi / body_frequency(run) / 86400
+    flattening = 0.00327379492  # (C-A)/C, Mathews et al. 2002
+    rotation = 2 * math.pi / 7.292115e-5 / 86400
+    assert period == pytest.approx((1 - flattening) / flattening * rotation, rel=1e-9)
+    assert period == pytest.approx(303.62, abs=0.005)  # Euler's prediction, mean solar days
+    assert not 427 < period < 435  # Chandler 1891, Gross 2007: the elastic Earth
+
+
+def test_rigid_earth_from_its_axes_nutates_in_about_300_days(runs: Path) -> None:
+    run = ready("earth_free_nutation_axes", runs)
+    period = 2 * math.pi / body_frequency(run) / 86400
+    a, c = 6378.0, 6357.0
+    expected = (a**2 + c**2) / (a**2 - c**2) * 2 * math.pi / 7.292115e-5 / 86400
+    assert period == pytest.approx(expected, rel=1e-9)
+    assert 295 < period < 310
+
+
+def test_symmetric_top_follows_its_closed_form(runs: Path) -> None:
+    """R(t) = exp(t [L/A]x) R0 exp(t (A-C)/A w3 [z]x): Landau & Lifshitz, Mechanics, section 33."""
+    run = ready("free_symmetric_top", runs, "time.samples=51")
+    prepared = prepare(rigidsim.load(BY_NAME["free_symmetric_top"]))
+    scene = prepared.scene
+    a, c = mpmath.mpf(2), mpmath.mpf(3)
+    with mpmath.workdps(40):
+        q0 = [mpmath.mpf(x) for x in scene.quaternion]
+        w = [mpmath.mpf(x) for x in scene.angular_velocity]
+        momentum = rotate(q0, [a * w[0], a * w[1], c * w[2]])
+        size = mpmath.sqrt(sum(x * x for x in momentum))
+        exact = []
+        for t in run.dataset["time"].values:
+            half = size / a * mpmath.mpf(float(t)) / 2
+            left = [mpmath.cos(half)] + [mpmath.sin(half) * x / size for x in momentum]
+            turn = (a - c) / a * w[2] * mpmath.mpf(float(t)) / 2
+            right = [mpmath.cos(turn), 0, 0, mpmath.sin(turn)]
+            exact.append([float(x) for x in multiply(multiply(left, q0), right)])
+    error = angle_between(run.dataset["quaternion"].values, np.array(exact))
+    bound = 3 * law(EPSILON["double"], run.summary["cost"]["steps"], math.sqrt(1.16), 200)
+    assert error.max() <= bound
+
+
+def multiply(p: list, q: list) -> list:
+    return [
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
+    ]
+
+
+def rotate(q: list, v: list) -> list:
+    conjugate = [q[0], -q[1], -q[2], -q[3]]
+    return multiply(multiply(q, [0, *v]), conjugate)[1:]
+
+
+def test_square_plate_about_its_corner_to_the_last_digit(runs: Path) -> None:
+    run = ready("square_plate_corner", runs)
+    body = run.summary["body"]
+    assert body["principal_moments"] == [1.0, 7.0, 8.0]  # m a^2 (1, 7, 8) / 12 with m a^2 = 12
+    assert body["principal_axes"][0] == [math.sqrt(0.5), math.sqrt(0.5), 0.0]
+    assert json.loads(run.dataset.attrs["inertia_tensor"]) == [[4, -3, 0], [-3, 4, 0], [0, 0, 8]]
+    w = run.dataset["angular_velocity"].values[0]
+    momentum = np.array([4.0, -3.0, 0.0])
+    assert np.linalg.norm(np.cross(w, momentum)) > 1  # not parallel: the edge is no principal axis
+
+
+def tilt(run: rigidsim.Run) -> np.ndarray:
+    q = run.dataset["quaternion"].values
+    return np.arccos(np.clip(1 - 2 * (q[:, 1] ** 2 + q[:, 2] ** 2), -1, 1))
+
+
+def test_sleeping_top_stays_up_above_the_threshold_and_falls_below(runs: Path) -> None:
+    # w3^2 = 4 A M g l / C^2: Landau & Lifshitz, section 35, problem 1
+    threshold = math.sqrt(4 * 2e-4 * 0.1 * 9.80665 * 0.04) / 1e-4
+    assert threshold == pytest.approx(56.02, abs=0.005)
+    stable = ready("heavy_top_sleeping_stable", runs)
+    unstable = ready("heavy_top_sleeping_unstable", runs)
+    # linear theory: the push e over half the difference of the two nutation frequencies
+    spread = math.sqrt((1e-4 * 57 / 2e-4) ** 2 - 4 * 0.1 * 9.80665 * 0.04 / 2e-4)
+    assert tilt(stable).max() <= 1.01 * 2 * 1e-3 / spread
+    assert tilt(unstable).max() > 0.3
+    for name, side in (("heavy_top_sleeping_stable", 1.001), ("heavy_top_sleeping_unstable", 0.999)):
+        close = ready(name, runs, f"initial.angular_velocity=[1e-6, 0, {side * threshold!r}]", "time.end=30")
+        assert (tilt(close).max() > 1e-3) == (side < 1)
+
+
+def test_unstable_sleeping_top_grows_at_its_linear_rate(runs: Path) -> None:
+    run = ready("heavy_top_sleeping_unstable", runs, "initial.angular_velocity=[1e-8, 0, 55]")
+    # (A theta'' has the complex exponent i C w3 / 2A +- rate)
+    rate = math.sqrt(0.1 * 9.80665 * 0.04 / 2e-4 - (1e-4 * 55 / (2 * 2e-4)) ** 2)
+    time, angle = run.dataset["time"].values, tilt(run)
+    early = (time > 1.5) & (angle < 1e-4)
+    fitted = np.polyfit(time[early], np.log(angle[early]), 1)[0]
+    # what is left of the decaying solution at 1.5 s, and the chord of arccos near zero
+    assert fitted == pytest.approx(rate, rel=0.01)
+
+
+def test_regular_precession_keeps_its_tilt(runs: Path) -> None:
+    run = ready("heavy_top_regular_precession", runs)
+    # a deviation of the rates of some eps, carried as in a stable motion
+    allowed = 50 * EPSILON["double"] * math.sqrt(run.summary["cost"]["steps"])
+    assert np.abs(np.cos(tilt(run)) - 0.5).max() < allowed
+
+
+def test_fast_top_at_right_angles_precesses_at_m_g_l_over_c_w3(runs: Path) -> None:
+    run = ready("heavy_top_fast", runs, 'output.record=["euler_angles"]')
+    phi = run.dataset["euler_angles"].values[:, 0]
+    time = run.dataset["time"].values
+    rate = (phi[-1] - phi[0]) / time[-1]
+    slow = 0.1 * 9.80665 * 0.04 / (1e-4 * 1000)
+    nutation = 1e-4 / 2e-4 * 1000
+    # exact for the mean; the last nutation is incomplete: one amplitude slow/nutation over the run
+    assert abs(rate - slow) < slow / (nutation * time[-1]) * 2 + slow * (slow / nutation) ** 2
+
+
+def test_wobble_of_a_tossed_plate_is_twice_its_spin(runs: Path) -> None:
+    run = ready("tossed_plate", runs)
+    momentum = run.dataset["angular_momentum"].values[0]
+    precession = np.linalg.norm(momentum) / (0.3 * 0.25**2 / 12)
+    assert precession / 25.0 == pytest.approx(2.0, abs=1e-3)  # small angle: w1/w3 = 1/25
+    position = run.dataset["position"].values
+    time = run.dataset["time"].values
+    parabola = 1.5 + 6 * time - 9.80665 / 2 * time**2
+    assert np.abs(position[:, 2] - parabola).max() < 20 * EPSILON["double"]
+
+
+NEEDLE = """
+name = "needle"
+[body]
+principal_moments = [1, 1, "2^-20"]
+mass = 1
+center_of_mass = [0, 0, 1]
+[initial]
+angular_velocity = [0.5, 0, "2^21"]
+euler_angles = [0.3, 1, 0.2]
+[[loads]]
+kind = "uniform_gravity"
+acceleration = [0, 0, -1]
+[time]
+end = {end}
+samples = 9                # at dyadic times, which are exact in each precision
+[output]
+record = ["quaternion"]
+"""
+
+
+def needle_error(out: Path, end: str) -> float:
+    text = NEEDLE.format(end=end)
+    ours = run_text(text, out, 'name="double"')
+    exact = run_text(text, out, 'name="extended"', 'integrator.precision="extended"')
+    quaternions = ours.dataset["quaternion"].values.astype(np.longdouble)
+    return float(angle_between(quaternions, wide(exact.dataset, "quaternion")).max())
+
+
+def test_needle_top_whose_spin_dwarfs_its_other_rates_a_million_times(runs: Path) -> None:
+    """Step control must see every component: each has a unit of its own."""
+    assert needle_error(runs, '"2^-4"') < 1e-12
+
+
+@pytest.mark.slow
+def test_needle_top_over_a_second(runs: Path) -> None:
+    assert needle_error(runs, "1") <= 1e-11  # bare heyoka at its default tolerance: 2e-7
+
+
+@pytest.mark.parametrize(("inertia", "rate"), [(600, 0), (-600, 0), (0, 27), (0, -27), (-600, 27)])
+def test_scaling_a_scene_by_powers_of_two_changes_no_bit(inertia: int, rate: int, runs: Path) -> None:
+    def scene(name: str, i: int, w: int) -> rigidsim.Run:
+        text = f"""
+        name = "{name}"
+        [body]
+        principal_moments = ["{_scaled(1, 1, i)}", "{_scaled(2, 1, i)}", "{_scaled(5, 2, i)}"]
+        [initial]
+        angular_velocity = ["{_scaled(1, 10, w)}", "{_scaled(1, 1, w)}", "{_scaled(1, 20, w)}"]
+        [time]
+        end = "{_scaled(1000, 1, -w)}"
+        samples = 101
+        """
+        return run_text(text, runs)
+
+    plain, scaled = scene("plain", 0, 0).dataset, scene("scaled", inertia, rate).dataset
+    assert np.array_equal(scaled["quaternion"], plain["quaternion"])
+    assert np.array_equal(np.ldexp(scaled["angular_velocity"], -rate), plain["angular_velocity"])
+    assert np.array_equal(np.ldexp(scaled["energy"], -inertia - 2 * rate), plain["energy"])
+    assert np.array_equal(scaled["energy_drift"], plain["energy_drift"])
+
+
+def _scaled(numerator: int, denominator: int, exponent: int) -> str:
+    if exponent >= 0:
+        return f"{numerator * 2**exponent}/{denominator}"
+    return f"{numerator}/{denominator * 2**-exponent}"
+
+
+def test_kilometres_and_days_are_as_good_as_metres_and_seconds(runs: Path) -> None:
+    metres = """
+    name = "metres"
+    [body]
+    shape = "ellipsoid"
+    mass = 6e24
+    semi_axes = [7e6, 6.3e6, 5.6e6]
+    [initial]
+    angular_velocity = ["1/86400", "2/86400", "3/86400"]
+    [time]
+    end = 8640000
+    samples = 201
+    """
+    days = (
+        metres.replace('"metres"', '"days"')
+        .replace("[7e6, 6.3e6, 5.6e6]", '["7000 km", "6300 km", "5600 km"]')
+        .replace('["1/86400", "2/86400", "3/86400"]', '["1 rad/day", "2 rad/day", "3 rad/day"]')
+        .replace("8640000", '"100 day"')
+    )
+    one, other = run_text(metres, runs).dataset, run_text(days, runs).dataset
+    assert np.array_equal(one["quaternion"], other["quaternion"])
+    assert np.array_equal(one["energy"], other["energy"])

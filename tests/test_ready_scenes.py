@@ -1,0 +1,98 @@
+"""Every config of configs/: invariants hold, and the attitude is right, in each formulation."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import CONFIGS, EPSILON, amplification, angle_between, law, wide
+
+import rigidsim
+
+ATTITUDE = 'output.record=["angular_velocity", "quaternion"]'
+NAMES = [path.stem for path in CONFIGS]
+UPRIGHT = ("sleeping", "earth")  # start in the singularity of zxz; xyz is regular there
+
+
+def run_config(path: Path, out: Path, *overrides: str) -> rigidsim.Run:
+    experiment = rigidsim.load(path, overrides=["output.timeline=false", *overrides])
+    return rigidsim.run(experiment, out=out, force=True)
+
+
+@lru_cache(maxsize=1)
+def reference(path: Path, out: Path) -> np.ndarray:
+    """Quaternions of the same scene in 80-bit arithmetic: rounding errors 2048 times smaller."""
+    run = run_config(path, out, ATTITUDE, 'integrator.precision="extended"', f'name="{path.stem}-reference"')
+    return wide(run.dataset, "quaternion")
+
+
+@lru_cache(maxsize=1)
+def sensitivity(path: Path) -> float:
+    return amplification(rigidsim.load(path, overrides=[ATTITUDE]))
+
+
+@pytest.fixture(scope="module")
+def module_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=NAMES)
+def test_all_invariants_hold(path: Path, runs: Path) -> None:
+    run = run_config(path, runs)
+    assert run.status == "finished"
+    assert run.summary["warnings"] == []
+    assert run.summary["invariants"]
+    for name, row in run.summary["invariants"].items():
+        # 50 eps sqrt(steps): rounding as a random walk, a few roundings per step
+        assert row["bound"] == 50 * 2.0**-52 * np.sqrt(run.summary["cost"]["steps"])
+        assert 0 <= row["largest_drift"] <= row["bound"], name
+        assert float(np.abs(run.dataset[f"{name}_drift"]).max()) == row["largest_drift"]
+
+
+@pytest.mark.parametrize("precision", ["single", "extended"])
+@pytest.mark.parametrize("path", CONFIGS, ids=NAMES)
+def test_all_invariants_hold_in_other_precisions(path: Path, precision: str, runs: Path) -> None:
+    run = run_config(path, runs, f'integrator.precision="{precision}"')
+    for name, row in run.summary["invariants"].items():
+        assert row["bound"] == 50 * EPSILON[precision] * np.sqrt(run.summary["cost"]["steps"])
+        assert 0 <= row["largest_drift"] <= row["bound"], name
+
+
+@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles"])
+@pytest.mark.parametrize("path", CONFIGS, ids=NAMES)
+def test_attitude_agrees_with_80_bit_arithmetic(path: Path, formulation: str, module_runs: Path) -> None:
+    overrides = [ATTITUDE, f'integrator.formulation="{formulation}"']
+    if formulation == "euler_angles" and any(word in path.stem for word in UPRIGHT):
+        overrides.append('integrator.euler_sequence="xyz"')
+    if path.stem == "earth_free_nutation":
+        overrides.append('time.every="0.25 day"')  # the sign of a matrix's quaternion needs it
+    run = run_config(path, module_runs, *overrides, f'name="{path.stem}-{formulation}"')
+    exact = reference(path, module_runs)
+    ours = run.dataset["quaternion"].values
+    if path.stem == "earth_free_nutation":
+        ours = ours[::4]
+    error = angle_between(ours.astype(np.longdouble), exact)
+    steps = run.summary["cost"]["steps"]
+    prepared_rate = np.sqrt((run.dataset["angular_velocity"].values ** 2).sum(axis=1)).max()
+    duration = float(run.dataset["time"][-1])
+    # three times the law; where the motion is unstable its own amplification (from the variational
+    # equations) takes the place of the stable motion's linear growth |w| t / sqrt 3
+    bound = 3 * law(EPSILON["double"], steps, prepared_rate, duration)
+    unstable = 3 * EPSILON["double"] / 2 * np.sqrt(steps) * sensitivity(path)
+    assert error.max() <= max(bound, unstable)
+    # the sign is continuous as well: no sample is the negative of its reference
+    assert (np.einsum("ij,ij->i", ours, exact.astype(float)) > 0).all()
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=NAMES)
+def test_the_summary_never_promises_more_than_it_keeps(path: Path, module_runs: Path) -> None:
+    run = run_config(path, module_runs, ATTITUDE, f'name="{path.stem}-promise"')
+    error = angle_between(
+        run.dataset["quaternion"].values.astype(np.longdouble), reference(path, module_runs)
+    )
+    promised = run.summary["accuracy"]["estimated_attitude_error"]
+    assert error.max() <= 3 * promised
+    unstable = run.summary["accuracy"]["amplification"] > 1
+    assert unstable == (path.stem in ("intermediate_axis", "heavy_top_sleeping_unstable", "water_molecule"))
