@@ -1,0 +1,773 @@
+"""The symbolic equations and observables, evaluated, against mechanics written a second time in numpy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import heyoka as hy
+import mpmath
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rigidsim.model.system import System
+from rigidsim.prepare import Prepared, prepare
+from rigidsim.scene.reading import parse
+from rigidsim.scene.schema import EULER_SEQUENCES
+
+EPS = np.finfo(float).eps
+# Expressions of at most some tens of operations in double, on numbers of order one.
+CLOSE = 100 * EPS
+GRAVITY = 'kind = "uniform_gravity"\n'
+
+
+def array(value: Any) -> str:
+    """Numbers as TOML, every bit of the doubles kept."""
+    return repr(np.asarray(value, dtype=float).tolist())
+
+
+def prepared(
+    body: str, initial: str, loads: str = "", record: str = "", integrator: str = "", end: float = 1.0
+) -> Prepared:
+    recorded = f"record = {record}" if record else ""
+    load = f"[[loads]]\n{loads}" if loads else ""
+    return prepare(
+        parse(
+            f'name = "scene"\n[body]\n{body}\n[initial]\n{initial}\n{load}\n'
+            f"[time]\nend = {end}\n[integrator]\n{integrator}\n[output]\n{record and recorded}\n"
+        )
+    )
+
+
+def internal(system: System, state: np.ndarray) -> np.ndarray:
+    """SI to the system's own units: powers of two, nothing is rounded."""
+    return np.ldexp(state, -np.array(system.state_exponents))
+
+
+def derivative(system: System, state: np.ndarray) -> np.ndarray:
+    """Time derivative of the states, SI, at a state in SI."""
+    rhs = hy.cfunc([rhs for _, rhs in system.equations], system.variables)
+    return np.ldexp(rhs(internal(system, state)), np.array(system.state_exponents) - system.scaling.time)
+
+
+def observed(system: System, state: np.ndarray) -> dict[str, np.ndarray]:
+    """All recorded variables, SI, at a state in SI."""
+    count = sum(r.count for r in system.recorded)
+    values = hy.cfunc(system.outputs[:count], system.variables)(internal(system, state))
+    return {r.name: np.ldexp(values[r.first : r.first + r.count], r.exponents) for r in system.recorded}
+
+
+class Random:
+    """Seeded scenes; every test has its own."""
+
+    def __init__(self, seed: int) -> None:
+        self.generator = np.random.default_rng(seed)
+
+    def vector(self, size: float = 1.0) -> np.ndarray:
+        return size * self.generator.uniform(-1, 1, 3)
+
+    def quaternion(self) -> np.ndarray:
+        q = self.generator.normal(size=4)
+        return q / np.linalg.norm(q)
+
+    def tensor(self) -> np.ndarray:
+        """A tensor in general axes that some body has: I = tr(S) 1 - S with S positive."""
+        a = self.generator.uniform(-1, 1, (3, 3))
+        s = a @ a.T + 0.1 * np.eye(3)
+        return np.trace(s) * np.eye(3) - (s + s.T) / 2
+
+
+def matrix(q: np.ndarray) -> np.ndarray:
+    return Rotation.from_quat([*q[1:], q[0]]).as_matrix()
+
+
+def skew(w: np.ndarray) -> np.ndarray:
+    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+
+
+def general_body(tensor: np.ndarray, mass: float = 1.0, center: Any = (0, 0, 0)) -> str:
+    return f"inertia_tensor = {array(tensor)}\nmass = {mass!r}\ncenter_of_mass = {array(center)}"
+
+
+# ---- (a) Euler's equations --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("size", [1.0, 1e-6, 3e5])
+def test_free_rotation_in_any_body_axes(seed: int, size: float) -> None:
+    """I w' = (I w) x w."""
+    random = Random(seed)
+    tensor, start = random.tensor(), random.vector(size)
+    system = prepared(
+        general_body(tensor), f"angular_velocity = {array(start)}", integrator='formulation = "rates"'
+    ).system
+    w = random.vector(size)
+    expected = np.linalg.solve(tensor, np.cross(tensor @ w, w))
+    amplification = np.linalg.cond(tensor) * size**2
+    np.testing.assert_allclose(derivative(system, w), expected, rtol=0, atol=CLOSE * amplification)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles", "rates"])
+def test_gravity_about_a_fixed_point(seed: int, formulation: str) -> None:
+    """I w' = (I w) x w + com x (M R^T g), and of the vertical alone g' = g x w (Euler-Poisson)."""
+    random = Random(100 + seed)
+    tensor, center, mass = random.tensor(), random.vector(), 1.7
+    pull = random.vector(9.0)
+    system = prepared(
+        general_body(tensor, mass, center),
+        f"angular_velocity = {array(random.vector())}\nquaternion = {array(random.quaternion())}",
+        GRAVITY + f"acceleration = {array(pull)}",
+        integrator=f'formulation = "{formulation}"',
+    ).system
+    w, q = random.vector(), random.quaternion()
+    r = matrix(q)
+    up = -r.T @ pull / np.linalg.norm(pull)
+    attitude = {
+        "quaternion": q,
+        "rotation_matrix": r.ravel(),
+        "euler_angles": Rotation.from_matrix(r).as_euler("ZXZ"),
+        "rates": up,
+    }[formulation]
+    got = derivative(system, np.concatenate([w, attitude]))
+    torque = np.cross(center, mass * r.T @ pull)
+    expected = np.linalg.solve(tensor, np.cross(tensor @ w, w) + torque)
+    amplification = np.linalg.norm(np.linalg.inv(tensor)) * (np.linalg.norm(tensor) + 20)
+    np.testing.assert_allclose(got[:3], expected, rtol=0, atol=CLOSE * amplification)
+    if formulation == "rates":
+        np.testing.assert_allclose(got[3:], np.cross(up, w), rtol=0, atol=CLOSE)
+
+
+def test_two_loads_of_gravity_add_up() -> None:
+    scene = prepared(
+        "principal_moments = [1, 2, 2.5]\nmass = 1\ncenter_of_mass = [0, 0, 1]",
+        "angular_velocity = [0.1, 0.2, 0.3]",
+        GRAVITY + "acceleration = [0, 3, 0]\n[[loads]]\n" + GRAVITY + "acceleration = [0, 0, -4]",
+    )
+    assert scene.scene.gravity == [0, 3, -4]
+    got = derivative(scene.system, np.array([0, 0, 0, 1.0, 0, 0, 0]))
+    np.testing.assert_allclose(got[:3], [-3.0, 0, 0], atol=CLOSE)  # com x g = (-3, 0, 0) over I = 1
+
+
+def test_principal_axes_have_no_cross_terms() -> None:
+    """A zero product of inertia adds nothing: w1' is a multiple of w2 w3."""
+    system = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [1, 1, 1]").system
+    names = ["wx", "wy", "wz"]
+    for i, (_, rhs) in enumerate(system.equations[:3]):
+        assert hy.get_variables(rhs) == [name for name in names if name != names[i]]
+        product = hy.make_vars(names[(i + 1) % 3]) * hy.make_vars(names[(i + 2) % 3])
+        ratio = hy.cfunc([rhs / product], hy.make_vars(*names))
+        coefficients = ratio(np.array([[0.5, 2.0], [0.25, 8.0], [4.0, 1.0]]))[0]
+        moments = np.array([1, 2, 2.5])
+        j, k = (i + 1) % 3, (i + 2) % 3
+        np.testing.assert_allclose(coefficients, (moments[j] - moments[k]) / moments[i], rtol=4 * EPS)
+
+
+def test_symmetric_top_keeps_its_spin_and_a_sphere_all_rates() -> None:
+    top = prepared("principal_moments = [1, 1, 2]", "angular_velocity = [1, 1, 1]").system
+    assert [str(rhs) == "0.0000000000000000" for _, rhs in top.equations[:3]] == [False, False, True]
+    ball = prepared("principal_moments = [2, 2, 2]", "angular_velocity = [1, 1, 1]").system
+    assert [hy.get_variables(rhs) for _, rhs in ball.equations[:3]] == [[], [], []]
+
+
+def test_products_of_inertia_do_add_cross_terms() -> None:
+    """The counterpart of the test on principal axes: the same body turned needs all rates."""
+    system = prepared(
+        "inertia_tensor = [[1, 0.1, 0.2], [0.1, 2, 0.3], [0.2, 0.3, 2.5]]", "angular_velocity = [1, 1, 1]"
+    ).system
+    for _, rhs in system.equations[:3]:
+        assert hy.get_variables(rhs) == ["wx", "wy", "wz"]
+
+
+def test_a_rod_gains_no_spin() -> None:
+    system = prepared(
+        'shape = "rod"\nmass = 1\nlength = 1\nreference = "end"',
+        "angular_velocity = [1, 2, 0]\nquaternion = [1, 1, 0, 0]",
+        GRAVITY,
+    ).system
+    got = derivative(system, np.array([1.0, 2.0, 0, np.sqrt(0.5), np.sqrt(0.5), 0, 0]))
+    # g along -Z is along -y of the body, at half the length: torque M g l/2 about x over m l^2/3
+    np.testing.assert_allclose(got[:3], [1.5 * 9.80665, 0, 0], rtol=CLOSE, atol=CLOSE * 15)
+
+
+# ---- (b), (c) kinematics ----------------------------------------------------------------------------------
+
+
+def turn(axis: str, angle: Any) -> Any:
+    """Elementary rotation in mpmath, written out by hand."""
+    c, s = mpmath.cos(angle), mpmath.sin(angle)
+    rows = {
+        "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
+        "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+        "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+    }
+    return mpmath.matrix(rows[axis])
+
+
+@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+def test_euler_kinematics(sequence: str) -> None:
+    """d/dt R(angles) = R [w]x, the derivative taken along the angles' rates at forty digits."""
+    random = Random(7)
+    system = prepared(
+        "principal_moments = [1, 2, 2.5]",
+        "angular_velocity = [0.1, 1, 0.05]\neuler_angles = [0.3, 0.7, -0.4]",
+        integrator=f'formulation = "euler_angles"\neuler_sequence = "{sequence}"',
+    ).system
+    for _ in range(5):
+        w = random.vector()
+        angles = np.array([random.vector(3)[0], random.generator.uniform(0.3, 1.2), random.vector(3)[0]])
+        rates = derivative(system, np.concatenate([w, angles]))[3:]
+        with mpmath.workdps(40):
+            step = mpmath.mpf(10) ** -12  # central difference: error h^2/6 = 2e-25, roundings 1e-28
+
+            def attitude(t: Any, angles: np.ndarray = angles, rates: np.ndarray = rates) -> Any:
+                a, b, c = (mpmath.mpf(x) + t * mpmath.mpf(v) for x, v in zip(angles, rates, strict=True))
+                return turn(sequence[0], a) * turn(sequence[1], b) * turn(sequence[2], c)
+
+            change = (attitude(step) - attitude(-step)) / (2 * step)
+            expected = attitude(0) * mpmath.matrix(skew(w).tolist())
+            # the rates' own rounding, times 1/sin or 1/cos of the middle angle, at most 3.4
+            assert mpmath.mnorm(change - expected, mpmath.inf) <= 4 * CLOSE
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_quaternion_kinematics(seed: int) -> None:
+    """q' = q (0, w) / 2."""
+    random = Random(200 + seed)
+    system = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [0.1, 1, 0.05]").system
+    w, q = random.vector(), random.quaternion()
+    got = derivative(system, np.concatenate([w, q]))[3:]
+    vector = q[0] * w + np.cross(q[1:], w)
+    expected = 0.5 * np.concatenate([[-q[1:] @ w], vector])
+    np.testing.assert_allclose(got, expected, rtol=0, atol=CLOSE)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_matrix_kinematics(seed: int) -> None:
+    """R' = R [w]x."""
+    random = Random(300 + seed)
+    system = prepared(
+        "principal_moments = [1, 2, 2.5]",
+        "angular_velocity = [0.1, 1, 0.05]",
+        integrator='formulation = "rotation_matrix"',
+    ).system
+    w, r = random.vector(), matrix(random.quaternion())
+    got = derivative(system, np.concatenate([w, r.ravel()]))[3:]
+    np.testing.assert_allclose(got.reshape(3, 3), r @ skew(w), rtol=0, atol=CLOSE)
+
+
+@pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rotation_matrix"])
+def test_all_formulations_start_from_one_attitude(formulation: str) -> None:
+    q = Random(5).quaternion()
+    system = prepared(
+        "principal_moments = [1, 2, 2.5]",
+        f"angular_velocity = [0.1, 1, 0.05]\nquaternion = {array(q)}",
+        record='["rotation_matrix"]',
+        integrator=f'formulation = "{formulation}"',
+    ).system
+    start = np.ldexp(np.array([float(x) for x in system.initial]), system.state_exponents)
+    got = observed(system, start)["rotation_matrix"].reshape(3, 3)
+    np.testing.assert_allclose(got, matrix(q), rtol=0, atol=CLOSE)
+
+
+def test_free_flight() -> None:
+    """x' = v, v' = g, and gravity doesn't turn the body."""
+    random = Random(11)
+    pull, tensor = random.vector(9), random.tensor()
+    system = prepared(
+        general_body(tensor, 3.0),
+        "angular_velocity = [1, 2, 3]\nposition = [1e6, 2, 3]\nvelocity = [1e-3, 5, 0]",
+        GRAVITY + f"acceleration = {array(pull)}",
+    ).system
+    w, q, x, v = random.vector(), random.quaternion(), random.vector(1e6), random.vector(5)
+    got = derivative(system, np.concatenate([w, q, x, v]))
+    np.testing.assert_allclose(got[7:10], v, rtol=4 * EPS)
+    np.testing.assert_allclose(got[10:13], pull, rtol=4 * EPS)
+    expected = np.linalg.solve(tensor, np.cross(tensor @ w, w))
+    np.testing.assert_allclose(got[:3], expected, rtol=0, atol=CLOSE * np.linalg.cond(tensor))
+
+
+# ---- (d) observables --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("size", [1.0, 1e-5])
+def test_observables_of_a_heavy_body(seed: int, size: float) -> None:
+    random = Random(400 + seed)
+    tensor, center, mass, pull = random.tensor(), random.vector(), 1.7, random.vector(9 * size**2)
+    system = prepared(
+        general_body(tensor, mass, center),
+        f"angular_velocity = {array(random.vector(size))}",
+        GRAVITY + f"acceleration = {array(pull)}",
+    ).system
+    w, q = random.vector(size), random.quaternion()
+    got, r = observed(system, np.concatenate([w, q])), matrix(q)
+    momentum, up = r @ tensor @ w, -pull / np.linalg.norm(pull)
+    potential = -mass * pull @ r @ center
+    scale = np.linalg.norm(tensor) * size
+    np.testing.assert_array_equal(got["angular_velocity"], w)
+    np.testing.assert_array_equal(got["quaternion"], q)
+    np.testing.assert_allclose(got["angular_momentum"], momentum, rtol=0, atol=CLOSE * scale)
+    np.testing.assert_allclose(
+        got["angular_momentum_norm"], np.linalg.norm(momentum), rtol=0, atol=CLOSE * scale
+    )
+    np.testing.assert_allclose(got["angular_momentum_vertical"], momentum @ up, rtol=0, atol=CLOSE * scale)
+    energy_scale = scale * size + mass * np.linalg.norm(pull)
+    np.testing.assert_allclose(got["potential_energy"], potential, rtol=0, atol=CLOSE * energy_scale)
+    np.testing.assert_allclose(
+        got["energy"], w @ tensor @ w / 2 + potential, rtol=0, atol=CLOSE * energy_scale
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_observables_of_a_body_in_flight(seed: int) -> None:
+    random = Random(500 + seed)
+    tensor, mass, pull = random.tensor(), 3.3, random.vector(9)
+    names = '["linear_momentum", "energy", "rotational_energy", "potential_energy", "position", "velocity"]'
+    system = prepared(
+        general_body(tensor, mass),
+        f"angular_velocity = [1, 2, 3]\nposition = {array(random.vector(50))}\nvelocity = [1, 2, 3]",
+        GRAVITY + f"acceleration = {array(pull)}",
+        record=names,
+    ).system
+    assert system.states == ["wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz"]
+    w, x, v = random.vector(), random.vector(50), random.vector(5)
+    got = observed(system, np.concatenate([w, x, v]))
+    rotation, potential = w @ tensor @ w / 2, -mass * pull @ x
+    scale = rotation + mass * v @ v / 2 + mass * np.linalg.norm(pull) * np.linalg.norm(x)
+    np.testing.assert_array_equal(got["position"], x)
+    np.testing.assert_array_equal(got["velocity"], v)
+    np.testing.assert_allclose(got["linear_momentum"], mass * v, rtol=4 * EPS)
+    np.testing.assert_allclose(got["rotational_energy"], rotation, rtol=CLOSE)
+    np.testing.assert_allclose(got["potential_energy"], potential, rtol=0, atol=CLOSE * scale)
+    total = rotation + mass * v @ v / 2 + potential
+    np.testing.assert_allclose(got["energy"], total, rtol=0, atol=CLOSE * scale)
+
+
+@pytest.mark.parametrize(
+    ("axis", "moments"), [([1, 0, 0], "[3, 2, 2]"), ([0, 1, 0], "[2, 3, 2]"), ([0, 0, 1], "[2, 2, 3]")]
+)
+def test_axial_momentum_is_along_the_symmetry_axis(axis: list[int], moments: str) -> None:
+    system = prepared(f"principal_moments = {moments}", "angular_velocity = [1, 2, 3]").system
+    w = np.array([0.3, -0.4, 0.5])
+    got = observed(system, np.concatenate([w, [1, 0, 0, 0]]))["angular_momentum_axial"]
+    np.testing.assert_allclose(got, 3 * w @ axis, rtol=4 * EPS)
+
+
+def test_axial_momentum_of_a_tilted_body() -> None:
+    """The axis is found in a tensor of general axes; its sign is a matter of convention."""
+    random = Random(17)
+    r = matrix(random.quaternion())
+    tensor = r @ np.diag([2.0, 2.0, 3.0]) @ r.T
+    # symmetric to fifty digits needs numbers of fifty digits: a part turned by a quaternion has them
+    q = Rotation.from_matrix(r).as_quat()
+    part = f'{{shape = "cylinder", mass = 2, radius = 2, height = 1, quaternion = {array([q[3], *q[:3]])}}}'
+    system = prepared(f"parts = [{part}]", "angular_velocity = [1, 2, 3]").system
+    w = random.vector()
+    got = observed(system, np.concatenate([w, [1, 0, 0, 0]]))["angular_momentum_axial"]
+    along, axis = 2 * 2**2 / 2, r[:, 2]  # m R^2 / 2
+    np.testing.assert_allclose(abs(got), along * abs(w @ axis), rtol=0, atol=CLOSE * along)
+    assert np.linalg.norm(tensor @ axis - 3 * axis) <= CLOSE
+
+
+@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix"])
+def test_euler_angles_from_another_formulation(sequence: str, formulation: str) -> None:
+    random = Random(23)
+    system = prepared(
+        "principal_moments = [1, 2, 2.5]",
+        "angular_velocity = [0.1, 1, 0.05]",
+        record='["euler_angles"]',
+        integrator=f'formulation = "{formulation}"\neuler_sequence = "{sequence}"',
+    ).system
+    for _ in range(10):
+        q = random.quaternion()
+        attitude = q if formulation == "quaternion" else matrix(q).ravel()
+        got = observed(system, np.concatenate([[0.1, 1, 0.05], attitude]))["euler_angles"]
+        expected = Rotation.from_matrix(matrix(q)).as_euler(sequence.upper())
+        middle = abs(np.sin(expected[1]) if sequence[0] == sequence[2] else np.cos(expected[1]))
+        np.testing.assert_allclose(got, expected, rtol=0, atol=CLOSE / middle)
+
+
+@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+def test_quaternion_and_matrix_from_euler_angles(sequence: str) -> None:
+    random = Random(29)
+    system = prepared(
+        "principal_moments = [1, 2, 2.5]",
+        "angular_velocity = [0.1, 1, 0.05]\neuler_angles = [0.3, 0.7, -0.4]",
+        record='["quaternion", "rotation_matrix", "euler_angles"]',
+        integrator=f'formulation = "euler_angles"\neuler_sequence = "{sequence}"',
+    ).system
+    for _ in range(5):
+        angles = random.vector(3)
+        got = observed(system, np.concatenate([[0.1, 1, 0.05], angles]))
+        expected = Rotation.from_euler(sequence.upper(), angles)
+        np.testing.assert_array_equal(got["euler_angles"], angles)
+        np.testing.assert_allclose(
+            got["rotation_matrix"].reshape(3, 3), expected.as_matrix(), rtol=0, atol=CLOSE
+        )
+        q = np.roll(expected.as_quat(), 1)
+        assert abs(abs(got["quaternion"] @ q) - 1) <= CLOSE
+
+
+NEARLY_HALF = np.pi - 1e-9
+ATTITUDES = {
+    "identity": [0, 0, 0],
+    "about x": [NEARLY_HALF, 0, 0],
+    "about y": [0, NEARLY_HALF, 0],
+    "about z": [0, 0, NEARLY_HALF],
+    "half turn": [np.pi, 0, 0],
+    "any": [0.3, -2.0, 1.1],
+    "tiny": [1e-9, 2e-9, 3e-9],
+}
+
+
+@pytest.mark.parametrize("case", ATTITUDES)
+def test_quaternion_from_the_matrix_formulation(case: str) -> None:
+    """Each of the four branches, near half turns, where a division by w would lose all digits."""
+    system = prepared(
+        "principal_moments = [1, 2, 2.5]",
+        "angular_velocity = [0.1, 1, 0.05]",
+        record='["quaternion"]',
+        integrator='formulation = "rotation_matrix"',
+    ).system
+    rotation = Rotation.from_rotvec(ATTITUDES[case])
+    state = np.concatenate([[0.1, 1, 0.05], rotation.as_matrix().ravel()])
+    got, q = observed(system, state)["quaternion"], np.roll(rotation.as_quat(), 1)
+    np.testing.assert_allclose(got * np.sign(got @ q), q, rtol=0, atol=CLOSE)
+
+
+# ---- (e) no more states than needed -----------------------------------------------------------------------
+
+FREE = "principal_moments = [1, 2, 2.5]\nmass = 1"
+HEAVY = "principal_moments = [1, 1, 0.3]\nmass = 1\ncenter_of_mass = [0, 0, 1]"
+SPIN = "angular_velocity = [0.1, 1, 0.05]\neuler_angles = [0.1, 0.5, 0.2]"
+FLIGHT = SPIN + "\nposition = [1, 2, 3]\nvelocity = [4, 5, 6]"
+RATES, QUATERNION, VERTICAL = "wx wy wz", "qw qx qy qz", "gx gy gz"
+ANGLES, NINE, PATH = "phi theta psi", "r11 r12 r13 r21 r22 r23 r31 r32 r33", "x y z vx vy vz"
+
+# body, initial, loads, record, formulation: the states in groups
+NEEDS = {
+    "rates alone": (FREE, SPIN, "", '["angular_velocity"]', "auto", [RATES]),
+    "energy alone": (FREE, SPIN, "", '["energy"]', "auto", [RATES]),
+    "momentum's norm alone": (FREE, SPIN, "", '["angular_momentum_norm"]', "auto", [RATES]),
+    "formulation rates": (FREE, SPIN, "", "", "rates", [RATES]),
+    "everything": (FREE, SPIN, "", "", "auto", [RATES, QUATERNION]),
+    "attitude": (FREE, SPIN, "", '["quaternion"]', "auto", [RATES, QUATERNION]),
+    "momentum in space": (FREE, SPIN, "", '["angular_momentum"]', "auto", [RATES, QUATERNION]),
+    "angles of a quaternion": (FREE, SPIN, "", '["euler_angles"]', "auto", [RATES, QUATERNION]),
+    "Euler angles": (FREE, SPIN, "", "", "euler_angles", [RATES, ANGLES]),
+    "rotation matrix": (FREE, SPIN, "", "", "rotation_matrix", [RATES, NINE]),
+    "heavy top": (HEAVY, SPIN, GRAVITY, "", "auto", [RATES, QUATERNION]),
+    "heavy top's rates": (HEAVY, SPIN, GRAVITY, '["angular_velocity"]', "auto", [RATES, VERTICAL]),
+    "heavy top's energies": (
+        HEAVY, SPIN, GRAVITY, '["energy", "potential_energy", "angular_momentum_vertical"]', "auto",
+        [RATES, VERTICAL],
+    ),
+    "gravity without an arm": (FREE, SPIN, GRAVITY, '["angular_velocity"]', "auto", [RATES]),
+    "no gravity with an arm": (HEAVY, SPIN, "", '["angular_velocity"]', "auto", [RATES]),
+    "flight": (FREE, FLIGHT, "", "", "auto", [RATES, QUATERNION, PATH]),
+    "flight in Euler angles": (FREE, FLIGHT, "", "", "euler_angles", [RATES, ANGLES, PATH]),
+    "flight in a matrix": (FREE, FLIGHT, GRAVITY, "", "rotation_matrix", [RATES, NINE, PATH]),
+    "path alone": (FREE, FLIGHT, GRAVITY, '["position"]', "auto", [RATES, PATH]),
+    "rates of a flight": (FREE, FLIGHT, GRAVITY, '["angular_velocity"]', "auto", [RATES]),
+    "attitude of a flight": (FREE, FLIGHT, GRAVITY, '["quaternion"]', "auto", [RATES, QUATERNION]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", NEEDS)
+def test_only_what_is_needed_is_carried_and_each_has_a_reason(case: str) -> None:
+    body, initial, loads, record, formulation, groups = NEEDS[case]
+    system = prepared(body, initial, loads, record, f'formulation = "{formulation}"').system
+    assert system.states == " ".join(groups).split()
+    assert len(system.initial) == len(system.equations) == len(system.state_exponents) == len(system.states)
+    reasons = dict(system.requirements.reasons)
+    shown = [group.replace(NINE, "r11 ... r33") for group in groups]
+    assert list(reasons) == shown
+    assert all(len(why) > 10 for why in reasons.values())
+    left_out = dict(system.requirements.left_out)
+    assert ("position and velocity" in left_out) == (PATH not in groups)
+    assert ("attitude" in left_out) == (not {QUATERNION, ANGLES, NINE} & set(groups))
+
+
+def test_counts_of_states() -> None:
+    counts = {case: len(prepared(*NEEDS[case][:4], f'formulation = "{NEEDS[case][4]}"').system.states)
+              for case in NEEDS}  # fmt: skip
+    assert counts["rates alone"] == 3
+    assert counts["everything"] == 7
+    assert counts["Euler angles"] == counts["heavy top's rates"] == 6
+    assert counts["rotation matrix"] == counts["flight in Euler angles"] == 12
+    assert counts["flight"] == 13
+    assert counts["flight in a matrix"] == 18
+
+
+def test_reasons_name_what_asked() -> None:
+    recorded = prepared(FREE, SPIN, record='["quaternion", "energy"]').system.requirements
+    assert dict(recorded.reasons)[QUATERNION] == "quaternion is recorded"
+    heavy = prepared(HEAVY, SPIN, GRAVITY, record='["angular_velocity"]').system.requirements
+    assert "Euler-Poisson" in dict(heavy.reasons)[VERTICAL]
+    asked = prepared(FREE, SPIN, integrator='formulation = "euler_angles"').system.requirements
+    assert '"euler_angles" asks for it' in dict(asked.reasons)[ANGLES]
+
+
+# ---- (f) exactly the invariants that hold -----------------------------------------------------------------
+
+DOWN = np.array([0, 0, -9.80665])
+# principal moments, centre of mass, initial, gravity, invariants
+SCENES: dict[str, tuple[list[float], list[float], str, bool, set[str]]] = {
+    "free asymmetric": (
+        [1, 2, 2.5], [0, 0, 0], SPIN, False, {"angular_momentum", "angular_momentum_norm", "energy"},
+    ),
+    "free symmetric": (
+        [1, 1, 1.5], [0, 0, 0], SPIN, False,
+        {"angular_momentum", "angular_momentum_norm", "angular_momentum_axial", "energy"},
+    ),
+    "free with an arm": (
+        [1, 2, 2.5], [0.3, 0.2, 1], SPIN, False,
+        {"angular_momentum", "angular_momentum_norm", "energy"},
+    ),
+    "heavy symmetric": (
+        [1, 1, 0.3], [0, 0, 1], SPIN, True,
+        {"angular_momentum_vertical", "angular_momentum_axial", "energy"},
+    ),
+    "heavy asymmetric": ([1, 2, 2.5], [0, 0, 1], SPIN, True, {"angular_momentum_vertical", "energy"}),
+    "heavy with the centre of mass off its axis": (
+        [1, 1, 0.3], [0.2, 0, 1], SPIN, True, {"angular_momentum_vertical", "energy"},
+    ),
+    "heavy sphere": (
+        [1, 1, 1], [0, 0, 1], SPIN, True,
+        {"angular_momentum_vertical", "angular_momentum_axial", "energy"},
+    ),
+    "asymmetric in flight": (
+        [1, 2, 2.5], [0, 0, 0], FLIGHT, False,
+        {"angular_momentum", "angular_momentum_norm", "energy", "rotational_energy", "linear_momentum"},
+    ),
+    "asymmetric in free fall": (
+        [1, 2, 2.5], [0, 0, 0], FLIGHT, True,
+        {"angular_momentum", "angular_momentum_norm", "energy", "rotational_energy"},
+    ),
+    "symmetric in free fall": (
+        [1, 1, 1.5], [0, 0, 0], FLIGHT, True,
+        {"angular_momentum", "angular_momentum_norm", "angular_momentum_axial", "energy",
+         "rotational_energy"},
+    ),
+}  # fmt: skip
+
+END = 20.0  # seconds, some turns of every scene
+
+
+def motion(system: System) -> np.ndarray:
+    """States in SI at every natural step up to the end, shape (steps, states)."""
+    start = np.array([float(x) for x in system.initial])
+    integrator = hy.taylor_adaptive(system.equations, start)
+    rows = [start]
+    while integrator.time < np.ldexp(END, -system.scaling.time):
+        integrator.step()
+        rows.append(integrator.state.copy())
+    return np.ldexp(np.array(rows), np.array(system.state_exponents))
+
+
+def departure(values: np.ndarray, scale: float | None = None) -> float:
+    """Largest distance from the start, over the scale (by default the largest size)."""
+    values = values.reshape(len(values), -1)
+    largest = np.max(np.linalg.norm(values, axis=1)) if scale is None else scale
+    return float(np.max(np.linalg.norm(values - values[0], axis=1)) / largest)
+
+
+def bound(states: np.ndarray) -> float:
+    """Each step adds at most eps of every state, its tolerance; sums of products of them some times that."""
+    return 10 * len(states) * EPS
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_exactly_what_is_conserved_is_listed(case: str) -> None:
+    """Each candidate is computed from the motion in numpy: the listed ones stay, all others leave."""
+    moments, center, initial, gravity, expected = SCENES[case]
+    table = f"principal_moments = {array(moments)}\nmass = 1\ncenter_of_mass = {array(center)}"
+    system = prepared(table, initial, GRAVITY if gravity else "", end=END).system
+    listed = {i.name for i in system.invariants if not i.numerical}
+    assert listed == expected
+    assert all(i.why for i in system.invariants)
+
+    states = motion(system)
+    flight = "position" in initial
+    w, r = states[:, :3], np.array([matrix(q) for q in states[:, 3:7]])
+    momentum = w * moments
+    in_space = np.einsum("nij,nj->ni", r, momentum)
+    spinning = np.einsum("ni,ni->n", w, momentum) / 2
+    candidates = {
+        "angular_momentum": in_space,
+        "angular_momentum_norm": np.linalg.norm(in_space, axis=1),
+        "angular_momentum_axial": momentum[:, 2],
+    }
+    if flight:
+        position, velocity = states[:, 7:10], states[:, 10:13]
+        flying = (velocity**2).sum(axis=1) / 2
+        potential = -position @ DOWN if gravity else 0 * spinning
+        candidates["rotational_energy"] = spinning
+        candidates["linear_momentum"] = velocity
+    else:
+        flying = 0 * spinning
+        potential = -np.einsum("nij,j,i->n", r, center, DOWN) if gravity else 0 * spinning
+        if gravity:
+            candidates["angular_momentum_vertical"] = in_space[:, 2]
+    found = {name: departure(values) for name, values in candidates.items()}
+    parts = np.max(spinning + flying) + np.max(np.abs(potential))
+    found["energy"] = departure(spinning + flying + potential, parts)
+    kept = {name for name, change in found.items() if change < bound(states)}
+    gone = {name for name, change in found.items() if change > 1e-3}
+    assert kept == expected
+    assert gone == found.keys() - expected
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_listed_expressions_are_what_stays(case: str) -> None:
+    """The expressions themselves, whose drift the summary reports, along the same motion."""
+    moments, center, initial, gravity, _ = SCENES[case]
+    table = f"principal_moments = {array(moments)}\nmass = 1\ncenter_of_mass = {array(center)}"
+    system = prepared(table, initial, GRAVITY if gravity else "", end=END).system
+    states = motion(system)
+    inside = np.ascontiguousarray(internal(system, states).T)
+    for invariant in system.invariants:
+        values = hy.cfunc(invariant.expressions, system.variables)(inside)
+        scale = np.ldexp(float(invariant.scale), -invariant.exponents[0])
+        drift = np.linalg.norm(values - values[:, :1], axis=0) / scale
+        assert np.max(drift) < bound(states)
+        assert invariant.scale > 0
+        assert invariant.scale_name
+
+
+def test_zero_gravity_is_no_force() -> None:
+    system = prepared(FREE, FLIGHT, GRAVITY + "acceleration = [0, 0, 0]").system
+    assert "linear_momentum" in {i.name for i in system.invariants}
+
+
+@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "rates"])
+def test_numerical_invariants(formulation: str) -> None:
+    """A quaternion's norm and a matrix's orthogonality hold by definition, and are told apart."""
+    system = prepared(HEAVY, SPIN, GRAVITY, integrator=f'formulation = "{formulation}"').system
+    names = {
+        "quaternion": "quaternion_norm",
+        "rotation_matrix": "orthogonality_defect",
+        "rates": "vertical_norm",
+    }
+    (found,) = [i for i in system.invariants if i.numerical]
+    assert found.name == names[formulation]
+    start = np.array([float(x) for x in system.initial])
+    value = hy.cfunc(found.expressions, system.variables)
+    perfect = 0.0 if formulation == "rotation_matrix" else 1.0
+    assert abs(value(start)[0] - perfect) <= CLOSE
+    start[3:] *= 1.01  # a norm that is off by one per cent is seen as such
+    seen = value(start)[0] - perfect
+    if formulation == "rotation_matrix":  # R R^T - 1 = 0.0201 on the diagonal
+        assert abs(seen - np.sqrt(3) * 0.0201) <= CLOSE
+    else:
+        assert abs(seen - 0.01) <= CLOSE
+
+
+def test_drifts_are_relative_to_the_scale() -> None:
+    """(value - initial) / scale: zero at the start, and as in numpy elsewhere."""
+    system = prepared(FREE, SPIN).system
+    start = np.array([float(x) for x in system.initial])
+    components = [x for invariant in system.invariants for x in invariant.expressions]
+    begin = hy.cfunc(components, system.variables)(start)
+    drifts = hy.cfunc(system.outputs[-len(system.invariants) :], system.variables)
+    np.testing.assert_array_equal(drifts(start, pars=begin), 0)
+    moved = start.copy()
+    moved[:3] *= 1.5  # momentum grows by one half, energy by 5/4
+    got = dict(zip([i.name for i in system.invariants], drifts(moved, pars=begin), strict=True))
+    assert got["angular_momentum"] == pytest.approx(0.5, rel=CLOSE)
+    assert got["angular_momentum_norm"] == pytest.approx(0.5, rel=CLOSE)
+    assert got["energy"] == pytest.approx(1.25, rel=CLOSE)
+    assert abs(got["quaternion_norm"]) <= CLOSE
+
+
+# ---- (g) units of powers of two ---------------------------------------------------------------------------
+
+
+def exact(value: float, power: int) -> str:
+    """value * 2**power as a TOML string that holds it exactly."""
+    numerator, denominator = value.as_integer_ratio()
+    if power >= 0:
+        return f'"{numerator * 2**power}/{denominator}"'
+    return f'"{numerator}/{denominator * 2**-power}"'
+
+
+def row(values: list[float], power: int) -> str:
+    return "[" + ", ".join(exact(v, power) for v in values) + "]"
+
+
+def scaled_scene(kind: str, inertia: int, rate: int, length: int = 0) -> System:
+    """A scene with all inertia times 2**inertia, times over 2**rate, lengths of flight times 2**length."""
+    tensor = [[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 2.5]]
+    spin = f"angular_velocity = {row([0.1, 1.0, 0.05], rate)}\nquaternion = [0.5, 0.1, -0.3, 0.7]"
+    loads = ""
+    if kind == "free":
+        body = f"principal_moments = {row([1.0, 2.0, 2.5], inertia)}"
+    elif kind == "general":
+        body = f"inertia_tensor = [{', '.join(row(r, inertia) for r in tensor)}]"
+    elif kind == "heavy":
+        body = (
+            f"principal_moments = {row([1.0, 1.0, 0.3], inertia)}\nmass = {exact(1.7, inertia)}\n"
+            "center_of_mass = [0, 0, 0.4]"
+        )
+        loads = GRAVITY + f"acceleration = {row([0.0, 0.0, -9.8], 2 * rate)}"
+    else:
+        body = f"principal_moments = {row([1.0, 2.0, 2.5], inertia)}\nmass = {exact(1.7, 0)}"
+        spin += (
+            f"\nposition = {row([1.0, 2.0, 3.0], length)}\nvelocity = {row([4.0, 5.0, 6.0], length + rate)}"
+        )
+        loads = GRAVITY + f"acceleration = {row([0.0, 0.0, -9.8], length + 2 * rate)}"
+    record = {"flight": '["position", "velocity", "quaternion"]'}.get(kind, "")
+    load = f"[[loads]]\n{loads}" if loads else ""
+    output = f"[output]\nrecord = {record}" if record else ""
+    text = (
+        f'name = "scaled"\n[body]\n{body}\n[initial]\n{spin}\n{load}\n'
+        f"[time]\nend = {exact(8.0, -rate)}\n{output}\n"
+    )
+    return prepare(parse(text)).system
+
+
+@pytest.mark.parametrize("kind", ["free", "general", "heavy", "flight"])
+@pytest.mark.parametrize("inertia", [600, -600, 0])
+@pytest.mark.parametrize("rate", [27, -27])
+def test_powers_of_two_change_no_bit(kind: str, inertia: int, rate: int) -> None:
+    """Equations and scaled initial states are literally those of the scene of order one."""
+    if kind == "flight":
+        inertia = inertia // 20  # its energy adds two kinds of terms, which a common factor would keep apart
+    plain = scaled_scene(kind, 0, 0)
+    scaled = scaled_scene(kind, inertia, rate, length=40 if kind == "flight" else 0)
+    assert [str(rhs) for _, rhs in scaled.equations] == [str(rhs) for _, rhs in plain.equations]
+    assert scaled.equations == plain.equations  # also the digits that a text doesn't show
+    assert scaled.initial == plain.initial
+    assert scaled.scaling.time == plain.scaling.time - rate
+    assert scaled.scaling.inertia == plain.scaling.inertia + inertia
+    if kind != "flight":
+        assert scaled.outputs == plain.outputs
+        by_name = {r.name: r.exponents for r in plain.recorded}
+        for recorded in scaled.recorded:
+            shift = {
+                "energy": inertia + 2 * rate,
+                "angular_velocity": rate,
+                "angular_momentum": inertia + rate,
+            }
+            if recorded.name in shift:
+                assert recorded.exponents == [e + shift[recorded.name] for e in by_name[recorded.name]]
+
+
+def test_another_factor_does_change_the_equations() -> None:
+    """The counterpart: a scene that isn't a scaled copy has other equations."""
+    free = prepared(FREE, SPIN).system
+    other = prepared("principal_moments = [1, 2, 2.75]\nmass = 1", SPIN).system
+    assert free.equations != other.equations
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 1e6])
+def test_scaled_states_are_of_order_one(size: float) -> None:
+    """heyoka's step control is absolute below one and relative above: no rate may dwarf another."""
+    system = prepared(
+        "principal_moments = [1, 1, 1e-6]", f"angular_velocity = [0, {size}, {size * 1e3}]"
+    ).system
+    sizes = [abs(float(x)) for x in system.initial[:3]]
+    assert max(sizes) <= 1
+    assert min(sizes[1:]) >= 2**-6

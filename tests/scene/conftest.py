@@ -1,0 +1,6 @@
+"""Property tests here have no deadline: a shared machine pauses now and then."""
+
+from hypothesis import settings
+
+settings.register_profile("rigidsim", deadline=None, max_examples=60)
+settings.load_profile("rigidsim")

@@ -1,0 +1,440 @@
+"""Inertia of bodies against integrals over their volume and the theorems of every mechanics course."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from rigidsim.scene.body import RigidBody, build_body, inverse_inertia, parallel_axis
+from rigidsim.scene.context import context_for, cross, diagonal, dot, eigen, multiply, transpose
+from rigidsim.scene.reading import parse
+from rigidsim.scene.shapes import SHAPES
+from rigidsim.solve.precision import precision_of
+
+DIGITS = 50
+CONTEXT = context_for(DIGITS)
+LAST = CONTEXT.mpf(2) ** (16 - CONTEXT.prec)  # some tens of roundings of the context
+CLOSE = 200 * np.finfo(float).eps  # sums of some hundred terms of one sign in double
+
+
+def body(table: str, context: Any = CONTEXT) -> RigidBody:
+    text = f'name = "body"\n[body]\n{table}\n[initial]\nangular_velocity = [0, 0, 0]\n[time]\nend = 1\n'
+    return build_body(parse(text).config.body, context)
+
+
+def numbers(matrix: Any) -> np.ndarray:
+    return np.array(matrix, dtype=float)
+
+
+def number(value: Fraction | int) -> Any:
+    value = Fraction(value)
+    return CONTEXT.mpf(value.numerator) / value.denominator
+
+
+def assert_same(matrix: Any, expected: Any, scale: Any = 1) -> None:
+    """To the scene's own arithmetic."""
+    for row, other in zip(matrix, expected, strict=True):
+        for x, y in zip(row, other, strict=True):
+            assert abs(x - y) <= LAST * scale
+
+
+# ---- shapes against integrals -----------------------------------------------------------------------------
+
+
+def line(low: float, high: float, count: int = 6) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss-Legendre nodes and weights: exact for polynomials up to degree 11."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    return (high + low) / 2 + (high - low) / 2 * x, (high - low) / 2 * w
+
+
+def circle(count: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """Equal steps around a circle: exact for trigonometric polynomials up to degree 7."""
+    return 2 * np.pi * np.arange(count) / count, np.full(count, 2 * np.pi / count)
+
+
+def nodes(*rules: tuple[np.ndarray, np.ndarray]) -> Iterator[np.ndarray]:
+    """Product rule: the coordinates of all nodes, and last the products of the weights."""
+    yield from (x.ravel() for x in np.meshgrid(*(rule[0] for rule in rules), indexing="ij"))
+    yield np.prod([w.ravel() for w in np.meshgrid(*(r[1] for r in rules), indexing="ij")], axis=0)
+
+
+def ball(a: float, b: float, c: float) -> tuple[np.ndarray, np.ndarray]:
+    r, u, phi, w = nodes(line(0, 1), line(-1, 1), circle())
+    s = np.sqrt(1 - u**2)
+    return np.stack([a * r * s * np.cos(phi), b * r * s * np.sin(phi), c * r * u], 1), w * r**2
+
+
+def tube(inner: float, outer: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    r, phi, z, w = nodes(line(inner, outer), circle(), line(-height / 2, height / 2))
+    return np.stack([r * np.cos(phi), r * np.sin(phi), z], 1), w * r
+
+
+def cone(radius: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """Apex at the origin, opening towards +z."""
+    r, phi, z, w = nodes(line(0, 1), circle(), line(0, height))
+    width = radius * z / height
+    return np.stack([r * width * np.cos(phi), r * width * np.sin(phi), z], 1), w * r * width**2
+
+
+def torus(major: float, minor: float) -> tuple[np.ndarray, np.ndarray]:
+    r, t, phi, w = nodes(line(0, minor), circle(), circle())
+    rho = major + r * np.cos(t)
+    return np.stack([rho * np.cos(phi), rho * np.sin(phi), r * np.sin(t)], 1), w * r * rho
+
+
+def shell(radius: float) -> tuple[np.ndarray, np.ndarray]:
+    u, phi, w = nodes(line(-1, 1), circle())
+    s = np.sqrt(1 - u**2)
+    return radius * np.stack([s * np.cos(phi), s * np.sin(phi), u], 1), w
+
+
+def box(*edges: float) -> tuple[np.ndarray, np.ndarray]:
+    """A cuboid, or with an edge of zero a plate or a rod."""
+    rules = [line(-e / 2, e / 2) if e else (np.zeros(1), np.ones(1)) for e in edges]
+    *xyz, w = nodes(*rules)
+    return np.stack(xyz, 1), w
+
+
+def disk(radius: float) -> tuple[np.ndarray, np.ndarray]:
+    r, phi, w = nodes(line(0, radius), circle())
+    return np.stack([r * np.cos(phi), r * np.sin(phi), 0 * r], 1), w * r
+
+
+def ring(radius: float) -> tuple[np.ndarray, np.ndarray]:
+    phi, w = circle()
+    return radius * np.stack([np.cos(phi), np.sin(phi), 0 * phi], 1), w
+
+
+def moments_of(points: np.ndarray, weights: np.ndarray, mass: float) -> tuple[np.ndarray, np.ndarray]:
+    """Inertia tensor about the origin and centre of mass of weighted points."""
+    m = mass * weights / weights.sum()
+    squares = np.einsum("n,ni,nj->ij", m, points, points)
+    return np.trace(squares) * np.eye(3) - squares, m @ points / mass
+
+
+SOLIDS = {
+    "cuboid": ("size = [0.7, 1.9, 3.1]", lambda: box(0.7, 1.9, 3.1)),
+    "plate": ("size = [0.7, 1.9]", lambda: box(0.7, 1.9, 0)),
+    "ellipsoid": ("semi_axes = [0.7, 1.9, 3.1]", lambda: ball(0.7, 1.9, 3.1)),
+    "sphere": ("radius = 1.3", lambda: ball(1.3, 1.3, 1.3)),
+    "spherical_shell": ("radius = 1.3", lambda: shell(1.3)),
+    "cylinder": ("radius = 1.3\nheight = 0.4", lambda: tube(0, 1.3, 0.4)),
+    "tube": ("inner_radius = 0.9\nouter_radius = 1.3\nheight = 0.4", lambda: tube(0.9, 1.3, 0.4)),
+    "cone": ("radius = 1.3\nheight = 2.4", lambda: cone(1.3, 2.4)),
+    "rod": ("length = 1.7", lambda: box(0, 0, 1.7)),
+    "disk": ("radius = 1.3", lambda: disk(1.3)),
+    "ring": ("radius = 1.3", lambda: ring(1.3)),
+    "torus": ("major_radius = 1.9\nminor_radius = 0.6", lambda: torus(1.9, 0.6)),
+}
+PLANE = ("plate", "disk", "ring")
+LANDMARKS = [(name, mark) for name, shape in SHAPES.items() for mark in shape.landmarks]
+
+
+def test_every_shape_is_tested() -> None:
+    assert SOLIDS.keys() == SHAPES.keys()
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_shape_is_the_integral_over_its_volume(name: str) -> None:
+    """The rules are exact for these polynomials, so that rounding alone is left."""
+    dimensions, rule = SOLIDS[name]
+    points, weights = rule()
+    _, center = moments_of(points, weights, 1.0)
+    expected, _ = moments_of(points - center, weights, 2.5)
+    solid = body(f'shape = "{name}"\nmass = 2.5\n{dimensions}')
+    np.testing.assert_allclose(numbers(solid.inertia), expected, rtol=0, atol=CLOSE * expected.max())
+    assert solid.center_of_mass == [0, 0, 0]
+    assert solid.mass == number(Fraction(5, 2))
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_shape_about_another_point_is_the_integral_from_there(name: str) -> None:
+    dimensions, rule = SOLIDS[name]
+    points, weights = rule()
+    _, center = moments_of(points, weights, 1.0)
+    reference = np.array([0.3, -0.8, 1.1])
+    expected, seen = moments_of(points - center - reference, weights, 2.5)
+    solid = body(f'shape = "{name}"\nmass = 2.5\n{dimensions}\nreference = [0.3, -0.8, 1.1]')
+    np.testing.assert_allclose(numbers(solid.inertia), expected, rtol=0, atol=CLOSE * expected.max())
+    np.testing.assert_allclose(numbers(solid.center_of_mass), seen, rtol=0, atol=CLOSE)
+
+
+@pytest.mark.parametrize("name", PLANE)
+def test_perpendicular_axes(name: str) -> None:
+    plane = body(f'shape = "{name}"\nmass = 2.5\n{SOLIDS[name][0]}')
+    x, y, z = plane.principal_moments
+    assert abs(x + y - z) <= LAST
+
+
+def test_cone_has_its_apex_below() -> None:
+    """The integral starts at the apex: seen from there the centre of mass is at 3/4 of the height."""
+    points, weights = cone(1.3, 2.4)
+    expected, center = moments_of(points, weights, 2.5)
+    top = body(f'shape = "cone"\nmass = 2.5\n{SOLIDS["cone"][0]}\nreference = "apex"')
+    np.testing.assert_allclose(numbers(top.inertia), expected, rtol=0, atol=CLOSE * expected.max())
+    np.testing.assert_allclose(numbers(top.center_of_mass), center, rtol=0, atol=CLOSE)
+    assert_same([top.center_of_mass], [[0, 0, number(Fraction(9, 5))]])
+
+
+# ---- textbook formulas, exactly ---------------------------------------------------------------------------
+
+
+def test_cone_about_its_apex() -> None:
+    top = body('shape = "cone"\nmass = 2\nradius = 0.3\nheight = 0.7\nreference = "apex"')
+    r2, h2 = Fraction(9, 100), Fraction(49, 100)
+    across, along = 3 * 2 * (r2 / 4 + h2) / 5, 3 * 2 * r2 / 10
+    assert_same(top.inertia, diagonal([number(across), number(across), number(along)]))
+
+
+def test_cone_about_its_centre_of_mass() -> None:
+    top = body('shape = "cone"\nmass = 2\nradius = 0.3\nheight = 0.7')
+    r2, h2 = Fraction(9, 100), Fraction(49, 100)
+    across, along = 3 * 2 * (r2 + h2 / 4) / 20, 3 * 2 * r2 / 10
+    assert_same(top.inertia, diagonal([number(across), number(across), number(along)]))
+
+
+def test_rod_about_its_end() -> None:
+    rod = body('shape = "rod"\nmass = 3\nlength = 0.7\nreference = "end"')
+    third = number(3 * Fraction(49, 100) / 3)
+    assert_same(rod.inertia, diagonal([third, third, CONTEXT.zero]))
+    assert rod.principal_moments[2] == 0
+    assert rod.center_of_mass == [0, 0, number(Fraction(35, 100))]
+
+
+def square_plate() -> tuple[RigidBody, Fraction]:
+    plate = body('shape = "plate"\nmass = 3\nsize = [0.7, 0.7]\nreference = "corner"')
+    return plate, 3 * Fraction(49, 100)
+
+
+def test_square_plate_about_its_corner() -> None:
+    """Off the diagonal -m a^2/4: the plate lies in the positive quadrant of its corner."""
+    plate, ma2 = square_plate()
+    third, quarter = Fraction(1, 3), Fraction(1, 4)
+    rows = [[third, -quarter, 0], [-quarter, third, 0], [0, 0, 2 * third]]
+    assert_same(plate.inertia, [[number(ma2 * Fraction(x)) for x in row] for row in rows])
+    assert plate.center_of_mass == [number(Fraction(35, 100)), number(Fraction(35, 100)), 0]
+
+
+def test_square_plate_has_its_diagonals_as_axes() -> None:
+    plate, ma2 = square_plate()
+    for found, twelfths in zip(plate.principal_moments, (1, 7, 8), strict=True):
+        assert abs(found - number(ma2 * Fraction(twelfths, 12))) <= LAST
+    half, zero = 1 / CONTEXT.sqrt(2), CONTEXT.zero
+    along, across, normal = plate.principal_axes
+    last_bit = precision_of(DIGITS).number  # rounded to fifty digits the axes are right to the last bit
+    assert [last_bit(abs(x)) for x in along] == [last_bit(x) for x in (half, half, zero)]
+    assert along[0] * along[1] > 0
+    assert [last_bit(abs(x)) for x in across] == [last_bit(x) for x in (half, half, zero)]
+    assert across[0] * across[1] < 0
+    assert [last_bit(abs(x)) for x in normal] == [last_bit(x) for x in (zero, zero, CONTEXT.one)]
+
+
+def test_the_cuboid_of_the_table() -> None:
+    m, a, b, c = 2, Fraction(7, 10), Fraction(19, 10), Fraction(31, 10)
+    found = body('shape = "cuboid"\nmass = 2\nsize = [0.7, 1.9, 3.1]')
+    expected = [m * (b * b + c * c) / 12, m * (a * a + c * c) / 12, m * (a * a + b * b) / 12]
+    assert_same(found.inertia, diagonal([number(x) for x in expected]))
+
+
+@given(st.lists(st.integers(1, 1000), min_size=6, max_size=6))
+def test_parallel_axis_theorem(values: list[int]) -> None:
+    a, b, c, *arm = (CONTEXT.mpf(v) for v in values)
+    shifted = parallel_axis(diagonal([a + b, a + c, b + c]), CONTEXT.mpf(3), arm)
+    x, y, z = arm
+    steiner = [
+        [y * y + z * z, -x * y, -x * z],
+        [-x * y, x * x + z * z, -y * z],
+        [-x * z, -y * z, x * x + y * y],
+    ]
+    central = diagonal([a + b, a + c, b + c])
+    expected = [[central[i][j] + 3 * steiner[i][j] for j in range(3)] for i in range(3)]
+    assert_same(shifted, expected, 10**7)
+
+
+# ---- points -----------------------------------------------------------------------------------------------
+
+
+def points_table(masses: list[int], positions: list[tuple[int, int, int]], reference: str = "") -> str:
+    entries = [f"{{mass = {m}, position = {list(p)}}}" for m, p in zip(masses, positions, strict=True)]
+    return f"points = [{', '.join(entries)}]\n{reference}"
+
+
+coordinates = st.integers(-100, 100)
+clouds = st.lists(
+    st.tuples(coordinates, coordinates, coordinates), min_size=3, max_size=8, unique=True
+).flatmap(
+    lambda positions: st.tuples(
+        st.lists(st.integers(1, 100), min_size=len(positions), max_size=len(positions)), st.just(positions)
+    )
+)
+
+
+def on_a_line(positions: list[tuple[int, int, int]], *more: tuple[int, int, int]) -> bool:
+    moved = np.array([*positions, *more]) - np.array(positions[0])
+    return np.linalg.matrix_rank(moved) < 2
+
+
+@given(clouds)
+def test_points_about_the_origin(cloud: tuple[list[int], list[tuple[int, int, int]]]) -> None:
+    """Ixx + Iyy + Izz = 2 sum m r^2, and every product of inertia, against whole numbers."""
+    masses, positions = cloud
+    assume(not on_a_line(positions, (0, 0, 0)))
+    found = body(points_table(masses, positions, "reference = [0, 0, 0]"))
+    squares = [
+        [sum(m * p[i] * p[j] for m, p in zip(masses, positions, strict=True)) for j in range(3)]
+        for i in range(3)
+    ]
+    trace = sum(squares[i][i] for i in range(3))
+    assert found.inertia == [[trace * (i == j) - squares[i][j] for j in range(3)] for i in range(3)]
+    assert sum(found.inertia[i][i] for i in range(3)) == 2 * trace
+
+
+@given(clouds)
+def test_no_moment_is_more_than_the_other_two(cloud: tuple[list[int], list[tuple[int, int, int]]]) -> None:
+    masses, positions = cloud
+    found = body(points_table(masses, positions))
+    small, middle, large = sorted(found.principal_moments)
+    assert small >= 0
+    assert small + middle >= large * (1 - LAST)
+
+
+@given(clouds)
+def test_moving_the_reference_is_steiner(cloud: tuple[list[int], list[tuple[int, int, int]]]) -> None:
+    masses, positions = cloud
+    assume(not on_a_line(positions, (0, 0, 0)))
+    central = body(points_table(masses, positions))
+    moved = body(points_table(masses, positions, "reference = [0, 0, 0]"))
+    expected = parallel_axis(central.inertia, central.mass, moved.center_of_mass)
+    assert_same(moved.inertia, expected, 10**8)
+    assert central.center_of_mass == [0, 0, 0]
+
+
+def test_water_is_plane() -> None:
+    """H2O: O-H 0.9572 angstrom, angle 104.52 degrees, in its plane x, y: I1 + I2 = I3."""
+    half = np.deg2rad(104.52 / 2)
+    x, y = float(0.9572 * np.sin(half)), float(0.9572 * np.cos(half))
+    table = f"""points = [
+        {{mass = "15.999 Da", position = [0, 0, 0]}},
+        {{mass = "1.008 Da", position = ["{x!r} Å", "{y!r} Å", 0]}},
+        {{mass = "1.008 Da", position = ["{-x!r} Å", "{y!r} Å", 0]}},
+    ]"""
+    molecule = body(table)
+    assert abs(molecule.inertia[0][0] + molecule.inertia[1][1] - molecule.inertia[2][2]) <= LAST * 1e-46
+    small, middle, large = sorted(molecule.principal_moments)
+    assert abs(small + middle - large) <= LAST * large
+    # about the centre of mass: 2 m x^2, and m_H2 m_O / M y^2, written out with the same numbers
+    dalton = 1.66053906892e-27 * 1e-20
+    expected = np.array([2.016 * 15.999 / 18.015 * y * y, 2.016 * x * x]) * dalton
+    found = numbers([molecule.inertia[0][0], molecule.inertia[1][1]])
+    np.testing.assert_allclose(found, expected, rtol=20 * np.finfo(float).eps)
+
+
+# ---- composite bodies -------------------------------------------------------------------------------------
+
+
+def test_two_halves_are_the_whole() -> None:
+    whole = body('shape = "cuboid"\nmass = 3\nsize = [0.7, 1.9, 3.1]\nreference = [0.1, 0.2, 0.3]')
+    half = '{{shape = "cuboid", mass = 1.5, size = [0.35, 1.9, 3.1], position = [{}, 0, 0]}}'
+    parts = f"parts = [{half.format('0.175')}, {half.format('-0.175')}]\nreference = [0.1, 0.2, 0.3]"
+    joined = body(parts)
+    assert_same(joined.inertia, whole.inertia)
+    assert_same([joined.center_of_mass], [whole.center_of_mass])
+    assert joined.mass == whole.mass
+
+
+def test_a_point_part_moves_the_centre_of_mass() -> None:
+    """A light ball on a heavy one: the body turns about the common centre, at 1/4 of the distance."""
+    ball_at = '{{shape = "sphere", mass = {}, radius = 0.5, position = [0, 0, {}]}}'
+    pair = body(f"parts = [{ball_at.format(3, 0)}, {ball_at.format(1, 4)}]")
+    assert pair.center_of_mass == [0, 0, 0]
+    across, along = Fraction(2, 5) + 3 * 1 + 1 * 9, Fraction(2, 5)
+    assert_same(pair.inertia, diagonal([number(across), number(across), number(along)]))
+    assert [entry["position"][2] for entry in pair.drawing] == [-1.0, 3.0]
+
+
+@given(st.tuples(*[st.integers(-10, 10)] * 4).filter(any))
+def test_a_parts_quaternion_turns_its_tensor(q: tuple[int, ...]) -> None:
+    """Part to body: I = R diag R^T, with scipy's R of the same quaternion."""
+    turned = body(f'parts = [{{shape = "cuboid", mass = 2, size = [0.7, 1.9, 3.1], quaternion = {list(q)}}}]')
+    straight = numbers(body('shape = "cuboid"\nmass = 2\nsize = [0.7, 1.9, 3.1]').inertia)
+    w, x, y, z = q
+    r = Rotation.from_quat([x, y, z, w]).as_matrix()
+    np.testing.assert_allclose(numbers(turned.inertia), r @ straight @ r.T, rtol=0, atol=CLOSE)
+
+
+def test_a_part_turns_from_its_own_axes_into_the_bodys() -> None:
+    """A rod along z, turned by +30 degrees about y, points to n = (1, 0, sqrt(3))/2: Ixz = -nx nz here."""
+    half = CONTEXT.pi / 12
+    q = [CONTEXT.cos(half), CONTEXT.zero, CONTEXT.sin(half), CONTEXT.zero]
+    written = ", ".join(f'"{CONTEXT.nstr(x, 80)}"' for x in q)
+    rod = body(f'parts = [{{shape = "rod", mass = 12, length = 1, quaternion = [{written}]}}]')
+    expected = -CONTEXT.sqrt(3) / 4
+    assert abs(rod.inertia[0][2] - expected) <= CONTEXT.mpf(10) ** -78  # the digits written
+    assert abs(rod.inertia[0][0] - CONTEXT.mpf(3) / 4) <= CONTEXT.mpf(10) ** -78
+    direction = rod.principal_axes[rod.principal_moments.index(0)]
+    assert abs(abs(direction[2]) - CONTEXT.sqrt(3) / 2) <= CONTEXT.mpf(10) ** -76
+
+
+# ---- principal axes ---------------------------------------------------------------------------------------
+
+entries = st.integers(-1000, 1000)
+
+
+@given(st.tuples(*[entries] * 9))
+def test_principal_axes_reproduce_the_tensor(values: tuple[int, ...]) -> None:
+    """A A^T + 1 is symmetric and positive; R^T diag R gives it back to the arithmetic's last bits."""
+    a = [[CONTEXT.mpf(x) for x in values[3 * i : 3 * i + 3]] for i in range(3)]
+    one = diagonal([CONTEXT.one] * 3)
+    product = multiply(a, transpose(a))
+    tensor = [[product[i][j] + one[i][j] for j in range(3)] for i in range(3)]
+    moments, axes = eigen(CONTEXT, tensor)
+    scale = max(abs(x) for row in tensor for x in row)
+    assert_same(multiply(multiply(transpose(axes), diagonal(moments)), axes), tensor, scale)
+    assert_same(multiply(axes, transpose(axes)), one)
+    assert abs(dot(cross(axes[0], axes[1]), axes[2]) - 1) <= LAST  # right-handed
+    assert min(moments) > 0
+
+
+@given(st.tuples(*[entries] * 3))
+def test_a_diagonal_tensor_keeps_its_axes(values: tuple[int, ...]) -> None:
+    tensor = diagonal([CONTEXT.mpf(x) for x in values])
+    moments, axes = eigen(CONTEXT, tensor)
+    assert moments == list(values)
+    assert axes == diagonal([CONTEXT.one] * 3)
+
+
+def test_a_tensor_stays_in_the_users_axes() -> None:
+    found = body("inertia_tensor = [[2, 0.1, 0.2], [0.1, 3, 0.3], [0.2, 0.3, 4]]")
+    tenth = [number(Fraction(n, 10)) for n in (20, 1, 2, 1, 30, 3, 2, 3, 40)]
+    assert found.inertia == [tenth[0:3], tenth[3:6], tenth[6:9]]
+    inverse = inverse_inertia(CONTEXT, found)
+    assert_same(multiply(inverse, found.inertia), diagonal([CONTEXT.one] * 3), 10)
+
+
+def test_a_rods_inverse_leaves_its_axis_alone() -> None:
+    rod = body('shape = "rod"\nmass = 12\nlength = 1')
+    assert inverse_inertia(CONTEXT, rod) == diagonal([CONTEXT.one, CONTEXT.one, CONTEXT.zero])
+
+
+# ---- the Earth --------------------------------------------------------------------------------------------
+
+
+def test_earth() -> None:
+    """Mathews, Herring & Buffett 2002: (C - A)/C = 0.00327379492, free nutation in 304.456 rotations."""
+    earth = body('preset = "earth"')
+    a, b, c = earth.principal_moments
+    assert a == b
+    assert abs((c - a) / c - number(Fraction("0.00327379492"))) <= LAST
+    assert abs(a / (c - a) / CONTEXT.mpf("304.456") - 1) < 1e-6  # six digits are published
+    assert abs(c / CONTEXT.mpf("8.0365e37") - 1) <= LAST
+    assert earth.mass == number(Fraction("5.9722e24"))
+    # C/(M R^2) = 0.3307 (Groten 2004) ties moments, mass and radius together
+    assert abs(float(c / earth.mass) / 6378136.6**2 - 0.3307) < 1e-4
+    assert "Mathews" in earth.source

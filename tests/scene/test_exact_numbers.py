@@ -1,0 +1,269 @@
+"""A number means what was written, to every digit, until it is rounded once to the working precision."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from rigidsim.prepare import prepare
+from rigidsim.scene.context import context_for, working_bits
+from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.reading import parse
+from rigidsim.solve.precision import precision_of
+
+DIGITS = 50
+CONTEXT = context_for(DIGITS)
+NAMES = ["single", "double", "extended", "quadruple", DIGITS]
+
+decimals = st.decimals(
+    min_value=-(10**12), max_value=10**12, allow_nan=False, allow_infinity=False, places=30
+)
+any_decimals = st.builds(
+    lambda sign, digits, exponent: Decimal((sign, tuple(digits), exponent)),
+    st.sampled_from([0, 1]),
+    st.lists(st.integers(0, 9), min_size=1, max_size=60),
+    st.integers(-400, 400),
+)
+
+
+def as_fraction(value: mpmath.mpf) -> Fraction:
+    """A finite mpf, exactly."""
+    sign, mantissa, exponent, _ = value._mpf_
+    return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+def scene_text(end: str = "1", rate: str = "1", moment: str = "2", integrator: str = "") -> str:
+    return f"""
+name = "exact"
+[body]
+principal_moments = [2, {moment}, 3]
+[initial]
+angular_velocity = [{rate}, 0, 1]
+[time]
+end = {end}
+[integrator]
+{integrator}
+"""
+
+
+# ---- as written -------------------------------------------------------------------------------------------
+
+
+@given(any_decimals)
+def test_a_decimal_is_the_fraction_that_it_shows(number: Decimal) -> None:
+    exact = Fraction(number)
+    for written in (number, str(number), f"{number} kg", f"{number}  kg "):
+        assert parse_number(written, "kg") == ExactNumber(exact)
+    assert parse_number(f"{number} g", "kg") == ExactNumber(exact / 1000)
+
+
+@given(st.integers(-(10**40), 10**40))
+def test_int_decimal_text_and_exponent_are_one_number(number: int) -> None:
+    forms = [number, Decimal(number), str(number), f"{number}.0", f"{number}e0", f"{number}000e-3"]
+    assert {parse_number(form, "m") for form in forms} == {ExactNumber(Fraction(number))}
+
+
+@given(decimals.filter(lambda d: d > 0))
+def test_toml_keeps_the_digits(number: Decimal) -> None:
+    plain = format(number, "f")
+    for written in (plain, f'"{plain}"', f'"{plain} s"'):
+        time = parse(scene_text(end=written)).config.time
+        assert time.end == ExactNumber(Fraction(number))
+
+
+@given(st.integers(-(10**9), 10**9), st.integers(1, 10**9))
+def test_quotients(numerator: int, denominator: int) -> None:
+    expected = Fraction(numerator, denominator)
+    assert parse_number(f"{numerator}/{denominator}", "1").rational == expected
+    assert parse_number(f"{numerator} / {denominator} km", "m").rational == expected * 1000
+
+
+@given(st.integers(1, 1000), st.integers(-60, 60))
+def test_powers(base: int, power: int) -> None:
+    expected = Fraction(base) ** power
+    assert parse_number(f"{base}^{power}", "1").rational == expected
+    assert parse_number(f"{base}**{power} kg", "kg").rational == expected
+
+
+def test_third_and_dyadic() -> None:
+    assert parse_number("1/3", "1").rational == Fraction(1, 3)
+    assert parse_number("2^-20", "1").rational == Fraction(1, 2**20)
+    assert parse_number("1_000.5", "1").rational == Fraction(2001, 2)
+    assert parse_number("+.5", "1").rational == Fraction(1, 2)
+    assert parse_number("-5.", "1").rational == -5
+
+
+def test_a_float_is_the_binary_number_that_it_is() -> None:
+    """Scenes built in code may hand over floats; nothing guesses what was meant."""
+    assert parse_number(0.1, "1").rational == Fraction(0.1) != Fraction(1, 10)
+
+
+def test_a_number_is_returned_as_it_is() -> None:
+    number = ExactNumber(Fraction(1, 7), 2)
+    assert parse_number(number, "kg") is number
+
+
+# ---- units ------------------------------------------------------------------------------------------------
+
+# written, SI unit, value in mpmath by the unit's definition
+UNITS = [
+    ("1 deg", "rad", lambda m: m.pi / 180),
+    ("1 °", "rad", lambda m: m.pi / 180),
+    ("23.44 deg", "rad", lambda m: m.mpf(2344) / 100 * m.pi / 180),
+    ("1 arcmin", "rad", lambda m: m.pi / 10800),
+    ("84381.406 arcsec", "rad", lambda m: m.mpf(84381406) / 1000 * m.pi / 648000),
+    ("1 turn", "rad", lambda m: 2 * m.pi),
+    ("0.25 rev", "rad", lambda m: m.pi / 2),
+    ("1 rad", "rad", lambda m: m.mpf(1)),
+    ("430 day", "s", lambda m: m.mpf(430 * 86400)),
+    ("2 h", "s", lambda m: m.mpf(7200)),
+    ("1 yr", "s", lambda m: m.mpf(31557600)),
+    ("3 min", "s", lambda m: m.mpf(180)),
+    ("5 ms", "s", lambda m: m.mpf(5) / 1000),
+    ("7.292115e-5 rad/s", "rad/s", lambda m: m.mpf(7292115) / m.mpf(10) ** 11),
+    ("5 rpm", "rad/s", lambda m: m.pi / 6),
+    ("50.307 arcsec/yr", "rad/s", lambda m: m.mpf(50307) / 1000 * m.pi / 648000 / 31557600),
+    ("1 deg/d", "rad/s", lambda m: m.pi / 180 / 86400),
+    ("2 turn/day", "rad/s", lambda m: 4 * m.pi / 86400),
+    ("3 s^-1", "rad/s", lambda m: m.mpf(3)),
+    ("8.008e37 kg m^2", "kg m^2", lambda m: m.mpf(8008) * m.mpf(10) ** 34),
+    ("8.008e37 kg*m**2", "kg m^2", lambda m: m.mpf(8008) * m.mpf(10) ** 34),
+    ("1 g cm^2", "kg m^2", lambda m: m.mpf(1) / 10**7),
+    ("0.6 Da Å^2", "kg m^2", lambda m: m.mpf(6) / 10 * m.mpf("1.66053906892e-27") / m.mpf(10) ** 20),
+    (
+        "0.6 dalton angstrom^2",
+        "kg m^2",
+        lambda m: m.mpf(6) / 10 * m.mpf("1.66053906892e-27") / m.mpf(10) ** 20,
+    ),
+    ("1 J s", "kg m^2/s", lambda m: m.mpf(1)),
+    ("1 N m s", "kg m^2/s", lambda m: m.mpf(1)),
+    ("6378.1366 km", "m", lambda m: m.mpf(63781366) / 10),
+    ("1 au", "m", lambda m: m.mpf(149597870700)),
+    ("36 km/h", "m/s", lambda m: m.mpf(10)),
+    ("1 g0", "m/s^2", lambda m: m.mpf(980665) / 100000),
+    ("1/3 t", "kg", lambda m: m.mpf(1000) / 3),
+]
+
+
+@pytest.mark.parametrize(("written", "unit", "value"), UNITS, ids=[u[0] for u in UNITS])
+def test_units_to_fifty_digits(written: str, unit: str, value) -> None:
+    expected = value(CONTEXT)
+    # three operations of CONTEXT (128 bits past fifty digits) on either side
+    assert abs(parse_number(written, unit).at(CONTEXT) - expected) <= 8 * CONTEXT.eps * abs(expected)
+    assert float(parse_number(written, unit)) == float(expected)
+
+
+@given(any_decimals.filter(lambda d: d != 0))
+def test_pi_is_not_rounded_before_the_run_asks(number: Decimal) -> None:
+    degrees = parse_number(f"{number} deg", "rad")
+    assert degrees == ExactNumber(Fraction(number) / 180, 1)
+    there_and_back = degrees.rational * 180
+    assert there_and_back == Fraction(number)
+
+
+# ---- into the working precision ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_tenth_is_a_tenth(name: str | int) -> None:
+    """Rounded to nearest: within half a unit in the last place, for 0.1 that is 2^-4 2^-bits."""
+    precision = precision_of(name)
+    scalar = precision.number(parse_number("0.1", "1").at(context_for(name)))
+    error = as_fraction(precision.exact(scalar)) - Fraction(1, 10)
+    assert abs(error) <= Fraction(2) ** (-4 - working_bits(name))
+    if working_bits(name) > 53:  # and so it isn't the double next to a tenth
+        assert as_fraction(precision.exact(scalar)) != Fraction(0.1)
+
+
+@given(any_decimals)
+@example(Decimal("0.1"))
+@example(Decimal(2**53 + 1))  # a tie: goes to even
+@example(Decimal(2**53 + 3))
+def test_double_is_correctly_rounded(number: Decimal) -> None:
+    """Python's division of integers, Fraction to float, is correctly rounded and independent of mpmath."""
+    if number and not 1e-290 < abs(number) < 1e300:  # the internal range, with room for 24-bit chunks
+        return
+    expected = float(Fraction(number))
+    assert precision_of("double").number(parse_number(number, "1").at(context_for("double"))) == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+@given(number=decimals)
+def test_every_precision_rounds_to_nearest(name: str | int, number: Decimal) -> None:
+    precision, bits = precision_of(name), working_bits(name)
+    exact = Fraction(number)
+    got = as_fraction(precision.exact(precision.number(parse_number(number, "1").at(context_for(name)))))
+    # half a unit in the last place of the larger power of two below the value is at most |x| 2^-bits
+    assert abs(got - exact) <= abs(exact) * Fraction(2) ** -bits
+
+
+@pytest.mark.parametrize("name", NAMES)
+@given(number=decimals)
+def test_scalars_make_the_round_trip(name: str | int, number: Decimal) -> None:
+    precision = precision_of(name)
+    scalar = precision.number(parse_number(number, "1").at(context_for(name)))
+    parts = precision.parts(np.array([scalar], dtype=precision.scalar))
+    assert sum(Fraction(float(part[0])) for part in parts) == as_fraction(precision.exact(scalar))
+    assert precision.number(precision.exact(scalar)) == scalar
+
+
+# ---- all the way through a scene --------------------------------------------------------------------------
+
+FORTY = "1.234567890123456789012345678901234567891"
+
+
+def test_forty_digits_reach_the_scene_and_the_states() -> None:
+    prepared = prepare(
+        parse(scene_text(end=FORTY, rate=FORTY, moment=f'"{FORTY} kg m^2"', integrator="precision = 50"))
+    )
+    exact, scene = Fraction(FORTY), prepared.scene
+    half_ulp = Fraction(2) ** -prepared.precision.bits  # of a number between 1 and 2
+    for value in (scene.angular_velocity[0], scene.body.principal_moments[1], scene.end):
+        # a single division of the scene's arithmetic
+        assert abs(as_fraction(value) - exact) <= Fraction(2) ** -scene.context.prec
+        scalar = prepared.precision.number(value)
+        assert abs(as_fraction(prepared.precision.exact(scalar)) - exact) <= half_ulp
+        assert abs(as_fraction(prepared.precision.exact(scalar)) - Fraction(float(FORTY))) > half_ulp
+    unit = Fraction(2) ** prepared.system.state_exponents[0]
+    assert as_fraction(prepared.system.initial[0]) * unit == as_fraction(scene.angular_velocity[0])
+
+
+def test_degrees_per_second_reach_the_states_with_fifty_digits_of_pi() -> None:
+    prepared = prepare(parse(scene_text(rate='"1 deg/s"', integrator="precision = 50")))
+    with mpmath.workprec(400):
+        expected = mpmath.pi / 180
+        unit = mpmath.mpf(2) ** prepared.system.state_exponents[0]
+        got = prepared.precision.exact(prepared.precision.number(prepared.system.initial[0])) * unit
+        # half a unit in the last place; pi as a double is wrong by 1e-16
+        assert abs(got - expected) <= expected * mpmath.mpf(2) ** -prepared.precision.bits
+
+
+def test_the_precision_decides_what_a_tenth_is() -> None:
+    rates = {}
+    for name in ("double", "quadruple", "50"):
+        wanted = f'"{name}"' if name.isalpha() else name
+        prepared = prepare(parse(scene_text(rate="0.1", integrator=f"precision = {wanted}")))
+        number = prepared.precision.number(prepared.scene.angular_velocity[0])
+        rates[name] = as_fraction(prepared.precision.exact(number))
+    assert rates["double"] == Fraction(0.1)
+    tenth = Fraction(1, 10)
+    errors = [abs(rates[name] - tenth) for name in ("double", "quadruple", "50")]
+    assert errors[0] > 10**15 * errors[1] > 10**15 * 10**14 * errors[2]
+
+
+def test_tolerance_as_text() -> None:
+    prepared = prepare(parse(scene_text(integrator='precision = 50\ntolerance = "1e-40"')))
+    error = as_fraction(prepared.precision.exact(prepared.tolerance)) - Fraction(1, 10**40)
+    assert abs(error) <= Fraction(1, 10**40) * Fraction(2) ** -prepared.precision.bits
+
+
+def test_the_global_context_of_mpmath_is_left_alone() -> None:
+    before = mpmath.mp.prec
+    prepare(parse(scene_text(rate='"1 deg/s"', integrator="precision = 100")))
+    assert mpmath.mp.prec == before

@@ -1,0 +1,125 @@
+"""``--set KEY=VALUE``: the same config as if it had been written so, and one that a file carries along."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene.reading import load, parse
+
+BASE = """\
+name = "base"
+[body]
+principal_moments = [1, 2, 2.5]
+mass = 1
+[initial]
+angular_velocity = [0.1, 1, 0.05]
+[[loads]]
+kind = "uniform_gravity"
+acceleration = [0, 0, -9.8]
+[time]
+end = 10
+"""
+
+# override, (text to replace, by)
+EDITS = {
+    "top key": ("name=other", ('name = "base"', 'name = "other"')),
+    "quoted string": ('name="other"', ('name = "base"', 'name = "other"')),
+    "nested number": ("time.end=20", ("end = 10", "end = 20")),
+    "spaces": (" time.end = 20 ", ("end = 10", "end = 20")),
+    "decimal as written": ("time.end=0.1", ("end = 10", "end = 0.1")),
+    "number with a unit": ("time.end=430 day", ("end = 10", 'end = "430 day"')),
+    "array": ("body.principal_moments=[2, 2, 3]", ("[1, 2, 2.5]", "[2, 2, 3]")),
+    "index": ("body.principal_moments[2]=3", ("2.5", "3")),
+    "index of a table": ("loads[0].acceleration[2]=-1.62", ("-9.8", "-1.62")),
+    "bool": ("output.timeline=false", ("end = 10", "end = 10\n[output]\ntimeline = false")),
+    "new table": (
+        "integrator.precision=quadruple",
+        ("end = 10", 'end = 10\n[integrator]\nprecision = "quadruple"'),
+    ),
+    "new key": ("initial.quaternion=[0,1,0,0]", ("0.05]", "0.05]\nquaternion = [0, 1, 0, 0]")),
+    "inline table": ("limits={max_steps = 5}", ("end = 10", "end = 10\n[limits]\nmax_steps = 5")),
+    "value with an equals sign": ("description=a=b", ('"base"', '"base"\ndescription = "a=b"')),
+}
+
+
+@pytest.mark.parametrize("case", EDITS)
+def test_an_override_is_the_edit(case: str) -> None:
+    override, (old, new) = EDITS[case]
+    assert BASE.count(old) == 1
+    edited = parse(BASE.replace(old, new)).config
+    assert parse(BASE, overrides=[override]).config == edited != parse(BASE).config
+
+
+@pytest.mark.parametrize("case", EDITS)
+def test_a_written_config_means_the_same_again(tmp_path: Path, case: str) -> None:
+    first = parse(BASE, overrides=[EDITS[case][0]])
+    path = tmp_path / "config.toml"
+    path.write_text(first.text, encoding="utf-8")
+    again = load(path)
+    assert again.config == first.config
+    assert again.text == first.text
+    assert again.sha256 == first.sha256
+    path.write_text(again.text, encoding="utf-8")
+    assert load(path).text == first.text
+
+
+def test_later_overrides_win_also_over_those_in_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "config.toml"
+    path.write_text(parse(BASE, overrides=["time.end=1", "time.end=2"]).text, encoding="utf-8")
+    assert load(path).config.time.end.rational == 2
+    assert load(path, overrides=["time.end=3"]).config.time.end.rational == 3
+    path.write_text(load(path, overrides=["time.end=3"]).text, encoding="utf-8")
+    assert load(path).config.time.end.rational == 3
+
+
+def test_without_overrides_the_text_is_as_given(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(BASE + "# a remark without a final line end", encoding="utf-8")
+    assert load(path).text == path.read_text(encoding="utf-8")
+
+
+def test_digits_survive_an_override() -> None:
+    digits = "1.234567890123456789012345678901234567891"
+    assert parse(BASE, overrides=[f"time.end={digits}"]).config == parse(BASE.replace("10", digits)).config
+
+
+@pytest.mark.parametrize(
+    ("override", "where", "phrase"),
+    [
+        ("time.end", "--set time.end", "write KEY=VALUE on one line, such as time.end=10"),
+        ("=3", "--set =3", "write KEY=VALUE"),
+        ('name="""a\nb"""', '--set name="""a\nb"""', "on one line"),
+        ("time..end=3", "--set time..end=3", '"" is not a key'),
+        ("body.principal_moments[x]=1", "--set body.principal_moments[x]=1", "an index counted from 0"),
+        ("body.principal_moments[-1]=1", "--set body.principal_moments[-1]=1", "an index counted from 0"),
+        (
+            "body.principal_moments[0=1",
+            "--set body.principal_moments[0=1",
+            '"principal_moments[0" is not a key',
+        ),
+        (
+            "body.principal_moments[9]=1",
+            "--set body.principal_moments[9]=1",
+            'there is nothing at "9" to set',
+        ),
+        ("body.principal_moments[0][0]=1", "--set body.principal_moments[0][0]=1", 'nothing at "0" to set'),
+        ("loads[1].kind=x", "--set loads[1].kind=x", 'there is nothing at "1" to set'),
+        ("time.end.value=1", "--set time.end.value=1", 'there is nothing at "value" to set'),
+        ("body[0]=1", "--set body[0]=1", 'there is nothing at "0" to set'),
+        ("body.principal_moments.x=1", "--set body.principal_moments.x=1", 'there is nothing at "x" to set'),
+        ("tiem.end=1", "tiem", 'did you mean "time"?'),
+        ("time.ned=1", "[time] ned", 'did you mean "end"?'),
+        ("time.end=true", "[time] end", "given true"),
+        ("time.end=ten", "[time] end", 'given "ten"'),
+    ],
+)
+def test_bad_overrides(override: str, where: str, phrase: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse(BASE, source="scene.toml", overrides=[override])
+    (problem,) = caught.value.problems
+    assert problem.where == where
+    assert phrase in problem.what
+    assert str(caught.value).startswith("scene.toml: 1 problem")
