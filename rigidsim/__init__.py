@@ -10,9 +10,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rigidsim.archive import Run, open_run
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
-    from rigidsim.plan import plan
-    from rigidsim.run import Run, open_run, run
+    from rigidsim.planner import plan
+    from rigidsim.runner import run
     from rigidsim.scene.reading import Experiment, load, parse
 
 __version__ = "0.1.0"
@@ -24,10 +25,10 @@ _PLACES = {
     "Experiment": "rigidsim.scene.reading",
     "load": "rigidsim.scene.reading",
     "parse": "rigidsim.scene.reading",
-    "Run": "rigidsim.run",
-    "open_run": "rigidsim.run",
-    "run": "rigidsim.run",
-    "plan": "rigidsim.plan",
+    "Run": "rigidsim.archive",
+    "open_run": "rigidsim.archive",
+    "run": "rigidsim.runner",
+    "plan": "rigidsim.planner",
 }
 
 __all__ = [
@@ -48,5 +49,5 @@ def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module 'rigidsim' has no attribute {name!r}")
     value = getattr(import_module(_PLACES[name]), name)
-    globals()[name] = value  # over the submodule of the same name, which the import has put there
+    globals()[name] = value
     return value

@@ -84,7 +84,7 @@ def run(
     Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
     """
     from rigidsim import progress, report
-    from rigidsim.run import run as run_experiment
+    from rigidsim.runner import run as run_experiment
     from rigidsim.scene.reading import load
 
     experiments = [load(path, overrides=overrides or []) for path in configs]
@@ -113,7 +113,7 @@ def plan(config: ConfigPath, overrides: SetOption = None, as_json: JsonOption = 
     Example: rigidsim plan configs/heavy_top_nutating.toml
     """
     from rigidsim import report
-    from rigidsim.plan import plan as make_plan
+    from rigidsim.planner import plan as make_plan
     from rigidsim.scene.reading import load
 
     made = make_plan(load(config, overrides=overrides or []))
@@ -131,13 +131,16 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
     Example: rigidsim info runs/intermediate_axis
     """
     from rigidsim import report
-    from rigidsim.run import open_run
+    from rigidsim.archive import open_run
 
     opened = open_run(run_path)
     if as_json:
         print(json.dumps(opened.summary))
         return
     report.print_summary(opened.summary, str(opened.folder.path))
+    if not opened.saved:
+        report.console().print("dataset  nothing was saved yet")
+        return
     with opened.dataset as dataset:
         report.console().print(
             f"dataset  {dataset.sizes['time']:,} samples of {', '.join(map(str, dataset.data_vars))}"
@@ -154,8 +157,8 @@ def view(
 
     Example: rigidsim view runs/intermediate_axis
     """
+    from rigidsim.archive import open_run
     from rigidsim.look.viewer import open_viewer
-    from rigidsim.run import open_run
 
     opened = open_run(run_path)
     timeline = opened.folder.timeline
@@ -179,13 +182,18 @@ def plot(
 
     Example: rigidsim plot runs/intermediate_axis --out flip.svg
     """
+    from rigidsim.archive import open_run
     from rigidsim.look.figures import save_figure
-    from rigidsim.run import open_run
 
     opened = open_run(run_path)
-    target = out or opened.folder.path / "figure.png"
+    target = out or opened.folder.figure
     with opened.dataset as dataset:
-        save_figure(dataset, target)
+        try:
+            save_figure(dataset, target)
+        except ValueError as error:
+            raise RigidsimError(str(error)) from None
+        except OSError as error:
+            raise RigidsimError(f"{target}: can't be written: {error.strerror or error}") from None
     print(target)
 
 

@@ -11,35 +11,32 @@ from rich.progress import (
     BarColumn,
     TaskID,
     TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 from rich.progress import (
     Progress as Bar,
 )
 
+from rigidsim.guards import Observer
 from rigidsim.prepare import Prepared
-from rigidsim.run import Observer
 from rigidsim.solve.advance import Progress
 
 _LINE_EVERY = 5.0  # seconds between plain lines
+_TITLE = 24  # letters of a run's name beside the bar
+_WIDE = 100  # columns from which simulated time has room
 _PHASES = {"dataset": "writing dataset.h5", "timeline": "drawing timeline.rrd"}
 
 
 class TerminalObserver(Observer):
-    """Draws a bar that shows simulated time, steps per second and time left."""
+    """Draws one line: a bar, steps per second and time left; simulated time too where there is room."""
 
-    def __init__(self) -> None:
+    def __init__(self, console: Console | None = None) -> None:
         self._bar = Bar(
-            TextColumn("[bold]{task.description}"),
+            TextColumn("[bold]{task.fields[title]}", markup=True),
             BarColumn(bar_width=None),
-            TextColumn("{task.percentage:5.1f} %"),
-            TextColumn("{task.fields[rate]}"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
+            TextColumn("{task.fields[said]}"),
+            console=console or Console(stderr=True),
             transient=True,
+            expand=True,
         )
         self._task: TaskID | None = None
         self._begin = time.perf_counter()
@@ -57,22 +54,27 @@ class TerminalObserver(Observer):
         last = float(prepared.scene.samples.last) - float(prepared.scene.start)
         self._start = float(prepared.scene.start)
         self._last = last
-        self._task = self._bar.add_task(prepared.scene.name, total=1.0, rate="")
+        name = prepared.scene.name
+        title = name if len(name) <= _TITLE else name[: _TITLE - 1] + "…"
+        self._task = self._bar.add_task("", total=1.0, title=title, said="")
 
     def progressed(self, progress: Progress) -> None:
         """See ``Observer``."""
         if self._task is None:
             return
         fraction = min(1.0, (progress.time - self._start) / self._last) if self._last else 1.0
-        rate = progress.steps / max(time.perf_counter() - self._begin, 1e-9)
-        self._bar.update(
-            self._task, completed=fraction, rate=f"{_engineering(rate)} steps/s  t = {progress.time:.6g} s"
-        )
+        elapsed = time.perf_counter() - self._begin
+        rate = _engineering(progress.steps / max(elapsed, 1e-9))
+        said = f"{100 * fraction:5.1f} %  {rate:>6} steps/s  {_left(elapsed, fraction)}"
+        if self._bar.console.width >= _WIDE:
+            said += f"  t = {progress.time:.6g} s"
+        self._bar.update(self._task, completed=fraction, said=said)
 
     def phase(self, name: str) -> None:
         """See ``Observer``."""
         if name in _PHASES and self._task is not None:
-            self._bar.update(self._task, description=_PHASES[name], rate="")
+            self._bar.remove_task(self._task)
+            self._task = self._bar.add_task("", total=None, title=_PHASES[name], said="")
 
 
 class LineObserver(Observer):
@@ -104,10 +106,10 @@ class LineObserver(Observer):
         self._latest = now
         elapsed = now - self._begin
         fraction = (progress.time - self._start) / self._last if self._last else 1.0
-        left = f", {elapsed * (1 / fraction - 1):.0f} s left" if 0 < fraction < 1 else ""
         rate = _engineering(progress.steps / max(elapsed, 1e-9))
         print(
-            f"{self._name}: {100 * min(fraction, 1):.1f} %, t = {progress.time:.6g} s, {rate} steps/s{left}",
+            f"{self._name}: {100 * min(fraction, 1):.1f} %, t = {progress.time:.6g} s, {rate} steps/s, "
+            f"{_left(elapsed, fraction)}",
             file=sys.stderr,
             flush=True,
         )
@@ -123,8 +125,21 @@ def observer() -> TerminalObserver | LineObserver:
     return TerminalObserver() if sys.stderr.isatty() else LineObserver()
 
 
+def _left(elapsed: float, fraction: float) -> str:
+    """Time to go at the mean pace so far; a guess from the first moments would be far off."""
+    if fraction >= 1:
+        return "0:00:00 left"
+    if fraction <= 0 or elapsed < 0.3:
+        return "-:--:-- left"
+    seconds = elapsed * (1 / fraction - 1)
+    if seconds >= 360_000:
+        return f"{seconds / 86400:.3g} days left"
+    minutes, seconds = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d} left"
+
+
 def _engineering(value: float) -> str:
     for factor, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if value >= factor:
             return f"{value / factor:.3g} {suffix}"
-    return f"{value:.3g} "
+    return f"{value:.3g}"

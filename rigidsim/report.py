@@ -22,7 +22,7 @@ def console() -> Console:
 def _table(*columns: str) -> Table:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for name in columns:
-        right = name in ("largest drift", "final drift", "bound", "value", "initial")
+        right = name in ("largest drift", "final", "bound", "initial")
         table.add_column(name, justify="right" if right else "left", overflow="fold")
     return table
 
@@ -46,12 +46,28 @@ def size(count: float) -> str:
     return f"{count:.0f} B"
 
 
-def _number(value: Any) -> str:
+def _line(out: Console, label: str, text: str, style: str = "") -> None:
+    """A label and a text that is broken between words, indented; never read as markup."""
+    line = Table.grid(padding=(0, 1))
+    line.add_column(width=8)
+    line.add_column(overflow="fold")
+    line.add_row(Text(label, style=style), Text(text, style=style))
+    out.print(line)
+
+
+def _initial(value: Any) -> str:
+    """A number, or the norm of a vector: enough to recognise it; all digits are in summary.json."""
     if value is None:
         return "-"
-    if isinstance(value, list):
-        return "[" + ", ".join(f"{x:.6g}" for x in value) + "]"
-    return f"{value:.9g}"
+    return f"|{math.hypot(*value):.6g}|" if isinstance(value, list) else f"{value:.6g}"
+
+
+def _scales(invariants: dict[str, Any]) -> str:
+    """What the drifts are relative to; invariants of the same scale together."""
+    names: dict[str, list[str]] = {}
+    for name, row in invariants.items():
+        names.setdefault(row["scale_name"], []).append(name)
+    return "; ".join(f"{scale} ({', '.join(of)})" for scale, of in names.items())
 
 
 def _drift(value: float | None) -> str:
@@ -70,42 +86,44 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
     if status != "finished":
         out.print(Text(str(summary.get("message", ""))))
     if "cost" not in summary:
-        out.print(f"folder   {folder}")
+        _line(out, "folder", folder)
         return
     cost, accuracy = summary["cost"], summary["accuracy"]
     seconds = sum(v for k, v in cost["seconds"].items() if k != "engine")
-    out.print(
-        f"model    {summary['formulation']}, {len(summary['states'])} states "
-        f"({' '.join(summary['states'])}), {summary['precision']} precision, "
-        f"tolerance {summary['tolerance']:.3g}"
+    _line(
+        out,
+        "model",
+        f"{summary['formulation']}, {len(summary['states'])} states ({' '.join(summary['states'])}), "
+        f"{summary['precision']} precision, tolerance {summary['tolerance']:.3g}",
     )
-    out.print(
-        f"cost     {cost['steps']:,} steps, "
-        f"{summary['samples']:,} of {summary['samples_planned']:,} samples, "
+    _line(
+        out,
+        "cost",
+        f"{cost['steps']:,} steps, {summary['samples']:,} of {summary['samples_planned']:,} samples, "
         f"{duration(seconds)} wall ({duration(cost['seconds']['engine'])} integrating), "
-        f"{duration(cost['cpu_seconds'])} CPU"
+        f"{duration(cost['cpu_seconds'])} CPU",
     )
-    table = _table("invariant", "initial", "largest drift", "final drift", "bound", "relative to")
+    table = _table("invariant", "initial", "largest drift", "final", "bound")
     for name, row in summary["invariants"].items():
         largest = row["largest_drift"]
         style = "red" if largest is not None and not largest <= row["bound"] else ""
         table.add_row(
             name,
-            _number(row["initial"]),
+            Text(_initial(row["initial"])),
             Text(_drift(largest), style=style),
             _drift(row["final_drift"]),
             _drift(row["bound"]),
-            row["scale_name"],
         )
     out.print(table)
+    _line(out, "drifts", "relative to: " + _scales(summary["invariants"]))
     estimate = accuracy["estimated_attitude_error"]
     if estimate is not None:
-        factor = accuracy["amplification"]
+        factor = accuracy.get("amplification", 1)
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        out.print(f"attitude uncertain by about {estimate:.1e} rad at the end (round-off law{unstable})")
+        _line(out, "attitude", f"uncertain by about {estimate:.1e} rad at the end (round-off law{unstable})")
     for warning in summary["warnings"]:
-        out.print(Text(f"warning  {warning}", style="bold red"))
-    out.print(f"folder   {folder}")
+        _line(out, "warning", warning, "bold red")
+    _line(out, "folder", folder)
 
 
 def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:

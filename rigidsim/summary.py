@@ -20,7 +20,10 @@ DRIFT_FACTOR = 50.0
 steps add up like a random walk (Brouwer 1937), with a few roundings per step."""
 
 _LOST_DIGITS = 1e-2  # rad; an attitude this uncertain is no result any more
-_NEAR_SINGULAR = 1e-3
+NEAR_SINGULAR = 1e-3
+"""Factor from which Euler angles lose digits to their singularity."""
+
+_STEPS_TO_SINGULARITY = math.e**2  # a Taylor step is e^-2 of the way to it (Jorba & Zou 2005)
 
 
 @dataclass
@@ -95,17 +98,25 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
                 "rounding alone explains; choose a tighter tolerance, a higher precision or another "
                 "formulation"
             )
-    if watch.nearest_singularity < _NEAR_SINGULAR:
+    shortest = math.ldexp(progress.smallest_step, system.scaling.time)
+    passed = shortest * float(system.rate_bound) * _STEPS_TO_SINGULARITY
+    if watch.nearest_singularity < NEAR_SINGULAR:
         found.append(
             f"the Euler angles came near the singularity of {system.sequence} (factor "
             f"{watch.nearest_singularity:.2g} at {watch.singularity_time:.6g} s), where they lose digits; "
             'choose formulation = "quaternion"'
         )
+    elif system.singular_factor is not None and passed < NEAR_SINGULAR:
+        found.append(
+            f"the Euler angles came near the singularity of {system.sequence} between two samples (within "
+            f"about {passed:.1g} rad, by the shortest step), where they lose digits; choose formulation = "
+            '"quaternion"'
+        )
     scene = prepared.scene
     if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
         found.append(
-            "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] reference "
-            "or center_of_mass for a top, or [initial] position for free flight"
+            "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] "
+            "reference or center_of_mass for a top, or [initial] position for free flight"
         )
     estimate = attitude_error(prepared, progress, growth)
     if estimate is not None and estimate > _LOST_DIGITS:

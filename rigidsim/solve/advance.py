@@ -147,7 +147,7 @@ class Advance:
             count = _MARGIN * expected - 2
             if self._mean > 0 and gap / self._mean > _LONG_GAP:
                 count = max(count, _MEAN_MARGIN * gap / self._mean)
-            return self._wrapped(self._skip(int(min(count, patience, wrap_in)), upcoming))
+            return self._wrapped(self._skip(max(1, int(min(count, patience, wrap_in))), upcoming))
         if step > 0 and self.precision.cheap and not self.winding.positions and self._dense(step):
             left = int((self._last - float(self.stepper.time)) / step)
             if left >= _WORTH_A_BLOCK:

@@ -17,6 +17,9 @@ from rigidsim.model.system import System
 from rigidsim.solve.precision import Precision
 
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
+# A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
+# of the order of one internal unit, far below this, so that the bound changes no other motion.
+_LONGEST_STEP = 2.0**30
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class Stepper:
         )
         far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
+        self._longest = precision.number(system.scene.context.mpf(_LONGEST_STEP))
         self.steps = 0
         self.smallest = self.largest = 0.0
 
@@ -79,7 +83,7 @@ class Stepper:
 
     def step(self) -> bool:
         """One step with dense output; False when the state is no longer finite."""
-        outcome, size = self._integrator.step(write_tc=True)
+        outcome, size = self._integrator.step(self._longest, write_tc=True)
         self.smallest = self.largest = abs(float(size))
         if outcome == hy.taylor_outcome.err_nf_state:
             return False
@@ -97,7 +101,7 @@ class Stepper:
 
     def to(self, time: float) -> bool:
         """Go exactly to a time, with a shortened last step: for comparisons, never for a run's samples."""
-        outcome = self._integrator.propagate_until(time, max_steps=100_000)[0]
+        outcome = self._integrator.propagate_until(time, max_steps=100_000, max_delta_t=self._longest)[0]
         return bool(outcome == hy.taylor_outcome.time_limit)
 
     def block(self, count: int) -> tuple[bool, Any]:
@@ -105,7 +109,7 @@ class Stepper:
         returns states (n, states).
         """
         outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
-            self._far, max_steps=count, c_output=True
+            self._far, max_steps=count, max_delta_t=self._longest, c_output=True
         )
         return self._account(outcome, smallest, largest, taken), output
 

@@ -38,6 +38,11 @@ class RunFolder:
         return self.path / "summary.json"
 
     @property
+    def figure(self) -> Path:
+        """Where ``rigidsim plot`` draws unless told otherwise."""
+        return self.path / "figure.png"
+
+    @property
     def segments(self) -> Path:
         """What an unfinished run has saved."""
         return self.path / "segments"
@@ -49,7 +54,7 @@ class RunFolder:
             RunFolderError: it holds a run and ``force`` is false, or something that is no run, or it can't
                 be written.
         """
-        ours = [self.config, self.dataset, self.timeline, self.summary, self.segments]
+        ours = [self.config, self.dataset, self.timeline, self.figure, self.summary, self.segments]
         try:
             if self.path.exists() and not self.path.is_dir():
                 raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -63,15 +64,30 @@ class SegmentWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Write what is collected; on return it is saved."""
+        """Write what is collected; on return it is saved.
+
+        Raises:
+            RunFolderError: the disk is full or fails; what is collected stays in memory.
+        """
         if not self._blocks:
             return
         attributes = {**self._attributes, "segment": self.count, "first_sample": self.saved_rows}
         content = netcdf.image(self._variables, self._collected(), self._rows, attributes)
-        netcdf.write_bytes(self._folder / f"{self.count:08d}.h5", content)
+        with self._writing():
+            netcdf.write_bytes(self._folder / f"{self.count:08d}.h5", content)
         self.count += 1
         self.saved_rows += self._rows
         self._blocks, self._rows = [], 0
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise RunFolderError(
+                f"{self._folder.parent}: can't be written: {error.strerror or error}; "
+                f"{self.saved_rows} samples are saved in {self._folder.name}/"
+            ) from error
 
     def _collected(self) -> netcdf.Block:
         return {
@@ -85,10 +101,15 @@ class SegmentWriter:
         """Stream all segments, and what is still in memory, into one compressed dataset.
 
         The dataset appears atomically; then the segments go. Returns its rows.
+
+        Raises:
+            RunFolderError: a segment is missing, or the disk is full or fails; the segments stay.
         """
         paths = segment_paths(self._folder)
+        if len(paths) < self.count:  # rows that nothing fills would read as zeros
+            raise RunFolderError(f"{self._folder}: segment {len(paths):08d}.h5 is missing")
         rows = self.saved_rows + self._rows
-        with netcdf.atomic(target) as temporary:
+        with self._writing(), netcdf.atomic(target) as temporary:
             with h5netcdf.File(temporary, "w") as file:
                 netcdf.declare(file, self._variables, rows, attributes, compressed=True)
                 first = 0

@@ -12,7 +12,7 @@ from rigidsim.prepare import Prepared, motion_growth, prepare
 from rigidsim.scene.reading import Experiment
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.winding import Winding
+from rigidsim.solve.winding import INTERVAL, Winding
 from rigidsim.summary import round_off_law
 
 PILOT_SECONDS = 0.5
@@ -37,7 +37,7 @@ def plan(experiment: Experiment) -> dict[str, Any]:
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
     evaluator = Evaluator(prepared.system, prepared.precision, winding)
     compile_seconds = time.perf_counter() - started
-    pilot = _pilot(prepared, stepper, evaluator)
+    pilot = _pilot(prepared, stepper, winding, evaluator)
     duration = float(prepared.scene.samples.last - prepared.scene.start)
     steps = max(1.0, duration / pilot["step"])
     samples = prepared.clock.count
@@ -90,14 +90,17 @@ def plan(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def _pilot(prepared: Prepared, stepper: Stepper, evaluator: Evaluator) -> dict[str, float]:
+def _pilot(prepared: Prepared, stepper: Stepper, winding: Winding, evaluator: Evaluator) -> dict[str, float]:
     """Mean step (s) and costs, from as many steps as half a second and the run's length allow."""
     begin = float(stepper.time)
     last = float(prepared.clock.at(prepared.clock.count - 1))
     spent, count = 0.0, 1
     while spent < PILOT_SECONDS and stepper.steps < _PILOT_STEPS and float(stepper.time) < last:
         started = time.perf_counter()
+        if winding.positions:  # as in a run: angles that grew would lengthen the steps
+            count = min(count, INTERVAL)
         fine = stepper.skip(count)
+        winding.wrap(stepper.state)
         spent += time.perf_counter() - started
         if not fine or stepper.largest <= 0:
             break

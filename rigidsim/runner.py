@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import signal
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import rigidsim.summary as summaries
-from rigidsim.errors import RunFolderError
+from rigidsim.archive import Run
+from rigidsim.guards import Guards, Interruption, Observer
 from rigidsim.prepare import Prepared, motion_growth, prepare
 from rigidsim.scene.reading import Experiment, load
 from rigidsim.solve.advance import Advance, Progress
@@ -24,136 +20,11 @@ from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.winding import Winding
 from rigidsim.store import netcdf, provenance, segments
-from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.folder import RunFolder
 from rigidsim.store.variables import SCHEMA_VERSION
 
 if TYPE_CHECKING:
-    import xarray
-
-
-class Observer:
-    """Is told how a run goes; the command line draws a progress bar with it. Does nothing by itself."""
-
-    def started(self, prepared: Prepared, folder: Path) -> None:
-        """The equations are compiled; integration begins."""
-
-    def progressed(self, progress: Progress) -> None:
-        """Called between chunks, at most some tens of times per second."""
-
-    def phase(self, name: str) -> None:
-        """A new phase begins: "integrate", "dataset", "timeline"."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """A run on disk, finished or partial.
-
-    Attributes:
-        folder: its files.
-        summary: the content of ``summary.json``.
-    """
-
-    folder: RunFolder
-    summary: dict[str, Any]
-
-    @property
-    def status(self) -> str:
-        """How it ended; ``"finished"`` is the only complete one."""
-        return str(self.summary["status"])
-
-    @property
-    def dataset(self) -> xarray.Dataset:
-        """The dataset, read lazily; of an unfinished run what its segments hold.
-
-        Raises:
-            RunFolderError: nothing was saved.
-        """
-        import xarray
-
-        if self.folder.dataset.exists():
-            return xarray.open_dataset(self.folder.dataset, engine="h5netcdf")
-        paths = segments.segment_paths(self.folder.segments)
-        if not paths:
-            raise RunFolderError(f"{self.folder.path}: nothing was saved")
-        pieces = [xarray.open_dataset(path, engine="h5netcdf") for path in paths]
-        joined = xarray.concat(
-            pieces, dim="time", data_vars="minimal", coords="minimal", compat="override", join="override"
-        )
-        joined.attrs = dict(pieces[0].attrs, status=self.status)
-        return joined
-
-
-def open_run(path: str | Path) -> Run:
-    """Open a run folder, or the dataset in one, finished or partial.
-
-    Raises:
-        RunFolderError: no run there, or a damaged summary.
-    """
-    folder = find_run(path)
-    return Run(folder, folder.read_summary())
-
-
-class _Interruption:
-    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks."""
-
-    def __init__(self) -> None:
-        self.requested = False
-
-    @contextmanager
-    def watching(self) -> Iterator[None]:
-        """Handle the signals inside the block (in the main thread, the only one that gets them)."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-
-        def note(*_: object) -> None:
-            self.requested = True
-
-        before = {s: signal.signal(s, note) for s in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-
-class _Guards:
-    """The checks between chunks."""
-
-    def __init__(
-        self,
-        prepared: Prepared,
-        watch: summaries.Watch,
-        interruption: _Interruption,
-        observer: Observer,
-        writer: segments.SegmentWriter,
-    ) -> None:
-        limits = prepared.scene.config.limits
-        self._wall = None if limits.wall_time is None else float(limits.wall_time)
-        self._drift = None if limits.max_drift is None else float(limits.max_drift)
-        self._steps = limits.max_steps
-        self._watch = watch
-        self._interruption = interruption
-        self._observer = observer
-        self._writer = writer
-        self._started = time.monotonic()
-        self._reported = 0.0
-
-    def __call__(self, progress: Progress) -> Status | None:
-        now = time.monotonic()
-        if now - self._reported > 0.05:
-            self._reported = now
-            self._observer.progressed(progress)
-            self._writer.flush_if_due()
-        if self._interruption.requested:
-            return Status.INTERRUPTED
-        if self._wall is not None and now - self._started > self._wall:
-            return Status.WALL_TIME
-        if self._steps is not None and progress.steps >= self._steps:
-            return Status.MAX_STEPS
-        if self._drift is not None and max(self._watch.largest.values(), default=0.0) > self._drift:
-            return Status.MAX_DRIFT
-        return None
+    pass
 
 
 def run(
@@ -195,7 +66,7 @@ def run(
     attributes = _attributes(prepared, stepper)
     writer = segments.SegmentWriter(folder.segments, prepared.variables(), attributes)
     watch = summaries.Watch()
-    interruption = _Interruption()
+    interruption = Interruption()
 
     def sink(_: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
         recorded: dict[str, list[np.ndarray]] = evaluator.evaluate(states, turns)
@@ -211,7 +82,7 @@ def run(
     clock.next("build")
     observer.started(prepared, folder.path)
     observer.phase("integrate")
-    guards = _Guards(prepared, watch, interruption, observer, writer)
+    guards = Guards(prepared, watch, interruption, observer, writer)
     advance = Advance(stepper, prepared.clock, winding, prepared.precision, sink, guards)
     with interruption.watching():
         progress = advance.run()
@@ -236,10 +107,12 @@ def run(
         if progress.status.final:
             _complete(prepared, folder, writer, attributes, summary, clock, observer)
     except KeyboardInterrupt:
+        kept = "the dataset is complete, the timeline is missing"
         if not folder.dataset.exists():
             writer.flush()
+            kept = "all samples are saved as segments"
         summary |= {"status": Status.INTERRUPTED.value, "exit_code": Status.INTERRUPTED.exit_code}
-        summary["message"] = "interrupted after the integration; all samples are saved as segments"
+        summary["message"] = f"interrupted after the integration; {kept}"
     summary["cost"]["cpu_seconds"] = time.process_time() - cpu
     folder.write_summary(summary)
     return Run(folder, json.loads(json.dumps(summary, default=str)))
@@ -350,7 +223,7 @@ def _message(prepared: Prepared, progress: Progress, evaluator: Evaluator) -> st
         return text
     state = np.array([progress.last_good.state], dtype=prepared.precision.scalar)
     factors = evaluator.singular_factors(state)
-    if factors is not None:
+    if factors is not None and abs(float(factors[0])) < summaries.NEAR_SINGULAR:
         middle = float(state[0][prepared.system.states.index("theta")])
         text += (
             f"; the middle Euler angle theta = {middle:.9g} rad came within {abs(float(factors[0])):.2g} of "

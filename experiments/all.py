@@ -1,0 +1,73 @@
+"""Do all studies pass? Runs each at reduced length (--full: at full length) and prints one table.
+
+Held against: every study's own published numbers and closed forms. A study that breaks down counts as failed.
+A new study is one more name in STUDIES: a module of this folder with ``study(full, out)``.
+
+Run: python -m experiments.all [--full] [--out DIR] [NAME ...]      exit code 1 if anything failed
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from experiments.common import Check, add_arguments, table
+
+STUDIES = (
+    "earth_free_nutation",
+    "toutatis",
+    "heavy_top_regimes",
+    "flip_period",
+    "free_flight_energy",
+    "bodies_table",
+)
+
+
+def run_studies(names: Sequence[str], full: bool, out: Path) -> tuple[list[Check], list[str]]:
+    """Run studies in turn, telling on stderr how long each took.
+
+    Returns:
+        Their checks, named after their studies, and the names of those that broke down.
+    """
+    checks: list[Check] = []
+    broken = []
+    for name in names:
+        started = time.process_time()
+        try:
+            study = importlib.import_module(f"experiments.{name}").study
+            found = study(full, out)
+        except Exception:
+            traceback.print_exc()
+            broken.append(name)
+            continue
+        checks += [replace(check, name=f"{name}: {check.name}") for check in found]
+        seconds = time.process_time() - started
+        print(f"{name}: {len(found)} checks, {seconds:.1f} s CPU", file=sys.stderr, flush=True)
+    return checks, broken
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run them, print the table, return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m experiments.all")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"default: {', '.join(STUDIES)}")
+    add_arguments(parser)
+    arguments = parser.parse_args(argv)
+    checks, broken = run_studies(arguments.names or STUDIES, arguments.full, arguments.out)
+    print(table(checks, "All studies"))
+    for name in broken:
+        print(f"{name}: BROKE DOWN, see the traceback above")
+    print(f"figures: {arguments.out}")
+    return int(bool(broken) or not checks or not all(check.passed for check in checks))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

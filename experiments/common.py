@@ -1,0 +1,231 @@
+"""What all studies share: checks and their table, the command line, runs in a temporary folder, figures.
+
+A study is a module with ``study(full, out)``: it writes ``out/NAME.png`` and returns its checks; ``main``
+makes a command of it, which ends with exit code 1 if any check fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import mpmath
+import xarray
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+import rigidsim
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+DEFAULT_OUT = Path("runs/experiments")
+BLUE, ORANGE, GREEN, RED, GREY = "#2166ac", "#e08214", "#1b9e77", "#b2182b", "#636363"
+EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadruple": 2.0**-112}
+
+Study = Callable[[bool, Path], "list[Check]"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One number held against another.
+
+    Attributes:
+        name: what was measured.
+        measured, expected: in ``unit``; floats, or mpf where double would not do.
+        tolerance: largest error that passes: over abs(expected) if relative, else in ``unit``.
+        unit: of both numbers; "1" for none.
+        source: where the expected number is from, and where the tolerance is from.
+        kind: "relative", "absolute", or "apart": the numbers must differ by more than the tolerance (in
+            ``unit``), for what a model must not reproduce.
+    """
+
+    name: str
+    measured: Any
+    expected: Any
+    tolerance: float
+    unit: str
+    source: str
+    kind: Literal["relative", "absolute", "apart"] = "relative"
+
+    @property
+    def error(self) -> float:
+        """Relative to the expected number, or in ``unit``."""
+        difference = abs(self.measured - self.expected)
+        return float(difference / abs(self.expected) if self.kind == "relative" else difference)
+
+    @property
+    def passed(self) -> bool:
+        """False for nan, whatever the kind."""
+        return self.error > self.tolerance if self.kind == "apart" else self.error <= self.tolerance
+
+    @property
+    def row(self) -> str:
+        """A Markdown row."""
+        allowed = {"relative": f"{self.tolerance:.1e} rel", "absolute": f"{self.tolerance:.1e}",
+                   "apart": f"> {self.tolerance:.1e}"}[self.kind]  # fmt: skip
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        verdict = "ok" if self.passed else "**FAILED**"
+        return (
+            f"| {self.name} | {_shown(self.measured, self)} | {_shown(self.expected, self)}{unit} "
+            f"| {self.error:.1e} | {allowed} | {verdict} | {self.source} |"
+        )
+
+
+def _shown(value: Any, check: Check) -> str:
+    """As many digits as the tolerance resolves, and one more; at least four, at most 34."""
+    scale = max(abs(check.expected), abs(value)) or 1
+    tolerance = check.tolerance if check.kind == "relative" else check.tolerance / float(scale)
+    digits = 1 - math.floor(math.log10(tolerance)) if tolerance > 0 else 34
+    with mpmath.workdps(60):
+        return str(mpmath.nstr(mpmath.mpf(value), min(max(digits, 4), 34)))
+
+
+def table(checks: Sequence[Check], title: str = "") -> str:
+    """The checks as a Markdown table, with a verdict below."""
+    failed = sum(not check.passed for check in checks)
+    verdict = f"{len(checks)} checks, all passed" if not failed else f"{len(checks)} checks, {failed} FAILED"
+    head = [f"## {title}", ""] if title else []
+    return "\n".join(
+        [
+            *head,
+            "| check | measured | expected | error | allowed | | source; origin of the tolerance |",
+            "| --- | --- | --- | --- | --- | --- | --- |",
+            *(check.row for check in checks),
+            "",
+            f"{verdict}",
+        ]
+    )
+
+
+def main(study: Study, name: str, argv: Sequence[str] | None = None) -> int:
+    """Run one study from the command line.
+
+    Args:
+        study: the module's.
+        name: of the module, for the table and the figure.
+        argv: arguments; the command line's by default.
+
+    Returns:
+        The exit code: 0, or 1 if a check failed.
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}")
+    add_arguments(parser)
+    arguments = parser.parse_args(argv)
+    checks = study(arguments.full, arguments.out)
+    print(table(checks, name))
+    print(f"figure: {arguments.out / name}.png")
+    return int(not checks or not all(check.passed for check in checks))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """``--out`` and ``--full``."""
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT, help="folder of the figure (default: %(default)s)"
+    )
+    parser.add_argument("--full", action="store_true", help="longer runs and more cases")
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished run, in memory."""
+
+    dataset: xarray.Dataset
+    summary: dict[str, Any]
+
+    @property
+    def steps(self) -> int:
+        """Taylor steps taken."""
+        return int(self.summary["cost"]["steps"])
+
+    def values(self, name: str) -> Any:
+        """A variable as a float64 array."""
+        return self.dataset[name].values
+
+    def exact(self, name: str) -> list[Any]:
+        """A scalar variable, or the time, as mpf with every digit of the run's precision."""
+        return exact(self.dataset[name].values, *self._residuals(name))
+
+    def exact_component(self, name: str, component: str) -> list[Any]:
+        """One component of a vector, as mpf with every digit of the run's precision."""
+        dimension = self.dataset[name].dims[1]
+        parts = [name, *(n for n in self._residual_names(name))]
+        return exact(*(self.dataset[p].sel({dimension: component}).values for p in parts))
+
+    def _residual_names(self, name: str) -> list[str]:
+        return [name + s for s in ("_lo", "_lo2", "_lo3") if name + s in self.dataset.variables]
+
+    def _residuals(self, name: str) -> list[Any]:
+        return [self.dataset[n].values for n in self._residual_names(name)]
+
+
+def exact(*parts: Any) -> list[Any]:
+    """The sums of float64 parts, as mpf of the current mpmath precision."""
+    return [sum(mpmath.mpf(float(x)) for x in reversed(row)) for row in zip(*parts, strict=True)]
+
+
+def simulate(config: str | Path, *overrides: str) -> Result:
+    """Run a config in a folder of its own that goes away, without a timeline.
+
+    Args:
+        config: the path of a config, or a TOML text.
+        overrides: ``KEY=VALUE`` texts.
+
+    Raises:
+        RuntimeError: the run didn't finish.
+    """
+    settings = ["output.timeline=false", *overrides]
+    if isinstance(config, Path):
+        experiment = rigidsim.load(config, overrides=settings)
+    else:
+        experiment = rigidsim.parse(config, overrides=settings)
+    with tempfile.TemporaryDirectory() as folder:
+        run = rigidsim.run(experiment, out=folder)
+        if run.status != "finished":
+            raise RuntimeError(f"{experiment.config.name}: {run.status}: {run.summary['message']}")
+        with run.dataset as dataset:
+            return Result(dataset.load(), run.summary)
+
+
+def round_off(result: Result, rate: float, precision: str = "double") -> float:
+    """Three times the round-off law of attitudes, (eps/2) sqrt(steps) |w| t / sqrt 3 (Brouwer 1937), rad.
+
+    Args:
+        result: for its steps and duration.
+        rate: abs(w), rad/s.
+        precision: of the run.
+    """
+    time = result.values("time")
+    duration = float(time[-1] - time[0])
+    return 3 * EPSILON[precision] / 2 * math.sqrt(result.steps) * rate * duration / math.sqrt(3)
+
+
+def new_figure(width: float = 10, height: float = 6, title: str = "") -> Figure:
+    """A figure on the Agg canvas, with a title that answers the study's question."""
+    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    if title:
+        figure.suptitle(title, fontsize=13, fontweight="bold")
+    return figure
+
+
+def tidy(axes: Any, xlabel: str, ylabel: str, title: str = "") -> None:
+    """Labels, a light grid, no box."""
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel(ylabel)
+    if title:
+        axes.set_title(title, fontsize=10.5)
+    axes.grid(True, color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def save(figure: Figure, out: Path, name: str) -> Path:
+    """Write ``out/name.png``."""
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{name}.png"
+    figure.savefig(path, dpi=130)
+    return path

@@ -1,0 +1,141 @@
+"""In how many days does the pole of a rigid Earth go round its figure axis, and is that Chandler's period?
+
+Method: rates alone (three states), double precision. The pole starts 1e-6 rad from the figure axis; its
+azimuth in the body grows linearly; its rate is a least-squares fit over all samples of ten years. Once with
+the measured moments (preset "earth"), once with a homogeneous ellipsoid of the Earth's diameters.
+
+Held against:
+- Euler's closed form, A/(C-A) = 304.456 rotations = 303.62 mean solar days for the dynamical flattening
+  (C-A)/C = 0.00327379492 (Mathews, Herring & Buffett 2002), and (a^2+c^2)/(a^2-c^2) rotations for the
+  ellipsoid; tolerance 1e-9, relative: ten years are 12 turns, so that the round-off law of the rates
+  (eps/2 sqrt(steps), some 1e-14 rad at 75 rad) leaves 1e-12 at worst, and the printed A/(C-A) has nine
+  digits;
+- Chandler's 427 to 435 days (Chandler 1891; Gross 2007), the period of the real, elastic Earth, which a rigid
+  body must NOT give.
+
+Run: python -m experiments.earth_free_nutation [--full] [--out DIR]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import mpmath
+import numpy as np
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from experiments.common import (
+    BLUE,
+    CONFIGS,
+    GREY,
+    ORANGE,
+    RED,
+    Check,
+    Result,
+    main,
+    new_figure,
+    save,
+    simulate,
+    tidy,
+)
+from experiments.measure import phase_rate
+
+NAME = "earth_free_nutation"
+FLATTENING = "0.00327379492"  # (C-A)/C, Mathews, Herring & Buffett 2002
+SPIN = "7.292115e-5"  # rad/s, nominal (Groten 2004)
+DIAMETERS = (12756, 12714)  # km, equatorial and polar
+CHANDLER = (427.0, 435.0)  # days: Chandler 1891; Gross 2007
+DAY = 86400
+
+
+def pole_rate(result: Result) -> float:
+    """Rate of the pole's azimuth in the body, rad/s."""
+    w = result.values("angular_velocity")
+    return phase_rate(result.values("time"), np.arctan2(w[:, 1], w[:, 0]))
+
+
+def study(full: bool, out: Path) -> list[Check]:
+    """Both Earths against Euler; see the module's text."""
+    years = 40 if full else 10
+    length = f'time.end="{365 * years} day"'
+    every = 'time.every="1 day"'
+    measured = simulate(CONFIGS / "earth_free_nutation.toml", length, every)
+    axes = simulate(CONFIGS / "earth_free_nutation_axes.toml", length, every,
+                    'output.record=["angular_velocity"]')  # fmt: skip
+    with mpmath.workdps(30):
+        h, spin = mpmath.mpf(FLATTENING), mpmath.mpf(SPIN)
+        rotation = 2 * mpmath.pi / spin / DAY
+        turns = {"measured moments": (1 - h) / h}
+        a, c = (mpmath.mpf(d) / 2 for d in DIAMETERS)
+        turns["axes"] = (a**2 + c**2) / (a**2 - c**2)
+        expected = {name: float(n * rotation) for name, n in turns.items()}
+    rates = {"measured moments": pole_rate(measured), "axes": pole_rate(axes)}
+    days = {name: 2 * np.pi / rate / DAY for name, rate in rates.items()}
+    rotations = float(spin) / rates["measured moments"]
+    closed = "Euler 1765, closed form; 1e-9: nine digits of the inputs, rounding is below 1e-12"
+    checks = [
+        Check("nutation, measured moments", rotations, float(turns["measured moments"]), 1e-9, "rotations",
+              closed),
+        Check("nutation, measured moments", days["measured moments"], expected["measured moments"], 1e-9,
+              "days", closed),
+        Check("as printed, in rotations", rotations, 304.456, 5e-4, "rotations",
+              "Mathews et al. 2002; half of the last printed digit", "absolute"),
+        Check("as printed, in mean solar days", days["measured moments"], 303.62, 5e-3, "days",
+              "Mathews et al. 2002; half of the last printed digit", "absolute"),
+        Check("nutation, from the axes", days["axes"], expected["axes"], 1e-9, "days", closed),
+        Check("NOT Chandler's period (measured moments)", days["measured moments"], sum(CHANDLER) / 2,
+              (CHANDLER[1] - CHANDLER[0]) / 2, "days",
+              "Chandler 1891, Gross 2007: 427 to 435 d, elastic; half the width of the band", "apart"),
+        Check("NOT Chandler's period (axes)", days["axes"], sum(CHANDLER) / 2,
+              (CHANDLER[1] - CHANDLER[0]) / 2, "days", "as above", "apart"),
+    ]  # fmt: skip
+    draw(measured, days, out)
+    return checks
+
+
+def draw(result: Result, days: dict[str, float], out: Path) -> None:
+    """The pole's path over one turn, and the three periods side by side."""
+    title = f"A rigid Earth nutates in {days['measured moments']:.2f} days, not in Chandler's 427 to 435"
+    figure = new_figure(11, 5.2, title)
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.5])
+    w = result.values("angular_velocity")
+    time = result.values("time") / DAY
+    arcsec = np.degrees(w[:, :2] / w[:, 2:3]) * 3600
+    turn = time <= days["measured moments"]
+    left.plot(*arcsec[turn].T, color=BLUE, linewidth=2)
+    left.plot(0, 0, "+", color=GREY, markersize=11)
+    left.annotate("figure axis", (0, 0), (0.012, 0.012), color=GREY, fontsize=9)
+    for day in range(0, 304, 50):
+        left.plot(*arcsec[day], "o", color=BLUE, markersize=5)
+        left.annotate(
+            f"day {day}",
+            arcsec[day],
+            arcsec[day] * (0.8 if day else 0.72) + (0, 0.012 * (day == 0)),
+            ha="center",
+            va="center",
+            fontsize=8.5,
+        )
+    tidy(left, "pole along x (arcsec)", "pole along y (arcsec)", "One turn of the pole, in the body")
+    left.set_aspect("equal")
+    span = time <= 900
+    right.axvspan(*CHANDLER, color=RED, alpha=0.25, label="Chandler's period, 427 to 435 d (elastic Earth)")
+    right.plot(time[span], arcsec[span, 0], color=BLUE, label="rigid Earth: pole along x")
+    period = days["measured moments"]
+    for number, label in ((1, f"{period:.2f} d and twice that"), (2, None)):
+        right.axvline(number * period, color=ORANGE, linestyle="--", linewidth=1.2, label=label)
+    tidy(
+        right,
+        "time (mean solar days)",
+        "pole along x (arcsec)",
+        "Measured moments, (C - A)/C = 0.00327379492",
+    )
+    right.set_ylim(-0.23, 0.33)
+    right.legend(loc="upper right", fontsize=9, framealpha=1)
+    save(figure, out, NAME)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, NAME))

@@ -1,0 +1,175 @@
+"""How long does a body dwell before it flips about its intermediate axis, ever nearer to the separatrix?
+
+Method: moments 1, 2, 3; w = (0, 1, d): the rate about the middle axis, an offset d from the separatrix. The
+first reversal of w_y is at K/p, and from then on one follows every 2K/p ~ 2 ln(4 / k') / p with k' ~ d: each
+factor of ten in d adds 2 ln(10) / p. Reversals are found between samples (50 per 1/p) by polynomials
+through 24 of them, good to 1e-28: the nearest singularity of the rates is pi/2p away.
+
+Why more than double precision: the period hangs on k'^2 ~ d^2, the small difference L^2 - 2 E I_2. Once the
+body has turned at full rate, rounding has changed L^2 and 2E by some eps sqrt(steps), each by its own
+amount. With eps = 2.2e-16 nothing is left of d = 1e-8 and less: the body then flips at intervals that
+rounding draws. So d <= 1e-4 is run in 80 bits, d <= 1e-6 in quadruple precision (eps = 1.9e-34, d^2 = 1e-24).
+
+Held against: 2K(k)/p in mpmath (50 digits). Tolerance: the round-off law (Brouwer 1937). L^2 and 2E each
+walk (eps/2) sqrt(steps), doubled as squares, so that their difference has sqrt(2) eps sqrt(steps) L^2;
+three times that over D = L^2 - 2 E I_2 is the relative error of k'^2, and over p the error of the period.
+And a contrast: double precision must NOT find the period at 1e-12.
+
+Run: python -m experiments.flip_period [--full] [--out DIR]
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from experiments.closed_forms import FreeTop, free_top
+from experiments.common import (
+    BLUE,
+    EPSILON,
+    GREEN,
+    GREY,
+    ORANGE,
+    Check,
+    Result,
+    main,
+    new_figure,
+    save,
+    simulate,
+    tidy,
+)
+from experiments.measure import crossings
+
+NAME = "flip_period"
+MOMENTS = (1, 2, 3)
+FLIPS = 3
+PER_UNIT = 50  # samples per 1/p
+COLORS = {"double": ORANGE, "extended": GREEN, "quadruple": BLUE}
+CONFIG = """
+name = "flips"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0, 1, "1e-{exponent}"]
+[time]
+end = "{end}"
+samples = {samples}
+[integrator]
+precision = "{precision}"
+[output]
+record = ["angular_velocity"]
+"""
+
+
+def closed(exponent: int) -> FreeTop:
+    """The closed form at offset 10^-exponent."""
+    return free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(0), 1, mpmath.mpf(10) ** -exponent])
+
+
+def bound(top: FreeTop, result: Result, precision: str) -> float:
+    """Allowed error of one flip's duration, seconds; see the module's text."""
+    beyond = abs(top.complement * top.p**2 * top.i1 * top.i2 * top.i3 / (top.i3 - top.i1))  # L^2 - 2 E I_2
+    walk = 3 * math.sqrt(2) * EPSILON[precision] * math.sqrt(result.steps)
+    return float(walk * top.momentum**2 / beyond / top.p)
+
+
+def run(exponent: int, precision: str) -> tuple[Result, list[Any]]:
+    """One run over some flips, and its reversals of w_y (mpf seconds)."""
+    top = closed(exponent)
+    end = (FLIPS + 0.8) * top.flip
+    samples = int(end * top.p * PER_UNIT) + 1
+    text = CONFIG.format(exponent=exponent, end=mpmath.nstr(end, 8), samples=samples, precision=precision)
+    result = simulate(text)
+    reversals = crossings(result.exact("time"), result.exact_component("angular_velocity", "y"), points=24)
+    return result, reversals
+
+
+def worst(top: FreeTop, reversals: list[Any]) -> Any:
+    """The interval between reversals that is farthest from the closed form."""
+    intervals = np.diff(np.array(reversals, dtype=object))
+    return max(intervals, key=lambda interval: abs(interval - top.flip))
+
+
+def study(full: bool, out: Path) -> list[Check]:
+    """Offsets from 1e-1 to 1e-12."""
+    cases = {
+        "double": range(1, 13) if full else (1, 2, 3, 6, 12),
+        "extended": range(1, 13) if full else (4, 6),
+        "quadruple": range(1, 13) if full else (6, 9, 12),
+    }
+    trusted = {"double": range(1, 4), "extended": range(4, 6), "quadruple": range(6, 13)}
+    checks: list[Check] = []
+    found: dict[str, list[tuple[int, float, float, float]]] = {}
+    kept: dict[int, Result] = {}
+    with mpmath.workdps(50):
+        for precision, exponents in cases.items():
+            for exponent in exponents:
+                top = closed(exponent)
+                result, reversals = run(exponent, precision)
+                interval, allowed = worst(top, reversals), bound(top, result, precision)
+                error = float(abs(interval - top.flip))
+                found.setdefault(precision, []).append((exponent, float(interval), error, allowed))
+                if exponent in trusted[precision]:
+                    kept[exponent] = result
+                    checks.append(
+                        Check(f"flip at offset 1e-{exponent}, {precision}", interval, top.flip, allowed, "s",
+                              "2K(k)/p; 3 x round-off of L^2 - 2 E I_2 over its value, over p", "absolute")
+                    )  # fmt: skip
+                if exponent == 12 and precision == "double":
+                    checks.append(
+                        Check("NOT in double at offset 1e-12", interval, top.flip, 1.0, "s",
+                              "d^2 = 1e-24 < eps: the flip comes early by about ln(d^2/eps)/p", "apart")
+                    )  # fmt: skip
+        draw(found, kept, out)
+    return checks
+
+
+def draw(found: dict[str, list[tuple[int, float, float, float]]], kept: dict[int, Result], out: Path) -> None:
+    """Period against offset, its error, and three of the motions."""
+    title = (
+        "Ten times nearer the separatrix, 2 ln(10)/p longer until the flip: down to 1e-12, in enough digits"
+    )
+    figure = new_figure(12, 7.4, title)
+    grid = figure.add_gridspec(2, 2, height_ratios=[1, 1.5])
+    motion, period, error = (figure.add_subplot(cell) for cell in (grid[0, :], grid[1, 0], grid[1, 1]))
+    for exponent, shade in zip((3, 6, 12), ("#9ecae1", "#4292c6", "#08306b"), strict=True):
+        result = kept.get(exponent)
+        if result is not None:
+            motion.plot(result.values("time"), result.values("angular_velocity")[:, 1], color=shade,
+                        label=f"offset 1e-{exponent}")  # fmt: skip
+    tidy(motion, "time (s)", "w_y (rad/s)", "Rate about the middle axis: it dwells, and flips")
+    motion.legend(loc="center", bbox_to_anchor=(0.79, 0.5), fontsize=9, framealpha=1)
+    offsets = np.logspace(-1, -12, 100)
+    curve = [float(free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(0), 1, mpmath.mpf(d)]).flip)
+             for d in offsets]  # fmt: skip
+    period.semilogx(offsets, curve, color=GREY, linewidth=1.2, label="2K(k)/p")
+    for precision, rows in found.items():
+        exponents, values, errors, allowed = (
+            np.array(column, dtype=float) for column in zip(*rows, strict=True)
+        )
+        style = {"color": COLORS[precision], "label": precision, "linestyle": "none", "markersize": 7}
+        marker = {"double": "s", "extended": "^", "quadruple": "o"}[precision]
+        period.semilogx(10**-exponents, values, marker=marker, markerfacecolor="none", **style)
+        error.loglog(10**-exponents, np.maximum(errors, 1e-36), marker=marker, **style)
+        error.loglog(10**-exponents, allowed, color=COLORS[precision], linewidth=1, linestyle="--")
+    period.invert_xaxis()
+    error.invert_xaxis()
+    tidy(period, "offset d from the separatrix (rad/s)", "time between flips (s)",
+         "Double precision loses it where d^2 < eps")  # fmt: skip
+    tidy(error, "offset d from the separatrix (rad/s)", "error (s)",
+         "Error; dashed: what rounding explains, ~ eps / d^2")  # fmt: skip
+    period.legend(loc="upper left", fontsize=9, framealpha=1)
+    error.legend(loc="upper left", fontsize=9, framealpha=1)
+    save(figure, out, NAME)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, NAME))

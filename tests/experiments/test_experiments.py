@@ -1,0 +1,155 @@
+"""Every study passes at reduced length, draws its figure, and can fail."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from experiments import all as everything  # noqa: E402
+from experiments import closed_forms, common, measure  # noqa: E402
+from experiments.common import Check  # noqa: E402
+
+
+@pytest.mark.parametrize("name", everything.STUDIES)
+def test_study_passes_and_draws(name: str, tmp_path: Path) -> None:
+    checks = importlib.import_module(f"experiments.{name}").study(False, tmp_path)
+    failed = [check.row for check in checks if not check.passed]
+    assert checks
+    assert not failed, "\n".join(failed)
+    assert all(check.source for check in checks)
+    pixels = imread(tmp_path / f"{name}.png")[:, :, :3]
+    inked = (pixels < 0.9).any(axis=2).mean()
+    assert pixels.shape[0] >= 500
+    assert pixels.shape[1] >= 1000
+    assert 0.01 < inked < 0.9
+
+
+def test_every_study_of_the_folder_is_in_the_list() -> None:
+    found = {path.stem for path in (ROOT / "experiments").glob("*.py") if "\ndef study(" in path.read_text()}
+    assert found == set(everything.STUDIES)
+
+
+def test_a_wrong_expected_value_makes_the_exit_code_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from experiments import earth_free_nutation as earth
+
+    arguments = ["--out", str(tmp_path)]
+    assert common.main(earth.study, earth.NAME, arguments) == 0
+    monkeypatch.setattr(earth, "FLATTENING", "0.003273795")  # the eighth digit
+    assert common.main(earth.study, earth.NAME, arguments) == 1
+    assert "FAILED" in capsys.readouterr().out
+    assert everything.main(["earth_free_nutation", *arguments]) == 1
+    assert "**FAILED**" in capsys.readouterr().out
+
+
+def test_a_study_that_breaks_down_makes_the_exit_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert everything.main(["no_such_study", "--out", str(tmp_path)]) == 1
+    captured = capsys.readouterr()
+    assert "BROKE DOWN" in captured.out
+    assert "Traceback" in captured.err
+
+
+def test_a_study_runs_as_a_script(tmp_path: Path) -> None:
+    script = ROOT / "experiments" / "earth_free_nutation.py"
+    done = subprocess.run(
+        [sys.executable, str(script), "--out", str(tmp_path / "out")],
+        capture_output=True, text=True, cwd=tmp_path, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "all passed" in done.stdout
+    assert (tmp_path / "out" / "earth_free_nutation.png").exists()
+
+
+def check(measured: float, kind: str = "relative", tolerance: float = 0.1) -> Check:
+    return Check("x", measured, 10.0, tolerance, "s", "nowhere", kind)  # type: ignore[arg-type]
+
+
+def test_checks_are_relative_absolute_or_apart() -> None:
+    assert check(10.9).passed
+    assert not check(11.1).passed
+    assert check(10.09, "absolute").passed
+    assert not check(10.9, "absolute").passed
+    assert check(10.9, "apart").passed
+    assert not check(10.09, "apart").passed
+    for kind in ("relative", "absolute", "apart"):
+        assert not check(math.nan, kind).passed
+
+
+def test_an_empty_study_does_not_pass(tmp_path: Path) -> None:
+    assert common.main(lambda full, out: [], "nothing", ["--out", str(tmp_path)]) == 1
+
+
+def test_mean_and_spectral_rates_of_a_modulated_angle() -> None:
+    time = np.linspace(0, 400, 8001)
+    angle = 1.7 * time + 0.3 * np.sin(2.9 * time + 1)
+    # exp(-sqrt(4 pi N)) of N = 184 turns of the modulation is below rounding, eps * phase / duration
+    assert measure.mean_rate(time, angle) == pytest.approx(1.7, rel=1e-13)
+    assert measure.spectral_rate(time, np.exp(1j * angle), 1.7001) == pytest.approx(1.7, rel=1e-13)
+    assert measure.phase_rate(time, 1.7 * time) == pytest.approx(1.7, rel=1e-14)
+
+
+def test_crossings_are_found_between_samples() -> None:
+    time = np.linspace(0, 20, 401)
+    with mpmath.workdps(30):
+        samples = [mpmath.sin(mpmath.mpf(t)) for t in time]
+        every = measure.crossings(time, samples, points=16)
+        rising = measure.crossings(time, samples, direction=1, points=16)
+        # entire function: (h/2)^16 (8!)^2 / 16! = 1e-30
+        assert [float(abs(t - (i + 1) * mpmath.pi)) for i, t in enumerate(every)] == pytest.approx(
+            [0] * 6, abs=1e-24
+        )
+        assert [round(float(t / mpmath.pi)) for t in rising] == [2, 4, 6]
+
+
+def test_closed_forms_agree_with_quadrature() -> None:
+    with mpmath.workdps(30):
+        moments, rates = (
+            [mpmath.mpf(m) for m in ("3.09", "3.22", "1")],
+            [mpmath.mpf(w) for w in ("2", "3", "9.8")],
+        )
+        top = closed_forms.free_top(moments, rates)
+        assert top.m + top.complement == pytest.approx(1, abs=1e-25)
+        # sn^2 of the rates from the amplitudes: phi' = L (I1 w1^2 + I2 w2^2) / (L^2 - I3^2 w3^2)
+        twice = sum(i * w * w for i, w in zip(moments, rates, strict=True))
+        square = top.momentum**2
+
+        def rate(u: mpmath.mpf) -> mpmath.mpf:
+            sn = mpmath.ellipfun("sn", u, m=top.m)
+            w2 = (square - twice * top.i3) / (top.i2 * (top.i2 - top.i3)) * sn**2
+            e3 = (square - twice * top.i1 - top.i2 * (top.i2 - top.i1) * w2) / (top.i3 - top.i1)  # I3 w3^2
+            return top.momentum * (twice - e3) / (square - top.i3 * e3)
+
+        quarter = mpmath.ellipk(top.m)
+        assert abs(mpmath.quad(rate, [0, quarter]) / quarter - top.precession) < mpmath.mpf("1e-20")
+
+        a, c, mu = mpmath.mpf("2e-4"), mpmath.mpf("1e-4"), mpmath.mpf("0.0392266")
+        heavy = closed_forms.heavy_top(
+            a, c, mu, mpmath.mpf("0.5"), [mpmath.mpf(0), mpmath.mpf(2), mpmath.mpf(100)]
+        )
+
+        def azimuth(u: mpmath.mpf) -> mpmath.mpf:
+            height = heavy.u1 + (heavy.u2 - heavy.u1) * mpmath.ellipfun("sn", u, m=heavy.m) ** 2
+            return (heavy.vertical - heavy.axial * height) / (a * (1 - height**2))
+
+        # at the turning points all energy is in the precession and the height
+        for u in (heavy.u1, heavy.u2):
+            rate = (heavy.vertical - heavy.axial * u) / (a * (1 - u * u))
+            energy = a * rate**2 * (1 - u * u) / 2 + mu * u
+            start = a * 4 / mpmath.mpf(2) + mu * mpmath.cos(mpmath.mpf("0.5"))
+            assert abs(energy - start) < mpmath.mpf("1e-25")
+        quarter = mpmath.ellipk(heavy.m)
+        assert abs(mpmath.quad(azimuth, [0, quarter]) / quarter - heavy.precession) < mpmath.mpf("1e-20")
