@@ -72,7 +72,8 @@ class Precision:
         mantissa, exponent = int(mantissa), int(exponent)
         while mantissa:
             part = float(mantissa & ((1 << _CHUNK_BITS) - 1))
-            scaled = float(np.ldexp(part, exponent))
+            with np.errstate(over="ignore", under="ignore"):
+                scaled = float(np.ldexp(part, exponent))
             if part and (scaled == 0.0 or np.isinf(scaled)):
                 raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the internal range")
             total = total + self._scalar(scaled)
@@ -111,10 +112,11 @@ class Precision:
         parts: list[np.ndarray] = []
         rest = values
         for n in range(self.part_count):
-            part = rest.astype(np.float64)
-            parts.append(part)
-            if n + 1 < self.part_count:
-                with np.errstate(invalid="ignore"):
+            # infinities and nan have no residual; numpy would warn of what is set right below
+            with np.errstate(invalid="ignore", over="ignore"):
+                part = rest.astype(np.float64)
+                parts.append(part)
+                if n + 1 < self.part_count:
                     rest = rest - part.astype(self.scalar)
         lead = parts[0]
         for part in parts[1:]:

@@ -1,0 +1,208 @@
+"""Runs that can't go on: the status, the reason in words, and the good samples kept.
+
+Euler angles driven into their singularity break down by themselves. For the sequence xyz, whose middle
+angle is singular at 90 degrees, a body that turns about its y axis with psi = offset passes it at a distance
+of about ``offset``: phi and psi then turn by half a turn within a time of offset / |w|, and a Taylor step is
+about e^-2 of that.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rigidsim
+from rigidsim.solve.stepper import Stepper
+
+Config = Callable[..., str]
+Command = Callable[..., Any]
+
+START = 0.1  # theta at the start, rad; the singularity is reached at t = pi/2 - 0.1 s
+REACHED = math.pi / 2 - START
+
+
+def into_singularity(
+    config: Config, offset: float, precision: str, samples: int = 301, form: str = "euler_angles"
+) -> str:
+    body = (
+        "[body]\nprincipal_moments = [1, 2, 3]\n"
+        f"[initial]\nangular_velocity = [0, 1, 0]\neuler_angles = [0.3, {START}, {offset}]\n"
+    )
+    return config(
+        time=f"end = 3\nsamples = {samples}",
+        integrator=f'precision = "{precision}"\nformulation = "{form}"\neuler_sequence = "xyz"',
+        rest='record = ["angular_velocity", "quaternion", "euler_angles", "angular_momentum"]',
+        body=body,
+    )
+
+
+BREAKDOWNS = {
+    # float32 ends at 3e38: the coefficients of order 9, offset^-9, overflow
+    "single": (1e-6, "stopped: non-finite state", "the state stopped being finite"),
+    # the distance is below the spacing of doubles near 90 degrees (2.2e-16): no step gets on
+    "double": (1e-16, "stopped: step size collapsed", "the steps became too small"),
+}
+
+
+@pytest.mark.parametrize("precision", BREAKDOWNS)
+def test_euler_angles_break_down_in_their_singularity(
+    precision: str, config: Config, rigidsim_command: Command
+) -> None:
+    offset, status, words = BREAKDOWNS[precision]
+    result = rigidsim_command("run", into_singularity(config, offset, precision))
+    assert result.exit_code == 3
+    assert isinstance(result.exception, SystemExit)
+    summary = json.loads(Path("runs/free/summary.json").read_text())
+    assert summary["status"] == status
+    assert summary["exit_code"] == 3
+    message = summary["message"]
+    assert message.startswith(words)
+    assert "the middle Euler angle theta = 1.570" in message
+    assert "of the singularity of xyz" in message
+    assert 'choose formulation = "quaternion"' in message
+    assert (
+        f"last good state at {summary['time_reached']:.9g} s after {summary['cost']['steps']} steps"
+        in message
+    )
+    assert message in result.stderr
+    near = float(message.split("came within ")[1].split()[0])
+    assert near < 1e-4  # of 90 degrees
+    assert summary["time_reached"] == pytest.approx(REACHED, abs=1e-4)
+
+    run = rigidsim.open_run("runs/free")
+    assert not run.folder.segments.exists()
+    with run.dataset as dataset:
+        assert dataset.attrs["status"] == status
+        assert dataset.attrs["status_message"] == message
+        count = dataset.sizes["time"]
+        # every sample up to the last good state: t = i / 100
+        assert count == summary["samples"] == math.floor(summary["time_reached"] * 100) + 1
+        assert all(np.isfinite(dataset[name]).all() for name in dataset.data_vars)
+        epsilon = 2.0**-23 if precision == "single" else 2.0**-52
+        # theta = 0.1 + t until phi and psi turn over, since psi is tiny: second order in the offset,
+        # and rounding of some steps
+        np.testing.assert_allclose(
+            dataset.euler_angles[:, 1], START + np.arange(count) / 100, rtol=0, atol=100 * epsilon
+        )
+    info = rigidsim_command("info", "runs/free")
+    assert info.exit_code == 0
+    assert status in info.stdout
+
+
+@pytest.mark.parametrize("precision", BREAKDOWNS)
+def test_the_quaternion_that_is_advised_does_get_through(
+    precision: str, config: Config, rigidsim_command: Command
+) -> None:
+    offset = BREAKDOWNS[precision][0]
+    result = rigidsim_command("run", into_singularity(config, offset, precision, form="quaternion"))
+    assert result.exit_code == 0, result.output
+    with rigidsim.open_run("runs/free").dataset as dataset:
+        assert dataset.sizes["time"] == 301
+
+
+@pytest.mark.parametrize("samples", [3001, 4])
+@pytest.mark.parametrize("offset", [1e-4, 1e-6])
+def test_a_passage_close_to_the_singularity_is_warned_of(
+    offset: float, samples: int, config: Config, rigidsim_command: Command
+) -> None:
+    """Whether a sample falls on it or not."""
+    result = rigidsim_command("run", into_singularity(config, offset, "double", samples))
+    assert result.exit_code == 0, result.output
+    (warning,) = json.loads(Path("runs/free/summary.json").read_text())["warnings"]
+    assert "came near the singularity of xyz" in warning
+    assert 'choose formulation = "quaternion"' in warning
+    assert ("between two samples" in warning) == (samples == 4)
+    if samples == 4:  # the distance that the shortest step tells, here within a factor of two
+        near = float(warning.split("within about ")[1].split()[0])
+        assert offset / 2 < near < 2 * offset
+    assert "warning  the Euler angles came near" in " ".join(result.stdout.split("\n"))
+    with rigidsim.open_run("runs/free").dataset as dataset:
+        assert dataset.attrs["warnings"] == warning
+
+
+@pytest.mark.parametrize("samples", [3001, 4])
+def test_a_passage_at_a_distance_is_not(samples: int, config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("run", into_singularity(config, 0.01, "double", samples))
+    assert result.exit_code == 0, result.output
+    assert json.loads(Path("runs/free/summary.json").read_text())["warnings"] == []
+
+
+@pytest.mark.parametrize("time", ["end = 100\nsamples = 1601", "end = 1000\nsamples = 11"])
+def test_a_failing_step_is_found_among_many(
+    time: str, config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Quaternions have no singularity, so a failure is put in: past a time no step stays finite. Whether
+    the run takes blocks or skips, it ends at the last step before, with every sample up to there.
+    """
+    broken = 80.0  # seconds
+    outcome = {name: getattr(Stepper, name) for name in ("step", "skip", "block")}
+
+    def past(stepper: Stepper) -> bool:
+        return float(stepper.time) > broken / unit
+
+    def step(self: Stepper) -> bool:
+        fine = outcome["step"](self)
+        return fine and not past(self)
+
+    def skip(self: Stepper, count: int) -> bool:
+        fine = outcome["skip"](self, count)
+        return fine and not past(self)
+
+    def block(self: Stepper, count: int) -> tuple[bool, Any]:
+        fine, output = outcome["block"](self, count)
+        return fine and not past(self), output
+
+    name = config(time=time)
+    assert rigidsim_command("run", name, "--out", "whole").exit_code == 0
+    with rigidsim.open_run("whole/free").dataset as whole:
+        unit = 2.0 ** json.loads(whole.attrs["unit_exponents"])["time"]
+        for method in (step, skip, block):
+            monkeypatch.setattr(Stepper, method.__name__, method)
+        result = rigidsim_command("run", name)
+        assert result.exit_code == 3
+        summary = json.loads(Path("runs/free/summary.json").read_text())
+        assert summary["status"] == "stopped: non-finite state"
+        assert "the largest state there was" in summary["message"]
+        assert "Euler" not in summary["message"]
+        assert broken - 1 < summary["time_reached"] <= broken  # steps are below one second here
+        with rigidsim.open_run("runs/free").dataset as kept:
+            count = kept.sizes["time"]
+            spacing = float(whole.time[1])
+            assert count == math.floor(summary["time_reached"] / spacing) + 1
+            for variable in ("time", "angular_velocity", "quaternion", "energy_drift"):
+                np.testing.assert_array_equal(kept[variable], whole[variable][:count])
+
+
+@pytest.mark.parametrize("time", ["end = 3\nsamples = 49", "end = 3000\nsamples = 4"])
+@pytest.mark.parametrize(
+    ("rates", "integrator", "rest"),
+    [
+        ("[0, 0, 1]", "", 'record = ["angular_velocity"]'),  # a steady spin, in rates alone
+        ("[0, 0, 0]", "", ""),  # a body at rest
+        ("[0, 0, 1]", 'formulation = "euler_angles"\neuler_sequence = "xyz"', ""),  # psi = 0.7 + t
+    ],
+)
+def test_a_motion_whose_series_ends_is_no_breakdown(
+    rates: str, integrator: str, rest: str, time: str, config: Config, rigidsim_command: Command
+) -> None:
+    """A Taylor series that is a polynomial would allow an infinite step, which is no state at all."""
+    body = (
+        "[body]\nprincipal_moments = [1, 2, 3]\n"
+        f"[initial]\nangular_velocity = {rates}\neuler_angles = [0, 0, 0.7]\n"
+    )
+    result = rigidsim_command("run", config(time=time, integrator=integrator, rest=rest, body=body))
+    assert result.exit_code == 0, result.output
+    with rigidsim.open_run("runs/free").dataset as dataset:
+        assert dataset.sizes["time"] in (49, 4)
+        steady = np.broadcast_to(json.loads(rates), dataset.angular_velocity.shape)
+        np.testing.assert_array_equal(dataset.angular_velocity, steady)
+        if integrator:
+            # psi grows linearly, up to rounding of its size once per step, of which there are few
+            expected = 0.7 + dataset.time.values
+            np.testing.assert_allclose(dataset.euler_angles[:, 2], expected, rtol=1e-13, atol=0)

@@ -1,0 +1,551 @@
+"""Every command on tiny experiments: what it prints, what it writes, how it ends."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rigidsim
+from rigidsim.look import viewer
+
+Config = Callable[..., str]
+Command = Callable[..., Any]
+
+
+def read(folder: str | Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((Path(folder) / "summary.json").read_text())
+    return content
+
+
+def files(folder: str | Path = ".") -> list[str]:
+    return sorted(str(p.relative_to(folder)) for p in Path(folder).rglob("*") if p.is_file())
+
+
+def no_traceback(result: Any) -> None:
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    assert "Traceback" not in result.output
+
+
+# run
+
+
+def test_run_writes_a_folder_and_prints_a_table(config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("run", config())
+    assert result.exit_code == 0, result.output
+    assert files("runs/free") == ["config.toml", "dataset.h5", "summary.json"]
+    summary = read("runs/free")
+    lines = result.stdout.splitlines()
+    assert lines[0].split() == ["free", "finished"]
+    assert f"{summary['cost']['steps']} steps, 49 of 49 samples" in result.stdout
+    for name, row in summary["invariants"].items():
+        line = next(line for line in lines if line.startswith(f"{name} "))
+        assert f"{row['largest_drift']:.2e}" in line
+        assert f"{row['bound']:.2e}" in line
+    assert "runs/free" in lines[-1]
+    assert "integrating into runs/free" in result.stderr  # progress is no result
+    assert "integrating into" not in result.stdout
+
+
+def test_run_draws_the_timeline_when_asked(config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("run", config(), "--set", "output.timeline=true")
+    assert result.exit_code == 0, result.output
+    assert files("runs/free") == ["config.toml", "dataset.h5", "summary.json", "timeline.rrd"]
+    assert "timeline" in read("runs/free")["cost"]["seconds"]
+
+
+def test_run_several_and_elsewhere(config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("run", config("a"), config("b"), "--out", "deep/er")
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in Path("deep/er").iterdir()) == ["a", "b"]
+    assert not Path("runs").exists()
+    assert result.stdout.index("a  finished") < result.stdout.index("b  finished")
+
+
+def test_run_refuses_all_before_it_starts_any(config: Config, rigidsim_command: Command) -> None:
+    bad = config("bad", time="end = 3\nsamples = 49\ntypo = 1")
+    result = rigidsim_command("run", config("good"), bad)
+    assert result.exit_code == 2
+    no_traceback(result)
+    assert "bad.toml: 1 problem in the config" in result.stderr
+    assert "[time] typo" in result.stderr
+    assert result.stdout == ""
+    assert not Path("runs").exists()
+
+
+def test_run_json_is_the_summary(config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("run", config("a"), config("b"), "--json")
+    assert result.exit_code == 0, result.output
+    printed = [json.loads(line) for line in result.stdout.splitlines()]
+    assert printed == [read("runs/a"), read("runs/b")]
+
+
+def test_set_replaces_values(config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command(
+        "run",
+        config(),
+        *("--set", "time.end=1", "--set", "time.samples=5"),
+        *("--set", "body.principal_moments[1]=1.5"),
+        *("--set", "initial.angular_velocity=[0, 0.25, 1]"),
+        *("--set", "integrator.precision=quadruple"),
+        *("--set", "limits.wall_time=1 h"),
+    )
+    assert result.exit_code == 0, result.output
+    summary = read("runs/free")
+    assert summary["body"]["principal_moments"] == [1.0, 1.5, 2.5]
+    assert summary["precision"] == "quadruple"
+    with rigidsim.open_run("runs/free").dataset as dataset:
+        assert dataset.time.values.tolist() == [0, 0.25, 0.5, 0.75, 1]
+        assert dataset.angular_velocity.values[0].tolist() == [0, 0.25, 1]
+
+
+def test_the_saved_config_is_the_run(config: Config, rigidsim_command: Command) -> None:
+    """With what --set changed, and bit for bit."""
+    rigidsim_command("run", config(), "--set", "body.principal_moments[1]=1.5")
+    result = rigidsim_command("run", "runs/free/config.toml", "--out", "again")
+    assert result.exit_code == 0, result.output
+    assert Path("again/free/config.toml").read_text() == Path("runs/free/config.toml").read_text()
+    with rigidsim.open_run("runs/free").dataset as a, rigidsim.open_run("again/free").dataset as b:
+        for name in a.variables:
+            np.testing.assert_array_equal(a[name].values, b[name].values)
+
+
+@pytest.mark.parametrize("override", ["time.end", "=3", "time.bogus=1", "time.times[3]=1", "body[0]=1"])
+def test_a_bad_set_is_a_message(override: str, config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("run", config(), "--set", override)
+    assert result.exit_code == 2
+    no_traceback(result)
+    assert result.stderr.startswith("rigidsim: free.toml: ")
+    assert not Path("runs").exists()
+
+
+def test_force_is_needed_to_overwrite(config: Config, rigidsim_command: Command) -> None:
+    assert rigidsim_command("run", config()).exit_code == 0
+    before = Path("runs/free/dataset.h5").read_bytes()
+    refused = rigidsim_command("run", config(), "--set", "time.end=1")
+    assert refused.exit_code == 2
+    no_traceback(refused)
+    assert "runs/free: holds a finished run; --force replaces it" in refused.stderr
+    assert Path("runs/free/dataset.h5").read_bytes() == before
+    assert rigidsim_command("run", config(), "--set", "time.end=1", "--force").exit_code == 0
+    assert Path("runs/free/dataset.h5").read_bytes() != before
+
+
+# plan
+
+
+def test_plan_explains_and_writes_nothing(config: Config, rigidsim_command: Command) -> None:
+    name = config(rest='record = ["angular_velocity"]')
+    before = files()
+    result = rigidsim_command("plan", name)
+    assert result.exit_code == 0, result.output
+    assert files() == before
+    assert "free  3 states, rates" in result.stdout
+    for text in ("Euler's equations", "no attitude", "wx' = ", "no torque acts", "predicted", "order 20"):
+        assert text in result.stdout
+
+
+def test_plan_json(config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("plan", config(), "--json", "--set", "integrator.formulation=rotation_matrix")
+    assert result.exit_code == 0, result.output
+    plan = json.loads(result.stdout)
+    assert plan["states"][:3] == ["wx", "wy", "wz"]
+    assert plan["state_count"] == len(plan["states"]) == 12
+    assert [row["states"] for row in plan["reasons"]] == ["wx wy wz", "r11 ... r33"]
+    assert all(row["why"] for row in plan["reasons"] + plan["left_out"] + plan["invariants"])
+    assert len(plan["equations"]) == 12
+    assert {"time", "angular_velocity", "rotation_matrix", "energy_drift"} <= set(plan["recorded"])
+    assert plan["predicted"]["dataset_bytes"] > 0
+
+
+@pytest.mark.parametrize(
+    ("time", "integrator"),
+    [
+        ("end = 20000\nsamples = 11", ""),
+        ("end = 3000\nsamples = 3001", 'formulation = "euler_angles"'),
+        ("end = 300\nsamples = 4", 'precision = "quadruple"'),
+    ],
+)
+def test_plan_predicts_the_steps(
+    time: str, integrator: str, config: Config, rigidsim_command: Command
+) -> None:
+    """Within a fifth: a pilot of many periods of the motion knows the mean step."""
+    name = config(time=time, integrator=integrator)
+    predicted = json.loads(rigidsim_command("plan", name, "--json").stdout)["predicted"]["steps"]
+    assert rigidsim_command("run", name).exit_code == 0
+    assert predicted == pytest.approx(read("runs/free")["cost"]["steps"], rel=0.2)
+
+
+# info, plot, view, schema
+
+
+def test_info_of_a_finished_run(config: Config, rigidsim_command: Command) -> None:
+    printed = rigidsim_command("run", config()).stdout.splitlines()
+    for path in ("runs/free", "runs/free/dataset.h5"):
+        result = rigidsim_command("info", path)
+        assert result.exit_code == 0, result.output
+        lines = result.stdout.splitlines()
+        assert lines[: len(printed)] == printed
+        rest = " ".join(" ".join(lines[len(printed) :]).split())
+        assert rest.startswith("dataset 49 samples of angular_velocity, quaternion, ")
+    machine = rigidsim_command("info", "runs/free", "--json")
+    assert json.loads(machine.stdout) == read("runs/free")
+
+
+@pytest.mark.parametrize("path", ["runs/nothing", "nothing.h5", "."])
+@pytest.mark.parametrize("command", ["info", "plot", "view"])
+def test_there_is_no_run(command: str, path: str, config: Config, rigidsim_command: Command) -> None:
+    config()
+    result = rigidsim_command(command, path)
+    assert result.exit_code == 2
+    no_traceback(result)
+    assert result.stderr.startswith(f"rigidsim: {path}: no run here; give a run folder")
+
+
+def test_a_damaged_dataset_is_a_message(config: Config, rigidsim_command: Command) -> None:
+    rigidsim_command("run", config())
+    Path("runs/free/dataset.h5").write_bytes(b"no HDF5")
+    for command in ("info", "plot"):
+        result = rigidsim_command(command, "runs/free")
+        assert result.exit_code == 2
+        no_traceback(result)
+        assert "dataset.h5: can't be read" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("out", "path", "begins"),
+    [
+        ([], "runs/free/figure.png", b"\x89PNG\r\n"),
+        (["--out", "x.png"], "x.png", b"\x89PNG\r\n"),
+        (["--out", "x.svg"], "x.svg", b"<?xml"),
+    ],
+)
+def test_plot(out: list[str], path: str, begins: bytes, config: Config, rigidsim_command: Command) -> None:
+    rigidsim_command("run", config())
+    result = rigidsim_command("plot", "runs/free", *out)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.strip() == path
+    content = Path(path).read_bytes()
+    assert content.startswith(begins)
+    assert len(content) > 20_000
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("x.pdf", "the suffix must be one of .png, .svg, given '.pdf'"),
+        ("x", "the suffix must be one of .png, .svg, given ''"),
+        ("no/such/folder.png", "can't be written: No such file or directory"),
+    ],
+)
+def test_plot_of_a_wrong_target(target: str, message: str, config: Config, rigidsim_command: Command) -> None:
+    rigidsim_command("run", config())
+    before = files()
+    result = rigidsim_command("plot", "runs/free", "--out", target)
+    assert result.exit_code == 2
+    no_traceback(result)
+    assert message in result.stderr
+    assert files() == before
+
+
+@pytest.mark.parametrize("web", [False, True])
+def test_view(web: bool, config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run without a timeline gets one first; the viewer's exit code is handed on."""
+    opened: list[tuple[Path, bool]] = []
+
+    def pretend(path: Path, *, web: bool) -> int:
+        opened.append((path, web))
+        return 130 if web else 0
+
+    monkeypatch.setattr(viewer, "open_viewer", pretend)
+    rigidsim_command("run", config())
+    assert not Path("runs/free/timeline.rrd").exists()
+    result = rigidsim_command("view", "runs/free", *(["--web"] if web else []))
+    assert result.exit_code == (130 if web else 0), result.output
+    assert opened == [(Path("runs/free/timeline.rrd"), web)]
+    assert Path("runs/free/timeline.rrd").stat().st_size > 10_000
+
+
+def test_schema_describes_every_table(config: Config, rigidsim_command: Command) -> None:
+    result = rigidsim_command("schema")
+    assert result.exit_code == 0
+    schema = json.loads(result.stdout)
+    assert {
+        "name",
+        "description",
+        "body",
+        "initial",
+        "loads",
+        "time",
+        "integrator",
+        "output",
+        "limits",
+    } <= set(schema["properties"])
+    for table, key in {
+        "Body": "principal_moments",
+        "Initial": "angular_velocity",
+        "Time": "samples",
+        "Integrator": "euler_sequence",
+        "Output": "timeline_rows",
+        "Limits": "max_drift",
+    }.items():
+        assert key in schema["$defs"][table]["properties"]
+        assert schema["$defs"][table]["additionalProperties"] is False
+    assert schema["additionalProperties"] is False
+
+
+@pytest.mark.skipif(importlib.util.find_spec("jsonschema") is None, reason="jsonschema isn't installed")
+def test_schema_is_valid_and_accepts_a_config(config: Config, rigidsim_command: Command) -> None:
+    import tomllib
+
+    import jsonschema
+
+    schema = json.loads(rigidsim_command("schema").stdout)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    table = tomllib.loads(Path(config()).read_text())
+    jsonschema.validate(table, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(table | {"typo": 1}, schema)
+
+
+# Guards
+
+GUARDS = {
+    "max_steps": ("end = 1e6\nevery = 1", "max_steps = 700", ""),
+    "wall_time": ("end = 1e8\nevery = 1", 'wall_time = "0.2 s"', 'precision = "extended"'),
+    "max_drift": ("end = 1e6\nevery = 1", "max_drift = 3e-6", 'precision = "single"'),
+}
+
+
+@pytest.mark.parametrize("guard", GUARDS)
+def test_a_guard_ends_the_run_and_keeps_the_samples(
+    guard: str, config: Config, rigidsim_command: Command
+) -> None:
+    time, limit, integrator = GUARDS[guard]
+    name = config(time=time, integrator=integrator, rest=f"[limits]\n{limit}")
+    result = rigidsim_command("run", name)
+    assert result.exit_code == 3
+    no_traceback(result)
+    summary = read("runs/free")
+    assert summary["status"] == f"stopped: {guard}"
+    assert summary["exit_code"] == 3
+    assert f"[limits] {guard}" in summary["message"]
+    assert summary["message"] in result.stderr
+    assert f"free  stopped: {guard}" in result.stdout
+    assert summary["bit_for_bit"]["claim"] is False
+    if guard == "max_steps":
+        # asked between chunks of a tenth of a second, or blocks of at most 4096 steps
+        assert 700 <= summary["cost"]["steps"] < 1_000_000
+    if guard == "max_drift":
+        assert max(row["largest_drift"] for row in summary["invariants"].values()) > 3e-6
+    with rigidsim.open_run("runs/free").dataset as dataset:
+        count = dataset.sizes["time"]
+        assert 0 < count == summary["samples"] < summary["samples_planned"]
+        np.testing.assert_array_equal(dataset.time, np.arange(count))
+        assert dataset.attrs["status"] == f"stopped: {guard}"
+        assert all(np.isfinite(dataset[v]).all() for v in dataset.data_vars)
+    info = rigidsim_command("info", "runs/free")
+    assert info.exit_code == 0
+    assert f"free  stopped: {guard}" in info.stdout
+    assert f"{count:,} samples of " in " ".join(info.stdout.split())
+    assert rigidsim_command("plot", "runs/free", "--out", "x.png").exit_code == 0
+    assert Path("x.png").stat().st_size > 20_000
+
+
+def test_a_guard_that_is_not_reached_changes_nothing(config: Config, rigidsim_command: Command) -> None:
+    limits = "[limits]\nmax_steps = 1_000_000\nmax_drift = 1e-9\nwall_time = 3600"
+    assert rigidsim_command("run", config(rest=limits)).exit_code == 0
+    assert rigidsim_command("run", config("plain")).exit_code == 0
+    with rigidsim.open_run("runs/free").dataset as a, rigidsim.open_run("runs/plain").dataset as b:
+        for name in a.variables:
+            np.testing.assert_array_equal(a[name].values, b[name].values)
+
+
+def test_a_stopped_run_does_not_stop_the_next(config: Config, rigidsim_command: Command) -> None:
+    stopped = config("a", time="end = 1e6\nevery = 1", rest="[limits]\nmax_steps = 10")
+    result = rigidsim_command("run", stopped, config("b"))
+    assert result.exit_code == 3
+    assert read("runs/a")["status"] == "stopped: max_steps"
+    assert read("runs/b")["status"] == "finished"
+
+
+# Outside of any command
+
+
+def test_an_unknown_command(rigidsim_command: Command) -> None:
+    result = rigidsim_command("rnu")
+    assert result.exit_code == 2
+    assert "rnu" in result.stderr
+
+
+def test_a_missing_config(rigidsim_command: Command) -> None:
+    result = rigidsim_command("run", "nowhere.toml")
+    assert result.exit_code == 2
+    no_traceback(result)
+    assert "nowhere.toml" in result.stderr
+    assert "can't be read: No such file or directory" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["run", "plan", "info", "view", "plot", "schema"])
+def test_each_command_helps_with_an_example(command: str, rigidsim_command: Command) -> None:
+    listed, own = rigidsim_command("--help"), rigidsim_command(command, "--help")
+    assert listed.exit_code == own.exit_code == 0
+    assert f" {command} " in listed.stdout
+    assert f"Example: rigidsim {command}" in " ".join(own.stdout.split())
+
+
+def python(code: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=cwd, timeout=60
+    )
+
+
+def test_version() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "rigidsim", "--version"], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stdout) == (0, f"rigidsim {rigidsim.__version__}\n")
+
+
+HEAVY = "{'rerun', 'xarray', 'matplotlib', 'heyoka', 'dask', 'h5py', 'numpy'}"
+
+
+def test_help_loads_nothing_heavy() -> None:
+    done = python(
+        "import sys\nfrom rigidsim.cli import app\n"
+        "try: app(['--help'])\nexcept SystemExit: pass\n"
+        f"print('loaded:', sorted({HEAVY} & set(sys.modules)))"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Usage:" in done.stdout
+    assert done.stdout.splitlines()[-1] == "loaded: []"
+
+
+def test_importing_loads_nothing_prints_nothing_and_writes_nothing(tmp_path: Path) -> None:
+    done = python(
+        "import sys\nopened = []\n"
+        "def hook(event, args):\n"
+        "    writes = event == 'open' and isinstance(args[1], str) and set('wax+') & set(args[1])\n"
+        "    if writes or event in ('os.mkdir', 'os.rename', 'os.remove', 'socket.connect'):\n"
+        "        opened.append((event, *args))\n"
+        "sys.dont_write_bytecode = True\n"
+        "sys.addaudithook(hook)\n"
+        "import rigidsim\n"
+        f"assert not {HEAVY} & set(sys.modules), {HEAVY} & set(sys.modules)\n"
+        "assert not opened, opened\n"
+        "assert set(rigidsim.__all__) <= set(dir(rigidsim)) | set(rigidsim._PLACES)",
+        cwd=tmp_path,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_names_of_the_package_stay_functions() -> None:
+    """Whichever is used first, and whatever is imported beside it."""
+    done = python(
+        "import rigidsim, rigidsim.cli\n"
+        "from rigidsim import open_run\nfrom rigidsim.archive import Run\n"
+        "import rigidsim.runner, rigidsim.planner\n"
+        "names = [rigidsim.run, rigidsim.plan, rigidsim.load, rigidsim.parse, rigidsim.open_run]\n"
+        "print([type(n).__name__ for n in names])"
+    )
+    assert done.stdout.strip() == str(["function"] * 5), done.stderr
+
+
+# What a terminal shows
+
+TOP = (
+    "[body]\nprincipal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 0.5]\n"
+    "[initial]\neuler_angles = [0, 0.5, 0]\nangular_velocity = [0, 0, 8.123456789]\n"
+    '[[loads]]\nkind = "uniform_gravity"\n'
+)
+FLIGHT = (
+    "[body]\nprincipal_moments = [1, 2, 2.5]\nmass = 1.23456789\n"
+    "[initial]\nangular_velocity = [-0.123456789, -1.23456789e-5, 0.5]\n"
+    "position = [0, 0, 0]\nvelocity = [-1.23456789, 2.3456789e-3, 1]\n"
+)
+
+
+@pytest.mark.parametrize("body", [TOP, FLIGHT])
+def test_the_summary_fits_eighty_columns(body: str, config: Config) -> None:
+    """One line per invariant, with its drift, and no word broken."""
+    from rich.console import Console
+
+    from rigidsim import report
+
+    summary = rigidsim.run(config(body=body)).summary
+    screen = Console(width=80, record=True, file=io.StringIO(), highlight=False)
+    report.print_summary(summary, "runs/[bold]free", screen)
+    lines = screen.export_text().splitlines()
+    assert max(map(len, lines)) <= 80
+    for name, row in summary["invariants"].items():
+        (line,) = [line for line in lines if line.startswith(f"{name} ")]
+        assert len(line.split()) == 5
+        assert f"{row['largest_drift']:.2e}" in line
+        assert f"{row['final_drift']:.2e}" in line
+    text = " ".join(" ".join(lines).split())
+    for row in summary["invariants"].values():
+        assert f"{row['scale_name']} (" in text
+    assert lines[-1] == "folder   runs/[bold]free"  # a path is no markup
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_bar_is_one_line(width: int, config: Config) -> None:
+    """Name, bar, percentage, rate and time left, none of them cut."""
+    from rich.console import Console
+
+    from rigidsim.prepare import prepare
+    from rigidsim.progress import TerminalObserver
+    from rigidsim.solve.advance import Progress
+
+    prepared = prepare(rigidsim.load(config("a_name_of_more_than_twenty_four_letters", time="end = 1000")))
+    screen = io.StringIO()
+    console = Console(width=width, file=screen, force_terminal=True, color_system=None)
+    with TerminalObserver(console) as observer:
+        observer.started(prepared, Path("runs/x"))
+        observer._begin -= 3600.0  # an hour ago
+        observer.progressed(Progress(11, steps=7_200_000_000, time=250.0))
+        observer._bar.refresh()
+        shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n")
+        line = next(x for x in reversed(shown.splitlines()) if "%" in x)
+        assert len(line.rstrip()) <= width
+        assert line.startswith("a_name_of_more_than_twe… ━")
+        assert " 25.0 %" in line
+        assert "2 M steps/s" in line
+        assert "3:00:00 left" in line  # three quarters at the pace of one quarter an hour
+        assert ("t = 250 s" in line) == (width >= 100)
+        observer.phase("dataset")
+        observer._bar.refresh()
+        shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n")
+        last = [x for x in shown.splitlines() if x.strip()][-1]
+        assert last.startswith("writing dataset.h5")
+        assert "left" not in last  # how long it takes isn't known
+
+
+def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[str]) -> None:
+    from rigidsim.prepare import prepare
+    from rigidsim.progress import LineObserver
+    from rigidsim.solve.advance import Progress
+
+    prepared = prepare(rigidsim.load(config(time="start = 100\nend = 500")))
+    with LineObserver() as observer:
+        observer.started(prepared, Path("runs/free"))
+        observer.progressed(Progress(11, steps=1, time=100.1))  # too soon for another line
+        observer._begin -= 100.0
+        observer._latest -= 100.0
+        observer.progressed(Progress(11, steps=500_000, time=200.0))
+        observer.phase("timeline")
+    assert capsys.readouterr().err.splitlines() == [
+        "free: integrating into runs/free",
+        "free: 25.0 %, t = 200 s, 5 k steps/s, 0:05:00 left",
+        "free: drawing timeline.rrd",
+    ]

@@ -1,0 +1,416 @@
+"""``dataset.h5``: every reader opens it, everything is labelled, every digit of every precision is in it."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import h5py
+import heyoka as hy
+import mpmath
+import netCDF4
+import numpy as np
+import pytest
+import xarray
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rigidsim
+from rigidsim.prepare import Prepared, prepare
+from rigidsim.solve.advance import Advance
+from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.winding import Winding
+
+PRECISIONS = ['"single"', '"double"', '"extended"', '"quadruple"', "50"]
+PARTS = {'"single"': 1, '"double"': 1, '"extended"': 2, '"quadruple"': 3, "50": 4}
+
+HEAVY_TOP = """\
+name = "top"
+description = "a comment"
+[body]
+principal_moments = [2, 2, 1]
+mass = 1
+center_of_mass = [0, 0, 0.5]
+[initial]
+euler_angles = [0, 0.5, 0]
+angular_velocity = [0, 0, 8]
+[[loads]]
+kind = "uniform_gravity"
+[time]
+end = 1
+samples = 33
+[integrator]
+formulation = "euler_angles"
+[output]
+timeline = false
+"""
+
+# variable: (dims beside time, units, frame or None, invariant), from the interface's section 3
+FREE = {
+    "angular_velocity": (("body_axis",), "rad s-1", "body axes", False),
+    "quaternion": (("quaternion_component",), "1", "body to space", False),
+    "angular_momentum": (("space_axis",), "kg m2 s-1", "space axes", True),
+    "angular_momentum_norm": ((), "kg m2 s-1", None, True),
+    "energy": ((), "J", None, True),
+}
+TOP = {
+    "angular_velocity": (("body_axis",), "rad s-1", "body axes", False),
+    "quaternion": (("quaternion_component",), "1", "body to space", False),
+    "euler_angles": (("euler_angle",), "rad", "body to space", False),
+    "angular_momentum": (("space_axis",), "kg m2 s-1", "space axes", False),
+    "angular_momentum_norm": ((), "kg m2 s-1", None, False),
+    "angular_momentum_vertical": ((), "kg m2 s-1", "space axes", True),
+    "angular_momentum_axial": ((), "kg m2 s-1", "body axes", True),
+    "energy": ((), "J", None, True),
+    "potential_energy": ((), "J", None, False),
+}
+LABELS = {
+    "body_axis": ["x", "y", "z"],
+    "space_axis": ["X", "Y", "Z"],
+    "quaternion_component": ["w", "x", "y", "z"],
+    "euler_angle": ["phi", "theta", "psi"],
+}
+
+
+@pytest.fixture(scope="module", params=PRECISIONS)
+def free(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, free_body: Callable[..., str]
+) -> tuple[str, rigidsim.Run]:
+    """A free body in each precision, with its name."""
+    text = free_body(precision=request.param)
+    return request.param, rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("free"))
+
+
+@pytest.fixture(scope="module")
+def top(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
+    """A heavy top in Euler angles."""
+    return rigidsim.run(rigidsim.parse(HEAVY_TOP), out=tmp_path_factory.mktemp("top"))
+
+
+def test_every_reader_reads_the_same(free: tuple[str, rigidsim.Run]) -> None:
+    path = free[1].folder.dataset
+    with (
+        xarray.open_dataset(path) as plain,
+        xarray.open_dataset(path, engine="h5netcdf") as other,
+        netCDF4.Dataset(path) as old,
+        h5py.File(path, "r") as raw,
+    ):
+        assert {"time", *FREE} <= set(map(str, plain.variables))
+        assert set(map(str, plain.variables)) == set(old.variables) == set(raw)
+        for name in map(str, plain.variables):
+            values = plain[name].values
+            assert values.shape == tuple(len(LABELS.get(d, range(49))) for d in plain[name].dims)
+            np.testing.assert_array_equal(values, other[name].values, strict=True)
+            np.testing.assert_array_equal(values, old[name][:])
+            if values.dtype == np.float64:
+                np.testing.assert_array_equal(values, raw[name][:], strict=True)
+
+
+def test_times_stay_numbers(free: tuple[str, rigidsim.Run]) -> None:
+    """Units that some readers would turn into dates are avoided."""
+    with xarray.open_dataset(free[1].folder.dataset) as dataset:
+        assert dataset.time.dtype == np.float64
+        assert dataset.time.attrs["units"] == "s"
+
+
+@pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump isn't installed")
+def test_ncdump_reads_it(free: tuple[str, rigidsim.Run]) -> None:
+    done = subprocess.run(
+        ["ncdump", "-h", str(free[1].folder.dataset)], capture_output=True, text=True, check=True
+    )
+    assert "time = 49 ;" in done.stdout
+    assert "double angular_velocity(time, body_axis) ;" in done.stdout
+    assert 'angular_velocity:units = "rad s-1" ;' in done.stdout
+    assert "energy:invariant = 1" in done.stdout
+
+
+@pytest.mark.parametrize("which", ["free", "top"])
+def test_variables_carry_labels_and_attributes(
+    which: str, free: tuple[str, rigidsim.Run], top: rigidsim.Run
+) -> None:
+    expected, path = (FREE, free[1].folder.dataset) if which == "free" else (TOP, top.folder.dataset)
+    with xarray.open_dataset(path) as dataset:
+        used = {dim for dims, *_ in expected.values() for dim in dims}
+        assert set(map(str, dataset.coords)) - {"time", "time_lo", "time_lo2", "time_lo3"} == used
+        for dim in used:
+            assert dataset[dim].values.tolist() == LABELS[dim]
+        plain = [v for v in map(str, dataset.data_vars) if not re.search(r"_lo\d*$|_drift$", v)]
+        assert set(plain) == set(expected)
+        for name, (dims, units, frame, invariant) in expected.items():
+            variable = dataset[name]
+            assert variable.dims == ("time", *dims)
+            assert variable.attrs["units"] == units
+            assert len(variable.attrs["long_name"]) > 5
+            assert variable.attrs.get("frame") == (frame if frame else None)
+            assert variable.attrs.get("invariant", 0) == int(invariant)
+            assert (f"{name}_drift" in dataset) == invariant
+
+
+def test_euler_angles_name_their_sequence(top: rigidsim.Run) -> None:
+    with top.dataset as dataset:
+        assert dataset.euler_angles.attrs["euler_sequence"] == "zxz"
+        assert dataset.euler_angles.attrs["convention"] == "intrinsic"
+
+
+@pytest.mark.parametrize("which", ["free", "top"])
+def test_a_drift_is_what_its_attributes_say(
+    which: str, tmp_path: Path, free_body: Callable[..., str]
+) -> None:
+    """Recomputed from the recorded values; a loose tolerance makes it far larger than rounding."""
+    text = (free_body() if which == "free" else HEAVY_TOP).replace(
+        "[integrator]\n", "[integrator]\ntolerance = 1e-6\n"
+    )
+    invariants = [name for name, row in (FREE if which == "free" else TOP).items() if row[3]]
+    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
+        sizes = []
+        for name in invariants:
+            drift = dataset[f"{name}_drift"]
+            values, scale = dataset[name].values, drift.attrs["scale"]
+            change = values - values[0]
+            expected = np.linalg.norm(change, axis=1) if change.ndim == 2 else change
+            # values are rounded to 2^-53 of their size, which is below 4 scales; twice, and sqrt(3) parts
+            bound = 16 * 2.0**-53
+            np.testing.assert_allclose(drift.values, expected / scale, rtol=0, atol=bound)
+            assert drift.attrs["units"] == "1"
+            assert drift.attrs["drift_of"] == name
+            assert drift.attrs["scale_units"] == dataset[name].attrs["units"]
+            assert len(drift.attrs["scale_name"]) > 5
+            assert "(value - initial) / scale" in drift.attrs["definition"]
+            assert drift.values[0] == 0.0
+            sizes.append(np.abs(drift.values).max())
+    assert max(sizes) > 1e3 * 2.0**-53  # so the comparison above was no comparison of zeros
+
+
+def test_root_attributes_tell_where_it_comes_from(free: tuple[str, rigidsim.Run]) -> None:
+    run = free[1]
+    with xarray.open_dataset(run.folder.dataset) as dataset:
+        attributes = dataset.attrs
+    text = run.folder.config.read_text()
+    assert attributes["config"] == text
+    assert attributes["config_sha256"] == hashlib.sha256(text.encode()).hexdigest()
+    assert attributes["title"] == "free"
+    assert attributes["status"] == "finished"
+    assert attributes["Conventions"].startswith("CF-")
+    assert attributes["version_rigidsim"] == rigidsim.__version__
+    assert attributes["version_heyoka"] == hy.__version__
+    assert attributes["version_numpy"] == np.__version__
+    assert {"version_python", "code_llvm", "cpu_model", "code_target_cpu"} <= set(attributes)
+    assert {"compact_mode", "batch_size", "high_accuracy", "code_fast_math", "taylor_order"} <= set(
+        attributes
+    )
+    assert attributes["steps"] == run.summary["cost"]["steps"] > 0
+    assert attributes["wall_seconds"] > 0
+    assert attributes["cpu_seconds"] > 0
+    for moment in ("started_at", "finished_at"):
+        assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", attributes[moment])
+
+
+def test_the_summary_knows_the_dataset(free: tuple[str, rigidsim.Run]) -> None:
+    run = free[1]
+    content = run.folder.dataset.read_bytes()
+    assert run.summary["dataset_sha256"] == hashlib.sha256(content).hexdigest()
+    assert run.summary["samples"] == run.summary["samples_planned"] == 49
+
+
+def test_only_doubles_and_texts_are_stored(free: tuple[str, rigidsim.Run]) -> None:
+    """netCDF4 readers crash on native long double; its digits are in the residuals."""
+    precision, run = free
+    with h5py.File(run.folder.dataset, "r") as raw:
+        kinds = {name: raw[name].dtype for name in raw}
+        texts = {name for name, kind in kinds.items() if h5py.check_string_dtype(kind)}
+        assert texts == {"body_axis", "space_axis", "quaternion_component"}
+        assert {kind for name, kind in kinds.items() if name not in texts} == {np.dtype("<f8")}
+        residuals = {name.removeprefix("energy") for name in raw if re.fullmatch(r"energy(_lo\d*)?", name)}
+    assert residuals == set(["", "_lo", "_lo2", "_lo3"][: PARTS[precision]])
+
+
+def test_long_runs_are_chunked_and_compressed(tmp_path: Path, free_body: Callable[..., str]) -> None:
+    run = rigidsim.run(rigidsim.parse(free_body("end = 4\nsamples = 8195")), out=tmp_path)
+    with h5py.File(run.folder.dataset, "r") as raw:
+        for name in ("time", "angular_velocity", "quaternion", "energy", "energy_drift"):
+            variable = raw[name]
+            assert variable.shape[0] == 8195
+            assert variable.chunks == (8192, *variable.shape[1:])
+            assert (variable.compression, variable.compression_opts) == ("gzip", 4)
+            assert variable.shuffle
+
+
+# Times
+
+
+def _exact(dataset: xarray.Dataset, name: str) -> list[Fraction]:
+    """Exact values of a flattened variable: the sum of its parts, as the file's attribute says."""
+    parts = [name + suffix for suffix in ("", "_lo", "_lo2", "_lo3") if name + suffix in dataset]
+    columns = [dataset[part].values.ravel() for part in parts]
+    return [sum((Fraction(float(x)) for x in row), Fraction(0)) for row in zip(*columns, strict=True)]
+
+
+def _rounded(value: Fraction, bits: int) -> Fraction:
+    """Nearest number of so many bits, ties to even."""
+    if value == 0:
+        return value
+    exponent = math.floor(math.log2(abs(value))) + 1 - bits
+    while abs(value) / Fraction(2) ** exponent >= 2**bits:
+        exponent += 1
+    return round(value / Fraction(2) ** exponent) * Fraction(2) ** exponent
+
+
+def test_dyadic_times_are_exact(free: tuple[str, rigidsim.Run]) -> None:
+    with free[1].dataset as dataset:
+        assert _exact(dataset, "time") == [Fraction(i, 16) for i in range(49)]
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_listed_times_are_the_decimals_as_written(
+    precision: str, tmp_path: Path, free_body: Callable[..., str]
+) -> None:
+    written = ["0", "0.1", "0.3", "1", "1.2345678901234567890123456789", "2.7"]
+    text = free_body(f"times = [{', '.join(written)}]", precision=precision)
+    prepared = prepare(rigidsim.parse(text))
+    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
+        times = _exact(dataset, "time")
+    assert times == [_rounded(Fraction(t), prepared.precision.bits) for t in written]
+
+
+def test_a_decimal_grid_is_i_times_span_over_intervals(tmp_path: Path, free_body: Callable[..., str]) -> None:
+    """Never added up: sample i is the double nearest to i/10, the last one the end itself."""
+    with rigidsim.run(rigidsim.parse(free_body("end = 3.3\nevery = 0.1")), out=tmp_path).dataset as dataset:
+        times = dataset.time.values
+    assert len(times) == 34
+    assert times[-1] == 3.3
+    # i * 3.3 / 33: two roundings of half an ulp and the half of 3.3 itself
+    np.testing.assert_allclose(times, np.arange(34) / 10, rtol=1.5 * 2.0**-52, atol=0)
+
+
+def test_a_start_that_is_not_zero(tmp_path: Path, free_body: Callable[..., str]) -> None:
+    text = free_body("start = 1.5\nend = 3.5\nsamples = 5")
+    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
+        assert dataset.time.values.tolist() == [1.5, 2.0, 2.5, 3.0, 3.5]
+        assert dataset.angular_velocity.values[0].tolist() == [0.3, 1.0, 0.5]
+
+
+# Every digit
+
+
+def _states(prepared: Prepared) -> np.ndarray:
+    """The states at the samples, integrated again."""
+    pieces = []
+    winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
+    advance = Advance(
+        stepper,
+        prepared.clock,
+        winding,
+        prepared.precision,
+        lambda first, times, states, turns: pieces.append(states),
+        lambda progress: None,
+    )
+    advance.run()
+    return np.concatenate(pieces)
+
+
+def _value(number: Any, bits: int) -> Fraction:
+    """Exact value of a heyoka scalar by way of its decimal digits, which are enough to come back."""
+    if isinstance(number, (float, np.float32)):
+        return Fraction(float(number))
+    if isinstance(number, np.longdouble):
+        mantissa, exponent = np.frexp(number)
+        return Fraction(int(np.ldexp(mantissa, 64))) * Fraction(2) ** (int(exponent) - 64)
+    with mpmath.workprec(bits):
+        sign, mantissa, exponent, _ = mpmath.mpf(str(number))._mpf_
+    return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+def test_the_parts_add_up_to_the_state(free: tuple[str, rigidsim.Run]) -> None:
+    prepared = prepare(rigidsim.load(free[1].folder.config))
+    states = _states(prepared)
+    bits = prepared.precision.bits
+    units = [Fraction(2) ** e for e in prepared.system.state_exponents]
+    expected = [[_value(x, bits) * u for x, u in zip(row, units, strict=True)] for row in states]
+    with free[1].dataset as dataset:
+        rates, quaternions = _exact(dataset, "angular_velocity"), _exact(dataset, "quaternion")
+    assert rates == [x for row in expected for x in row[:3]]
+    assert quaternions == [x for row in expected for x in row[3:]]
+    if bits > 53:  # and the residuals do say something that a double doesn't
+        assert sum(Fraction(float(x)) != x for x in quaternions) > len(quaternions) // 2
+
+
+@pytest.mark.parametrize("precision", ['"extended"', '"quadruple"', "50"])
+def test_the_lead_is_the_nearest_double(
+    precision: str, tmp_path: Path, free_body: Callable[..., str]
+) -> None:
+    text = free_body(precision=precision)
+    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
+        for name in ("time", "angular_velocity", "quaternion", "angular_momentum", "energy"):
+            exact = _exact(dataset, name)
+            assert dataset[name].values.ravel().tolist() == [float(x) for x in exact]  # correctly rounded
+            assert dataset[f"{name}_lo"].attrs["residual_of"] == name
+            assert f"{name}_lo + {name}" in dataset[name].attrs["exact_value"]
+
+
+NAMES: list[str | int] = ["single", "double", "extended", "quadruple", 20, 50, 100, 250]
+
+
+def _array(precision: Precision, values: list[Any]) -> np.ndarray:
+    return np.array(values, dtype=precision.scalar)
+
+
+def _number(precision: Precision, value: Fraction) -> Any:
+    with mpmath.workprec(2000):
+        return precision.number(mpmath.mpf(value.numerator) / value.denominator)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_parts_are_exact(name: str | int, data: st.DataObject) -> None:
+    precision = precision_of(name)
+    bits = precision.bits
+    # away from where float64 itself ends (2^-1074) or float32 does (2^-126, 2^128)
+    lowest, highest = (-120, 120) if name == "single" else (-1000 + bits, 900)
+    numbers = data.draw(
+        st.lists(
+            st.tuples(st.integers(-(2**bits) + 1, 2**bits - 1), st.integers(lowest, highest)),
+            min_size=1,
+            max_size=5,
+        )
+    )
+    values = [Fraction(m) * Fraction(2) ** (e - bits) for m, e in numbers if e]
+    if not values:
+        return
+    parts = precision.parts(_array(precision, [_number(precision, v) for v in values]))
+    assert len(parts) == precision.part_count
+    for part in parts:
+        assert part.dtype == np.float64
+    for i, value in enumerate(values):
+        assert sum((Fraction(float(part[i])) for part in parts), Fraction(0)) == value
+        assert float(parts[0][i]) == float(value)  # Fraction's conversion rounds correctly
+        total = mpmath.mpf(0)
+        with mpmath.workprec(bits):  # smallest first, in the working precision, as a reader would
+            for part in reversed(parts):
+                total += mpmath.mpf(float(part[i]))
+            assert total == mpmath.mpf(value.numerator) / value.denominator
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parts_keep_the_signs_of_zeros_and_what_is_not_finite(name: str | int) -> None:
+    precision = precision_of(name)
+
+    def scalar(value: float) -> Any:
+        return hy.real(value, precision.bits) if precision.scalar is hy.real else precision.scalar(value)
+
+    special = [0.0, -0.0, math.inf, -math.inf, math.nan, 1.5]
+    lead, *rest = precision.parts(_array(precision, [scalar(x) for x in special]))
+    np.testing.assert_array_equal(lead, special)
+    assert np.signbit(lead).tolist()[:4] == [False, True, False, True]
+    for part in rest:
+        assert part.tolist() == [0.0] * 6
+        assert np.signbit(part[:2]).tolist() == [False, True]  # -0.0 + 0.0 would lose the sign
