@@ -8,14 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import heyoka as hy
 
 from rigidsim.model.rotations import Expression, ExpressionMatrix
 from rigidsim.model.scaling import Scaling
-from rigidsim.scene.context import norm
+from rigidsim.scene.context import dot, norm
 from rigidsim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from rigidsim.model.loads import Term
+    from rigidsim.model.mechanics import Mechanics
 
 Number = Callable[[Any], Any]
 """From an mpf to the working precision's scalar, rounded once."""
@@ -71,49 +75,38 @@ def negligible(context: Any, value: Any, scale: Any) -> bool:
     return abs(value) <= abs(scale) * context.mpf(2) ** (24 - context.prec)
 
 
-def rate_equations(
-    scene: Scene,
-    numbers: ScaledNumbers,
-    states: list[Expression],
-    vertical: list[Expression] | None,
-    number: Number,
-) -> list[Expression]:
+def rate_equations(m: Mechanics, torque: list[Term]) -> list[Expression]:
     """Euler's equations I w' = (I w) x w + torque, solved for the scaled rates' derivatives.
 
     Written as quadratic forms in the rates, so that principal and arbitrary body axes are one case: in
     principal axes the coefficients that vanish are left out (Landau & Lifshitz, Mechanics, eq. 36.4-5).
 
     Args:
-        states: the three scaled rates.
-        vertical: unit vector against gravity in body axes, where gravity pulls on a fixed-point body.
+        torque: terms of all loads, body axes, internal units.
     """
-    context = scene.context
+    context, numbers, states = m.scene.context, m.numbers, m.rate_states
     zero = context.zero
     inverse, inertia, units = numbers.inverse_inertia, numbers.inertia, numbers.rate_units
-    scale = max(abs(x) for row in inverse for x in row) * max(abs(x) for row in inertia for x in row)
+    largest_inverse = max(abs(x) for row in inverse for x in row)
+    scale = largest_inverse * max(abs(x) for row in inertia for x in row)
     result = []
     for i in range(3):
         quadratic: dict[tuple[int, int], Any] = {}
-        linear = [zero] * 3
-        for (m, a, b), sign in LEVI_CIVITA.items():
+        for (axis, a, b), sign in LEVI_CIVITA.items():
             for j in range(3):
                 pair = (min(j, b), max(j, b))
-                term = sign * inverse[i][m] * inertia[a][j] * units[j] * units[b] / units[i]
+                term = sign * inverse[i][axis] * inertia[a][j] * units[j] * units[b] / units[i]
                 quadratic[pair] = quadratic.get(pair, zero) + term
-            if numbers.arm is not None:
-                linear[a] += sign * inverse[i][m] * numbers.arm[b] / units[i]
         terms = [
-            number(c) * (states[j] * states[b])
+            m.number(c) * (states[j] * states[b])
             for (j, b), c in quadratic.items()
             if not negligible(context, c, scale * units[j] * units[b] / units[i])
         ]
-        if vertical is not None and numbers.arm is not None:
-            largest = max(abs(x) for x in numbers.arm) * max(abs(x) for row in inverse for x in row)
-            terms += [
-                number(c) * vertical[a]
-                for a, c in enumerate(linear)
-                if not negligible(context, c, largest / units[i])
-            ]
+        for vector, expression in torque:
+            coefficient = dot(inverse[i], vector) / units[i]
+            size = largest_inverse * max(abs(x) for x in vector) / units[i]
+            if not negligible(context, coefficient, size):
+                terms.append(m.number(coefficient) * expression)
         result.append(hy.sum(terms) if terms else hy.expression(0.0))
     return result
 
@@ -137,15 +130,13 @@ def vertical_equations(vertical: list[Expression], rates: list[Expression]) -> l
     ]
 
 
-def flight_equations(
-    scene: Scene, scaling: Scaling, velocity: list[Expression], number: Number
-) -> tuple[list[Expression], list[Expression]]:
-    """x' = v and v' = g in the units of position and speed."""
-    context = scene.context
-    ratio = number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
-    gravity = scene.gravity or [context.zero] * 3
-    pull = [context.ldexp(g, scaling.time - scaling.speed) for g in gravity]
-    return (
-        [ratio * v for v in velocity],
-        [number(p) * hy.expression(1.0) if p != 0 else hy.expression(0.0) for p in pull],
-    )
+def flight_equations(m: Mechanics, force: list[Term]) -> tuple[list[Expression], list[Expression]]:
+    """x' = v and v' = force over mass, in the units of position and speed."""
+    assert m.velocity is not None
+    context, scaling = m.scene.context, m.scaling
+    ratio = m.number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
+    accelerations = []
+    for i in range(3):
+        terms = [m.number(vector[i]) * expression for vector, expression in force if vector[i] != 0]
+        accelerations.append(hy.sum(terms) if terms else hy.expression(0.0))
+    return [ratio * v for v in m.velocity], accelerations

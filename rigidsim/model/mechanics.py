@@ -5,7 +5,7 @@ One object that observables and invariants are written against: what a scene doe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -13,6 +13,7 @@ import heyoka as hy
 
 from rigidsim.model.dynamics import Number, ScaledNumbers
 from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.loads import GravityGradientModel, LoadModel, Term, quadratic_form
 from rigidsim.model.rotations import Expression, ExpressionMatrix, apply
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene.context import dot
@@ -31,6 +32,7 @@ class Mechanics:
         vertical: unit vector against gravity, body axes; None where no torque needs it.
         position, velocity: states in their own units; None unless carried.
         number: mpf to the working precision.
+        loads: all that act.
     """
 
     scene: Scene
@@ -42,6 +44,7 @@ class Mechanics:
     position: list[Expression] | None
     velocity: list[Expression] | None
     number: Number
+    loads: list[LoadModel] = field(default_factory=list)
 
     @cached_property
     def rates(self) -> list[Expression]:
@@ -86,19 +89,45 @@ class Mechanics:
         return 0.5 * hy.sum([w * m for w, m in zip(self.rates, self.momentum_body, strict=True)])
 
     @cached_property
+    def torque(self) -> list[Term]:
+        """Of all loads, body axes, internal units of energy."""
+        return [term for load in self.loads for term in load.torque(self)]
+
+    @cached_property
+    def force(self) -> list[Term]:
+        """Acceleration of the centre of mass by all loads, space axes."""
+        return [term for load in self.loads for term in load.force(self)]
+
+    @cached_property
     def potential_energy(self) -> Expression | None:
-        """M g l above the fixed point, or -M g . x in free flight; None without gravity."""
-        context, scene, scaling = self.scene.context, self.scene, self.scaling
-        if self.vertical is not None and self.numbers.arm is not None:
-            return hy.sum(
-                [self.number(a) * v for a, v in zip(self.numbers.arm, self.vertical, strict=True) if a]
-            )
-        mass = scene.body.mass
-        if self.position is None or scene.gravity is None or mass is None:
-            return None
-        weights = [context.ldexp(-mass * g, scaling.length - scaling.energy) for g in scene.gravity]
-        terms = [self.number(k) * x for k, x in zip(weights, self.position, strict=True) if k]
+        """Of the loads that are conservative; None where none is."""
+        parts = [load.potential(self) for load in self.loads if load.conservative]
+        found = [part for part in parts if part is not None]
+        return hy.sum(found) if found else None
+
+    @cached_property
+    def power(self) -> Expression | None:
+        """Of the loads without a potential, internal units of energy over time; None without such loads."""
+        context, terms = self.scene.context, []
+        for load in self.loads:
+            if load.conservative:
+                continue
+            for vector, expression in load.torque(self):
+                pairs = zip(vector, self.rates, strict=True)
+                terms.append(expression * hy.sum([self.number(x) * w for x, w in pairs if x != 0]))
+            if self.velocity is not None and self.scene.body.mass is not None:
+                # force per mass times mass times speed
+                scale = context.ldexp(self.scene.body.mass, 2 * self.scaling.speed - self.scaling.energy)
+                for vector, expression in load.force(self):
+                    pairs = zip(vector, self.velocity, strict=True)
+                    along = hy.sum([self.number(scale * x) * v for x, v in pairs if x != 0])
+                    terms.append(expression * along)
         return hy.sum(terms) if terms else None
+
+    @property
+    def conserves_energy(self) -> bool:
+        """Whether every load has a potential that doesn't depend on time."""
+        return all(load.conservative for load in self.loads)
 
     @cached_property
     def energy(self) -> Expression:
@@ -115,28 +144,53 @@ class Mechanics:
 
     @cached_property
     def symmetry_direction(self) -> list[Any] | None:
-        """Unit axis of a symmetric top, body axes (mpf): the tensor is symmetric about it and, where
-        gravity acts, the centre of mass lies on it. None for other bodies, and for spheres without gravity.
+        """Unit axis about which the tensor is symmetric, body axes (mpf); None for an asymmetric body, and for
+        a sphere without a weight to mark an axis.
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
         tiny = max(moments) * context.mpf(2) ** (24 - context.prec)
-        if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere
+        if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere: gravity marks its axis
             if self.numbers.arm is None:
                 return None
             length = context.sqrt(dot(self.numbers.arm, self.numbers.arm))
             return [a / length for a in self.numbers.arm]
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            if abs(moments[j] - moments[k]) > tiny:
-                continue
-            if self.numbers.arm is not None:
-                largest = max(abs(a) for a in self.numbers.arm)
-                across = [abs(dot(axes[n], self.numbers.arm)) for n in (j, k)]
-                if max(across) > largest * context.mpf(2) ** (24 - context.prec):
-                    continue
-            return axes[i]
+            if abs(moments[j] - moments[k]) <= tiny:
+                return axes[i]
         return None
+
+    @property
+    def keeps_axial(self) -> bool:
+        """Whether the angular momentum along the symmetry axis is conserved."""
+        axis = self.symmetry_direction
+        return axis is not None and all(load.keeps_axial(self, axis) for load in self.loads)
+
+    @cached_property
+    def jacobi(self) -> Expression | None:
+        """Jacobi's constant H = w . I w / 2 - n o . I w + (3 G M / 2 R^3) c . I c of the only load, a gravity
+        gradient on a circular orbit in a fixed plane (o its normal, c the direction of the source).
+        """
+        if len(self.loads) != 1 or not isinstance(self.loads[0], GravityGradientModel):
+            return None
+        load = self.loads[0]
+        orbit = load.spec.orbit
+        if orbit is None or not orbit.circular or not orbit.fixed_plane:
+            return None
+        context = self.scene.context
+        sin_i, cos_i = context.sin(orbit.inclination), context.cos(orbit.inclination)
+        normal = [
+            sin_i * context.sin(orbit.ascending_node),
+            -sin_i * context.cos(orbit.ascending_node),
+            cos_i,
+        ]
+        motion = context.ldexp(orbit.mean_motion, self.scaling.time)
+        carried = [
+            self.number(motion * o) * x for o, x in zip(normal, self.momentum_space, strict=True) if o != 0
+        ]
+        tidal = 1.5 * load.strength(self) * quadratic_form(self, load.direction(self))
+        return self.rotational_energy - hy.sum(carried) + tidal
 
 
 def in_common_unit(states: list[Expression], units: list[Any], number: Number) -> list[Expression]:

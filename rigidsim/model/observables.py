@@ -13,10 +13,11 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import rotations
+from rigidsim.model.loads import CentralGravityModel
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Expression
-from rigidsim.model.scaling import potential_amplitude
-from rigidsim.scene.context import apply, dot, norm
+from rigidsim.model.scaling import orbital_rate, potential_amplitude, tidal_amplitude
+from rigidsim.scene.context import apply, cross, dot, norm
 
 Dims = tuple[str, ...]
 BODY: Dims = ("body_axis",)
@@ -60,12 +61,14 @@ def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     """abs(L) at the start, or the momentum that gravity can build up, if that is larger."""
     scene, context = m.scene, m.scene.context
     initial = norm(context, apply(scene.body.inertia, scene.angular_velocity))
-    swing = context.sqrt(2 * max(scene.body.principal_moments) * potential_amplitude(scene))
+    fed = potential_amplitude(scene) + tidal_amplitude(scene)
+    swing = context.sqrt(2 * max(scene.body.principal_moments) * fed)
+    swing = max(swing, max(scene.body.principal_moments) * orbital_rate(scene))
     if initial == 0 and swing == 0:
         return context.one, "1 kg m^2/s (the body is at rest)"
     if initial >= swing:
         return initial, "initial norm of the angular momentum"
-    return swing, "sqrt(2 I_max M g l), the angular momentum of a swing"
+    return swing, "angular momentum that the loads can build up"
 
 
 def rotational_scale(m: Mechanics) -> tuple[Any, str]:
@@ -73,10 +76,11 @@ def rotational_scale(m: Mechanics) -> tuple[Any, str]:
     scene, context = m.scene, m.scene.context
     momentum = apply(scene.body.inertia, scene.angular_velocity)
     kinetic = dot(scene.angular_velocity, momentum) / 2
-    amplitude = potential_amplitude(scene)
+    carried = max(scene.body.principal_moments) * orbital_rate(scene) ** 2 / 2
+    amplitude = potential_amplitude(scene) + tidal_amplitude(scene) + carried
     if kinetic + amplitude == 0:
         return context.one, "1 J (the body is at rest)"
-    name = "initial rotational energy" + (" plus M g l" if amplitude else "")
+    name = "initial rotational energy" + (" plus that of the loads" if amplitude else "")
     return kinetic + amplitude, name
 
 
@@ -99,16 +103,72 @@ def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
     return (value, "initial norm of the linear momentum") if value else (m.scene.context.one, "1 kg m/s")
 
 
+WORK = "work"
+
+
+def work_is_needed(m: Mechanics) -> bool:
+    """Whether the energy balance is checked by integrating power: where energy isn't conserved and Jacobi's
+    constant doesn't stand in for it.
+    """
+    has_energy = m.velocity is not None or not m.scene.free_flight
+    has_jacobi = m.attitude is not None and m.jacobi is not None
+    return has_energy and not m.conserves_energy and not has_jacobi and m.power is not None
+
+
 def _torque_free(m: Mechanics) -> str | None:
-    return "no torque acts" if m.numbers.arm is None else None
+    return None if m.torque else "no torque acts"
+
+
+def _conservative(m: Mechanics) -> str | None:
+    if not m.conserves_energy:
+        return None
+    return "all loads have a potential that doesn't depend on time" if m.loads else "no load acts"
+
+
+def _vertical_only(m: Mechanics) -> str | None:
+    others = [load for load in m.loads if load.title != "uniform_gravity" and load.torque(m)]
+    return None if others else "gravity has no torque about the vertical"
+
+
+def _central(m: Mechanics) -> str | None:
+    centers = [load for load in m.loads if isinstance(load, CentralGravityModel)]
+    return "the only load is a central force" if len(m.loads) == len(centers) == 1 else None
+
+
+def _total_momentum(m: Mechanics) -> list[Expression]:
+    """M r x v + R I w about the (first) attracting point."""
+    context, scaling = m.scene.context, m.scaling
+    center = next(load for load in m.loads if isinstance(load, CentralGravityModel))
+    offset = []
+    for x, a in zip(m.carried(m.position), center.spec.position, strict=True):
+        shift = context.ldexp(a, -scaling.length)
+        offset.append(x - m.number(shift) if shift != 0 else x)
+    scale = m.number(context.ldexp(m.scene.body.mass, scaling.length + scaling.speed - scaling.momentum))
+    x, y, z = offset
+    u, v, w = m.carried(m.velocity)
+    orbital = [y * w - z * v, z * u - x * w, x * v - y * u]
+    return [scale * a + b for a, b in zip(orbital, m.momentum_space, strict=True)]
+
+
+def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:
+    """abs of the orbital plus the spin angular momentum at the start."""
+    scene, context = m.scene, m.scene.context
+    assert scene.position is not None
+    assert scene.velocity is not None
+    center = next(load for load in m.loads if isinstance(load, CentralGravityModel))
+    offset = [x - a for x, a in zip(scene.position, center.spec.position, strict=True)]
+    orbital = scene.body.mass * norm(context, cross(offset, scene.velocity))
+    spin, _ = momentum_scale(m)
+    return orbital + spin, "initial orbital plus spin angular momentum"
 
 
 def _axial(m: Mechanics) -> str | None:
-    if m.symmetry_direction is None:
+    if not m.keeps_axial:
         return None
-    return "the body is symmetric about its axis" + (
-        ", on which the centre of mass lies" if m.numbers.arm is not None else ", and no torque acts"
-    )
+    why = "the body is symmetric about its axis"
+    if m.numbers.arm is not None:
+        why += ", on which the centre of mass lies"
+    return why + (", and no torque acts" if not m.torque else "")
 
 
 def _linear(m: Mechanics) -> str | None:
@@ -183,7 +243,7 @@ OBSERVABLES: tuple[Observable, ...] = (
     Observable(
         "angular_momentum_vertical", (), "kg m2 s-1", "angular momentum along the vertical",
         _along_vertical, _same(_MOMENTUM, 1), "space axes", ("vertical",),
-        lambda m: "gravity has no torque about the vertical", momentum_scale,
+        _vertical_only, momentum_scale,
     ),
     Observable(
         "angular_momentum_axial", (), "kg m2 s-1", "angular momentum along the symmetry axis",
@@ -191,7 +251,23 @@ OBSERVABLES: tuple[Observable, ...] = (
     ),
     Observable(
         "energy", (), "J", "total energy", lambda m: [m.energy], _same(_ENERGY, 1), "", ("energy",),
-        lambda m: "all loads have a potential that doesn't depend on time", energy_scale,
+        _conservative, energy_scale,
+    ),
+    Observable(
+        "total_angular_momentum", SPACE, "kg m2 s-1", "angular momentum about the attracting point, orbital plus spin",
+        _total_momentum, _same(_MOMENTUM, 3), "space axes", ("attractor",), _central, total_momentum_scale,
+    ),
+    Observable(
+        "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [m.carried(m.jacobi)], _same(_ENERGY, 1), "",
+        ("jacobi",), lambda m: "the only load is a gravity gradient on a circular orbit", energy_scale,
+    ),
+    Observable(
+        "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],
+        _same(_ENERGY, 1), "", ("work",),
+    ),
+    Observable(
+        "energy_balance", (), "J", "energy less the work done", lambda m: [m.energy - hy.make_vars(WORK)],
+        _same(_ENERGY, 1), "", ("work",), lambda m: "energy changes by the work of the loads", energy_scale,
     ),
     Observable(
         "rotational_energy", (), "J", "kinetic energy of rotation",

@@ -5,9 +5,11 @@ Starts from what is recorded and what the loads read, and adds a state only when
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.loads import LoadModel
 from rigidsim.scene.scene import Scene
 
 ATTITUDE_RECORDS = ("quaternion", "euler_angles", "rotation_matrix", "angular_momentum")
@@ -35,8 +37,11 @@ class Requirements:
     left_out: list[tuple[str, str]] = field(default_factory=list)
 
 
-def choose_requirements(scene: Scene) -> Requirements:
+def choose_requirements(scene: Scene, loads: Sequence[LoadModel] = ()) -> Requirements:
     """Decide what is carried.
+
+    Args:
+        loads: of the scene; they say what they read.
 
     Raises:
         ConfigError: something recorded can't be had in the formulation or the scene.
@@ -44,6 +49,8 @@ def choose_requirements(scene: Scene) -> Requirements:
     asked = scene.config.integrator.formulation
     record = scene.config.output.record
     _check_recordable(scene, asked, record)
+    readers = {need: [load.title for load in loads if need in load.reads] for need in ("attitude", "flight")}
+    _check_readers(asked, readers)
     reasons = [("wx wy wz", _why_rates(scene, record))]
     left_out: list[tuple[str, str]] = []
     wants_attitude = [name for name in record or () if name in ATTITUDE_RECORDS]
@@ -52,6 +59,8 @@ def choose_requirements(scene: Scene) -> Requirements:
         why_attitude = f'[integrator] formulation = "{asked}" asks for it'
     elif record is None:
         formulation, why_attitude = "quaternion", "nothing restricts what is recorded"
+    elif readers["attitude"]:
+        formulation, why_attitude = "quaternion", f"{', '.join(readers['attitude'])} reads it"
     elif wants_attitude:
         formulation, why_attitude = "quaternion", f"{', '.join(wants_attitude)} is recorded"
     else:
@@ -70,15 +79,19 @@ def choose_requirements(scene: Scene) -> Requirements:
     else:
         states = {"quaternion": "qw qx qy qz", "euler_angles": "phi theta psi"}
         also = "; gravity's torque reads it" if torque else ""
+        if readers["attitude"] and "reads it" not in why_attitude:
+            also += f"; {', '.join(readers['attitude'])} reads it"
         reasons.append((states.get(formulation, "r11 ... r33"), why_attitude + also))
     flight = False
     if scene.free_flight:
         needs = [name for name in record or () if name in (*FLIGHT_RECORDS, "energy", "potential_energy")]
-        flight = record is None or bool(needs)
+        flight = record is None or bool(needs) or bool(readers["flight"])
         if flight:
             why = (
                 f"{', '.join(needs)} is recorded"
                 if needs
+                else f"{', '.join(readers['flight'])} reads them"
+                if readers["flight"]
                 else "the body moves, and nothing restricts what is recorded"
             )
             reasons.append(("x y z vx vy vz", why))
@@ -87,6 +100,16 @@ def choose_requirements(scene: Scene) -> Requirements:
     else:
         left_out.append(("position and velocity", "[initial] has neither"))
     return Requirements(formulation, vertical, flight, record, reasons, left_out)
+
+
+def _check_readers(formulation: str, readers: dict[str, list[str]]) -> None:
+    if formulation == "rates" and readers["attitude"]:
+        raise ConfigError(
+            Problem(
+                "[integrator] formulation",
+                f'given "rates", but {readers["attitude"][0]} reads the attitude; choose "auto"',
+            )
+        )
 
 
 def _why_rates(scene: Scene, record: list[str] | None) -> str:
@@ -104,6 +127,7 @@ def _check_recordable(scene: Scene, formulation: str, record: list[str] | None) 
             why = "the scene has no position; give [initial] position or velocity, or leave it out"
         elif (
             name == "potential_energy"
+            and not scene.loads
             and scene.torque_arm is None
             and not (scene.free_flight and scene.gravity is not None)
         ):

@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rigidsim.scene.context import dot, norm
+from rigidsim.scene.context import cross, dot, norm
+from rigidsim.scene.loads import CentralGravity, GravityGradient
 from rigidsim.scene.scene import Scene
 
 
@@ -66,6 +67,10 @@ def largest_rates(scene: Scene) -> list[Any]:
     weighted = [dot(row, w) for row in inertia]
     twice_energy = dot(w, weighted)
     swing = 4 * potential_amplitude(scene)
+    if scene.loads:  # energy may come from an orbit: a bound for the body carried along with it
+        carried = orbital_rate(scene)
+        fed = context.sqrt(max(twice_energy, zero) + swing + 4 * tidal_amplitude(scene))
+        return [fed * context.sqrt(inverse[i][i]) + carried for i in range(3)]
     diagonal = all(inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j)
     axis = symmetry_axis(scene) if diagonal else None
     if swing != 0 and axis is not None:
@@ -104,6 +109,86 @@ def potential_amplitude(scene: Scene) -> Any:
     return norm(scene.context, arm) * norm(scene.context, scene.gravity)
 
 
+def tidal_amplitude(scene: Scene) -> Any:
+    """(3/2) (G M / R^3) (I_max - I_min) summed over the attracting bodies at their nearest, J."""
+    context, moments = scene.context, scene.body.principal_moments
+    spread = max(moments) - min(moments)
+    total = context.zero
+    for load in scene.loads:
+        if isinstance(load, GravityGradient):
+            if load.orbit is None:
+                distance = norm(context, load.position)
+            else:
+                distance = load.orbit.semi_major_axis * (1 - load.orbit.eccentricity)
+        elif isinstance(load, CentralGravity):
+            distance = nearest_approach(scene, load)
+        else:
+            continue
+        total += 3 * load.gravitational_parameter / distance**3 * spread / 2
+    return total
+
+
+def orbital_rate(scene: Scene) -> Any:
+    """Fastest angular rate of any attracting body seen from the body, rad/s; zero without one."""
+    context = scene.context
+    fastest = context.zero
+    for load in scene.loads:
+        if isinstance(load, GravityGradient) and load.orbit is not None:
+            e = load.orbit.eccentricity
+            fastest = max(fastest, load.orbit.mean_motion * context.sqrt(1 - e * e) / (1 - e) ** 2)
+        elif isinstance(load, CentralGravity):
+            nearest = nearest_approach(scene, load)
+            offset, speed = _relative(scene, load)
+            momentum = norm(context, cross(offset, scene.velocity)) if scene.velocity else context.zero
+            fastest = max(fastest, momentum / nearest**2)
+    return fastest
+
+
+def _relative(scene: Scene, load: CentralGravity) -> tuple[list[Any], Any]:
+    assert scene.position is not None
+    assert scene.velocity is not None
+    offset = [x - a for x, a in zip(scene.position, load.position, strict=True)]
+    return offset, norm(scene.context, scene.velocity)
+
+
+def nearest_approach(scene: Scene, load: CentralGravity) -> Any:
+    """Pericentre distance of the Kepler orbit through the initial state, m (at least a thousandth of the
+    initial distance, since a scale must not vanish for a plunging orbit).
+    """
+    context = scene.context
+    offset, speed = _relative(scene, load)
+    distance = norm(context, offset)
+    momentum = norm(context, cross(offset, scene.velocity or offset))
+    energy = speed**2 / 2 - load.gravitational_parameter / distance
+    strength = load.gravitational_parameter
+    e = context.sqrt(max(1 + 2 * energy * momentum**2 / strength**2, context.zero))
+    pericentre = momentum**2 / strength / (1 + e)
+    return max(min(pericentre, distance), distance / 1000)
+
+
+def _flight_scales(scene: Scene) -> tuple[Any, Any]:
+    """Largest distance from the origin (m) and speed (m/s) to be expected."""
+    context = scene.context
+    assert scene.position is not None
+    assert scene.velocity is not None
+    horizon = scene.end - scene.start
+    central = [load for load in scene.loads if isinstance(load, CentralGravity)]
+    if len(central) == 1 and scene.gravity is None:
+        load = central[0]
+        offset, speed = _relative(scene, load)
+        distance = norm(context, offset)
+        energy = speed**2 / 2 - load.gravitational_parameter / distance
+        nearest = nearest_approach(scene, load)
+        swiftest = context.sqrt(2 * abs(energy + load.gravitational_parameter / nearest))
+        if energy < 0:
+            farthest = load.gravitational_parameter / -energy  # twice the semi-major axis
+            return norm(context, load.position) + min(farthest, distance + swiftest * horizon), swiftest
+        return norm(context, scene.position) + swiftest * horizon, swiftest
+    pull = norm(context, scene.gravity) if scene.gravity is not None else context.zero
+    swiftest = norm(context, scene.velocity) + pull * horizon
+    return norm(context, scene.position) + swiftest * horizon, swiftest
+
+
 def choose_scaling(scene: Scene) -> Scaling:
     """The units of a scene; a pure function of it, so that the same config gives the same bits."""
     context, body = scene.context, scene.body
@@ -117,6 +202,7 @@ def choose_scaling(scene: Scene) -> Scaling:
         if axial is not None and all(body.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j):
             swing_moment = body.inertia[(axial + 1) % 3][(axial + 1) % 3]
         fastest = max(fastest, context.sqrt(potential / swing_moment))
+    fastest = max(fastest, orbital_rate(scene))
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
         time = exponent(context, scene.end - scene.start)
@@ -126,10 +212,7 @@ def choose_scaling(scene: Scene) -> Scaling:
         rates.append(relative if abs(relative) >= _WORTH_A_UNIT else 0)
     length = speed = 0
     if scene.position is not None and scene.velocity is not None:
-        horizon = scene.end - scene.start
-        pull = norm(context, scene.gravity) if scene.gravity is not None else context.zero
-        swiftest = norm(context, scene.velocity) + pull * horizon
-        farthest = norm(context, scene.position) + swiftest * horizon
+        farthest, swiftest = _flight_scales(scene)
         length, speed = exponent(context, farthest), exponent(context, swiftest)
     return Scaling(
         time=time,

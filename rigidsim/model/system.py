@@ -18,8 +18,9 @@ from rigidsim.model.dynamics import (
     vertical_from_attitude,
 )
 from rigidsim.model.formulations import BUILDERS, AttitudeStates
+from rigidsim.model.loads import CentralGravityModel, LoadModel, load_models
 from rigidsim.model.mechanics import Mechanics, in_common_unit
-from rigidsim.model.observables import OBSERVABLES, Observable
+from rigidsim.model.observables import OBSERVABLES, WORK, Observable, work_is_needed
 from rigidsim.model.requirements import Requirements, choose_requirements
 from rigidsim.model.rotations import Expression
 from rigidsim.model.scaling import Scaling, choose_scaling, largest_rates
@@ -114,16 +115,18 @@ class System:
         return [variable for variable, _ in self.equations]
 
 
-def build_system(scene: Scene, number: Number) -> System:
+def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] = ()) -> System:
     """Build the least system that the scene needs.
 
     Args:
         number: from an mpf to the working precision's scalar, rounded once.
+        extra_loads: beside those of the config.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.
     """
-    requirements = choose_requirements(scene)
+    loads = [*load_models(scene), *extra_loads]
+    requirements = choose_requirements(scene, loads)
     scaling = choose_scaling(scene)
     numbers = scaled_numbers(scene, scaling)
     context = scene.context
@@ -161,18 +164,36 @@ def build_system(scene: Scene, number: Number) -> System:
         position = list(hy.make_vars("x", "y", "z"))
         velocity = list(hy.make_vars("vx", "vy", "vz"))
         names += ["x", "y", "z", "vx", "vy", "vz"]
-        x_rates, v_rates = flight_equations(scene, scaling, velocity, number)
-        derivatives += x_rates + v_rates
         initial += [context.ldexp(x, -scaling.length) for x in scene.position]
         initial += [context.ldexp(v, -scaling.speed) for v in scene.velocity]
         exponents += [scaling.length] * 3 + [scaling.speed] * 3
-    derivatives = rate_equations(scene, numbers, rate_states, vertical, number) + derivatives
     mechanics = Mechanics(
-        scene, scaling, numbers, rate_states, attitude, vertical, position, velocity, number
+        scene, scaling, numbers, rate_states, attitude, vertical, position, velocity, number, loads
     )
+    derivatives = rate_equations(mechanics, mechanics.torque) + derivatives
+    if requirements.flight:
+        x_rates, v_rates = flight_equations(mechanics, mechanics.force)
+        derivatives += x_rates + v_rates
+    norms: list[Expression] = []
+    for load in loads:
+        extra = load.extra_states(mechanics)
+        if extra is not None:
+            names += extra.names
+            derivatives += extra.derivatives
+            initial += extra.initial
+            exponents += [0] * len(extra.names)
+            norms += extra.norms
+            requirements.reasons.append((" ".join(extra.names), f"{load.title}: where its source is"))
+    if work_is_needed(mechanics):
+        names.append(WORK)
+        assert mechanics.power is not None
+        derivatives.append(mechanics.power)
+        initial.append(context.zero)
+        exponents.append(scaling.energy)
+        requirements.reasons.append((WORK, "work of the loads without a potential, to check the energy"))
     _refuse_singular_start(scene, attitude)
     recorded, outputs = _recorded(mechanics, requirements)
-    invariants = _invariants(mechanics)
+    invariants = _invariants(mechanics, norms)
     outputs += _drifts(invariants, context, number)
     angle_states = tuple(3 + i for i in attitude.angles) if attitude else ()
     _refuse_out_of_range(initial, [*recorded, *invariants], number)
@@ -232,6 +253,9 @@ def _available(m: Mechanics, observable: Observable) -> bool:
         "gravity": m.potential_energy is not None,
         "symmetry": m.symmetry_direction is not None,
         "energy": m.velocity is not None or not m.scene.free_flight,
+        "work": work_is_needed(m),
+        "jacobi": m.attitude is not None and m.jacobi is not None,
+        "attractor": m.velocity is not None and any(isinstance(x, CentralGravityModel) for x in m.loads),
     }
     return all(has[need] for need in observable.needs)
 
@@ -287,7 +311,7 @@ def _recorded(m: Mechanics, requirements: Requirements) -> tuple[list[Recorded],
     return recorded, outputs
 
 
-def _invariants(m: Mechanics) -> list[Invariant]:
+def _invariants(m: Mechanics, norms: list[Expression]) -> list[Invariant]:
     found = []
     for observable in OBSERVABLES:
         if observable.drift_scale is None or not _available(m, observable):
@@ -308,6 +332,12 @@ def _invariants(m: Mechanics) -> list[Invariant]:
                 scale_name,
             )
         )
+    for number, expression in enumerate(norms):
+        found.append(
+            Invariant(f"orbit_norm_{number + 1}", "it is so by definition", "1",
+                      "norm of a cosine and sine that an orbit is carried by", [expression], [0],
+                      m.scene.context.one, "1", numerical=True)
+        )  # fmt: skip
     if m.attitude is not None and m.attitude.defect is not None:
         name, long_name, expression = m.attitude.defect
         found.append(

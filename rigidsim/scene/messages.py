@@ -26,7 +26,7 @@ _LATER_VALUES: dict[tuple[str, ...], tuple[Any, str]] = {
     ),
     ("output", "lyapunov"): (True, "not in this version yet; allowed: false"),
 }
-_LATER_LOADS = ("gravity_gradient", "central_gravity", "torque", "force", "viscous_torque")
+_LATER_LOADS = ("torque", "force")
 _TABLES = (
     "body",
     "initial",
@@ -40,7 +40,14 @@ _TABLES = (
     "sweep",
 )
 _ARRAYS_OF_TABLES = ("loads", "events")
-UNION_TAGS = ("as a name", "as a point")
+UNION_TAGS = (
+    "as a name",
+    "as a point",
+    "uniform_gravity",
+    "gravity_gradient",
+    "central_gravity",
+    "viscous_torque",
+)
 """Names of a union's alternatives; they are no part of the user's key."""
 
 
@@ -100,7 +107,11 @@ def later_features(table: Mapping[str, Any]) -> list[Problem]:
         if kind in _LATER_LOADS:
             where = place(("loads", number, "kind"))
             problems.append(
-                Problem(where, f"given {shown(kind)}: not in this version yet; allowed: uniform_gravity")
+                Problem(
+                    where,
+                    f"given {shown(kind)}: not in this version yet; allowed: "
+                    "uniform_gravity, gravity_gradient, central_gravity, viscous_torque",
+                )
             )
     return problems
 

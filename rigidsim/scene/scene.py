@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import attitude, schema
+from rigidsim.scene import attitude, loads, schema
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.context import Matrix, Vector, apply, context_for, dot, transpose
 from rigidsim.scene.messages import shown
@@ -53,6 +53,7 @@ class Scene:
         euler_angles: as given in ``euler_sequence`` (radians), or None where another attitude was given.
         position, velocity: of the centre of mass, space axes; None unless the body moves freely.
         gravity: uniform acceleration in space axes, m/s^2, or None without such a load.
+        loads: the others.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
     """
 
@@ -67,6 +68,7 @@ class Scene:
     position: Vector | None
     velocity: Vector | None
     gravity: Vector | None
+    loads: tuple[loads.Load, ...]
     start: Any
     end: Any
     samples: SampleTimes
@@ -114,8 +116,10 @@ def build_scene(experiment: Experiment) -> Scene:
     start, end, samples = times
     try:
         inverse = inverse_inertia(context, body)
-        gravity = _gravity(config, context)
+        resolved = [loads.resolve_load(table, i, context) for i, table in enumerate(config.loads)]
+        gravity = _gravity(resolved, context)
         position, velocity = _translation(config, body, context)
+        _check_loads(resolved, position)
         if gravity is not None and body.mass is None:
             off_center = any(x != 0 for x in body.center_of_mass)
             if position is not None or off_center:
@@ -132,6 +136,7 @@ def build_scene(experiment: Experiment) -> Scene:
             position=position,
             velocity=velocity,
             gravity=gravity,
+            loads=tuple(load for load in resolved if not isinstance(load, loads.UniformGravity)),
             start=start,
             end=end,
             samples=samples,
@@ -205,13 +210,27 @@ def _initial_rates(
     return rates
 
 
-def _gravity(config: schema.Config, context: Any) -> Vector | None:
-    if not config.loads:
+def _gravity(resolved: list[loads.Load], context: Any) -> Vector | None:
+    fields = [load.acceleration for load in resolved if isinstance(load, loads.UniformGravity)]
+    if not fields:
         return None
-    total = [context.zero] * 3
-    for load in config.loads:
-        total = [t + a.at(context) for t, a in zip(total, load.acceleration, strict=True)]
-    return total
+    return [sum(components, context.zero) for components in zip(*fields, strict=True)]
+
+
+def _check_loads(resolved: list[loads.Load], position: Vector | None) -> None:
+    for number, load in enumerate(resolved):
+        if not isinstance(load, loads.CentralGravity):
+            continue
+        where = f"number {number + 1} kind"
+        if position is None:
+            raise _fail(
+                "[loads]",
+                where,
+                'given "central_gravity" for a body without a position; give [initial] position and '
+                'velocity, or use "gravity_gradient" for a prescribed orbit',
+            )
+        if position == load.position:
+            raise _fail("[loads]", where, "the body starts at the attracting point; start it elsewhere")
 
 
 def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:

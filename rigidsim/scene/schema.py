@@ -7,27 +7,29 @@ axis without inertia, ...) is checked where the scene is built.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    PlainValidator,
-    StrictBool,
-    StrictInt,
-    StrictStr,
-    Tag,
-    WithJsonSchema,
-    field_validator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import Discriminator, Field, StrictBool, StrictInt, StrictStr, Tag, field_validator
 
-from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.exact import ZERO, parse_number
+from rigidsim.scene.load_tables import LoadTable
 from rigidsim.scene.messages import nearest, shown
 from rigidsim.scene.shapes import SHAPES
+from rigidsim.scene.tables import (
+    Angle,
+    Dimensionless,
+    Four,
+    Kilogram,
+    Metre,
+    Moment,
+    Momentum,
+    Rate,
+    Second,
+    Speed,
+    Table,
+    Triple,
+    refuse,
+)
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
 # room for numbers down to 1e-70.
@@ -49,6 +51,10 @@ RECORDABLE = (
     "position",
     "velocity",
     "linear_momentum",
+    "total_angular_momentum",
+    "jacobi_constant",
+    "work",
+    "energy_balance",
 )
 EULER_SEQUENCES = tuple(
     first + second + third
@@ -59,74 +65,10 @@ EULER_SEQUENCES = tuple(
 )
 
 
-def _refuse(text: str) -> PydanticCustomError:
-    return PydanticCustomError("rigidsim", "{text}", {"text": text})
-
-
-def quantity(unit: str) -> Any:
-    """The annotated type of a number in the SI unit ``unit`` (see ``parse_number``)."""
-
-    def validate(value: Any) -> ExactNumber:
-        try:
-            return parse_number(value, unit)
-        except ValueError as error:
-            raise _refuse(str(error)) from None
-
-    shown = {"anyOf": [{"type": "number"}, {"type": "string"}], "description": f"number, in {unit}"}
-    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(shown)]
-
-
-def _exactly(count: int) -> BeforeValidator:
-    def validate(value: Any) -> Any:
-        if isinstance(value, list) and len(value) != count:
-            raise _refuse(f"given {len(value)} {'entry' if len(value) == 1 else 'entries'}; "
-                          f"exactly {count} are needed")  # fmt: skip
-        return value
-
-    return BeforeValidator(validate)
-
-
-T = TypeVar("T")
-Triple = Annotated[list[T], Field(min_length=3, max_length=3), _exactly(3)]
-"""A vector of three."""
-Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
-"""A quaternion."""
-
-
 def _kind_of_reference(value: Any) -> str | None:
     if isinstance(value, str):
         return "as a name"
     return "as a point" if isinstance(value, list) else None
-
-
-if TYPE_CHECKING:
-    Dimensionless: TypeAlias = ExactNumber
-    Metre: TypeAlias = ExactNumber
-    Kilogram: TypeAlias = ExactNumber
-    Second: TypeAlias = ExactNumber
-    Moment: TypeAlias = ExactNumber
-    Rate: TypeAlias = ExactNumber
-    Angle: TypeAlias = ExactNumber
-    Momentum: TypeAlias = ExactNumber
-    Speed: TypeAlias = ExactNumber
-    Acceleration: TypeAlias = ExactNumber
-else:
-    Dimensionless = quantity("1")
-    Metre = quantity("m")
-    Kilogram = quantity("kg")
-    Second = quantity("s")
-    Moment = quantity("kg m^2")
-    Rate = quantity("rad/s")
-    Angle = quantity("rad")
-    Momentum = quantity("kg m^2/s")
-    Speed = quantity("m/s")
-    Acceleration = quantity("m/s^2")
-
-
-class Table(BaseModel):
-    """A TOML table: unknown keys are errors, values never change after reading."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
 
 class PointMass(Table):
@@ -154,7 +96,7 @@ class Solid(Table):
     @classmethod
     def _known_shape(cls, value: str | None) -> str | None:
         if value is not None and value not in SHAPES:
-            raise _refuse(f'given "{value}"{nearest(value, SHAPES)}; allowed: {", ".join(SHAPES)}')
+            raise refuse(f'given "{value}"{nearest(value, SHAPES)}; allowed: {", ".join(SHAPES)}')
         return value
 
 
@@ -202,15 +144,6 @@ class Initial(Table):
     velocity: Triple[Speed] | None = None
 
 
-class UniformGravity(Table):
-    """A uniform field; a torque about the fixed point, or free fall in a scene with a position."""
-
-    kind: Literal["uniform_gravity"]
-    acceleration: Triple[Acceleration] = Field(
-        default_factory=lambda: [parse_number(a, "m/s^2") for a in ("0", "0", "-9.80665")]
-    )
-
-
 class Time(Table):
     """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``."""
 
@@ -235,7 +168,7 @@ class Integrator(Table):
     @classmethod
     def _known_sequence(cls, value: str) -> str:
         if value not in EULER_SEQUENCES:
-            raise _refuse(f'given "{value}"; allowed: {", ".join(EULER_SEQUENCES)} (intrinsic)')
+            raise refuse(f'given "{value}"; allowed: {", ".join(EULER_SEQUENCES)} (intrinsic)')
         return value
 
     @field_validator("precision", mode="before")
@@ -245,7 +178,7 @@ class Integrator(Table):
             return value
         if isinstance(value, str) and value in PRECISION_NAMES:
             return value
-        raise _refuse(
+        raise refuse(
             f"given {shown(value)}; allowed: {', '.join(PRECISION_NAMES)}, "
             f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
         )
@@ -258,9 +191,9 @@ class Integrator(Table):
         try:
             number = parse_number(value, "1")
         except ValueError as error:
-            raise _refuse(f'{error}; or "auto"') from None
+            raise refuse(f'{error}; or "auto"') from None
         if not 0 < number.rational <= 1:
-            raise _refuse(f'given {shown(value)}; allowed: above 0 and at most 1, or "auto"')
+            raise refuse(f'given {shown(value)}; allowed: above 0 and at most 1, or "auto"')
         return number
 
 
@@ -278,11 +211,11 @@ class Output(Table):
         for name in value or []:
             if name not in RECORDABLE:
                 near = nearest(name, RECORDABLE)
-                raise _refuse(f'given "{name}"{near}; allowed: {", ".join(RECORDABLE)}')
+                raise refuse(f'given "{name}"{near}; allowed: {", ".join(RECORDABLE)}')
         if value is not None and not value:
-            raise _refuse("given an empty array; name at least one variable, or leave the key out")
+            raise refuse("given an empty array; name at least one variable, or leave the key out")
         if value is not None and len(set(value)) < len(value):
-            raise _refuse("a variable is named twice; name each once")
+            raise refuse("a variable is named twice; name each once")
         return value
 
 
@@ -301,7 +234,7 @@ class Config(Table):
     description: StrictStr = ""
     body: Body
     initial: Initial
-    loads: list[UniformGravity] = Field(default_factory=list)
+    loads: list[LoadTable] = Field(default_factory=list)
     time: Time
     integrator: Integrator = Field(default_factory=Integrator)
     output: Output = Field(default_factory=Output)
@@ -311,7 +244,7 @@ class Config(Table):
     @classmethod
     def _folder_name(cls, value: str) -> str:
         if not re.fullmatch(r"[A-Za-z0-9._-]{1,100}", value) or not value.strip("."):
-            raise _refuse(
+            raise refuse(
                 f'given "{value[:40]}"; allowed: 1 to 100 letters, digits, dots, underscores and '
                 "hyphens, not dots alone, since it names the run folder"
             )

@@ -1,0 +1,80 @@
+"""The tables that ``[[loads]]`` takes, told apart by ``kind`` (the interface's section 1)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.tables import (
+    Acceleration,
+    Angle,
+    Damping,
+    Dimensionless,
+    GravitationalParameter,
+    Metre,
+    Rate,
+    Second,
+    Table,
+    Triple,
+)
+
+
+def _standard_gravity() -> list[ExactNumber]:
+    return [parse_number(a, "m/s^2") for a in ("0", "0", "-9.80665")]
+
+
+class UniformGravity(Table):
+    """A uniform field; a torque about the fixed point, or free fall in a scene with a position."""
+
+    kind: Literal["uniform_gravity"]
+    acceleration: Triple[Acceleration] = Field(default_factory=_standard_gravity)
+
+
+class Orbit(Table):
+    """A Kepler orbit of the attracting body, whose node and periapsis may move uniformly.
+
+    Angles are those at time zero of the scene, as classical elements in space axes. ``period`` replaces
+    the one of Kepler's third law.
+    """
+
+    semi_major_axis: Metre
+    eccentricity: Dimensionless = ZERO
+    inclination: Angle = ZERO
+    ascending_node: Angle = ZERO
+    periapsis: Angle = ZERO
+    mean_anomaly: Angle = ZERO
+    node_rate: Rate = ZERO
+    periapsis_rate: Rate = ZERO
+    period: Second | None = None
+
+
+class GravityGradient(Table):
+    """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
+
+    kind: Literal["gravity_gradient"]
+    gravitational_parameter: GravitationalParameter
+    orbit: Orbit | None = None
+    position: Triple[Metre] | None = None
+
+
+class CentralGravity(Table):
+    """A point that attracts a freely flying body: force and torque to second degree."""
+
+    kind: Literal["central_gravity"]
+    gravitational_parameter: GravitationalParameter
+    position: Triple[Metre] = Field(default_factory=lambda: [ZERO] * 3)
+
+
+class ViscousTorque(Table):
+    """A torque -c_i w_i about each body axis."""
+
+    kind: Literal["viscous_torque"]
+    coefficients: Triple[Damping]
+
+
+LoadTable = Annotated[
+    UniformGravity | GravityGradient | CentralGravity | ViscousTorque, Field(discriminator="kind")
+]
+"""Any of them."""

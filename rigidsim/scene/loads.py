@@ -1,0 +1,166 @@
+"""Loads with every number worked out: what acts on the body, without saying how it enters equations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene import load_tables
+from rigidsim.scene.context import Vector
+
+
+@dataclass(frozen=True)
+class UniformGravity:
+    """A uniform field; ``acceleration`` in space axes, m/s^2."""
+
+    acceleration: Vector
+
+
+@dataclass(frozen=True)
+class KeplerOrbit:
+    """Where an attracting body is, as elements at time zero (radians, m, rad/s) with secular rates.
+
+    Attributes:
+        mean_motion: rad/s, from Kepler's third law or from the period that was given.
+    """
+
+    semi_major_axis: Any
+    eccentricity: Any
+    inclination: Any
+    ascending_node: Any
+    periapsis: Any
+    mean_anomaly: Any
+    node_rate: Any
+    periapsis_rate: Any
+    mean_motion: Any
+
+    def eccentric_anomaly(self, context: Any, time: Any) -> Any:
+        """Solution of Kepler's equation M = E - e sin E at a time, to the context's precision."""
+        mean = self.mean_anomaly + self.mean_motion * time
+        e = self.eccentricity
+        anomaly = mean + e * context.sin(mean)
+        # Newton converges quadratically; the count covers any precision from a start that is good to e^2
+        for _ in range(12 + int(context.prec).bit_length()):
+            step = (anomaly - e * context.sin(anomaly) - mean) / (1 - e * context.cos(anomaly))
+            anomaly -= step
+            if abs(step) <= context.ldexp(1, -context.prec // 2 - 2):
+                break
+        return anomaly
+
+    @property
+    def circular(self) -> bool:
+        """Whether the distance is constant."""
+        return bool(self.eccentricity == 0)
+
+    @property
+    def fixed_plane(self) -> bool:
+        """Whether neither node nor periapsis moves."""
+        return bool(self.node_rate == 0 and self.periapsis_rate == 0)
+
+
+@dataclass(frozen=True)
+class GravityGradient:
+    """Torque of a distant body: on an ``orbit``, or fixed at ``position`` (space axes, m)."""
+
+    gravitational_parameter: Any
+    orbit: KeplerOrbit | None
+    position: Vector | None
+
+
+@dataclass(frozen=True)
+class CentralGravity:
+    """An attracting point at ``position`` (space axes, m); force and torque on a freely flying body."""
+
+    gravitational_parameter: Any
+    position: Vector
+
+
+@dataclass(frozen=True)
+class ViscousTorque:
+    """Torque -c_i w_i about the body axes; ``coefficients`` in kg m^2/s."""
+
+    coefficients: Vector
+
+
+Load = UniformGravity | GravityGradient | CentralGravity | ViscousTorque
+
+
+def _fail(number: int, key: str, text: str) -> ConfigError:
+    return ConfigError(Problem(f"[[loads]] number {number + 1} {key}", text))
+
+
+def resolve_load(table: load_tables.LoadTable, number: int, context: Any) -> Load:
+    """Work out one load.
+
+    Args:
+        number: its place in the config, for messages.
+
+    Raises:
+        ConfigError: a contradiction or a value out of range.
+    """
+    if isinstance(table, load_tables.UniformGravity):
+        return UniformGravity([a.at(context) for a in table.acceleration])
+    if isinstance(table, load_tables.ViscousTorque):
+        for i, coefficient in enumerate(table.coefficients):
+            if coefficient.sign < 0:
+                raise _fail(
+                    number, f"coefficients[{i}]", f"given {float(coefficient):g}; zero or more is allowed"
+                )
+        return ViscousTorque([c.at(context) for c in table.coefficients])
+    strength = table.gravitational_parameter
+    if strength.sign <= 0:
+        raise _fail(
+            number, "gravitational_parameter", f"given {float(strength):g}; a positive number is allowed"
+        )
+    if isinstance(table, load_tables.CentralGravity):
+        return CentralGravity(strength.at(context), [x.at(context) for x in table.position])
+    if (table.orbit is None) == (table.position is None):
+        given = "neither" if table.orbit is None else "both"
+        raise _fail(number, "orbit", f"given {given} of orbit and position; exactly one is needed")
+    if table.position is not None:
+        position = [x.at(context) for x in table.position]
+        if all(x == 0 for x in position):
+            raise _fail(number, "position", "given the origin, where the body is; another point is allowed")
+        return GravityGradient(strength.at(context), None, position)
+    assert table.orbit is not None
+    return GravityGradient(
+        strength.at(context), _orbit(table.orbit, strength.at(context), number, context), None
+    )
+
+
+def _orbit(table: load_tables.Orbit, strength: Any, number: int, context: Any) -> KeplerOrbit:
+    axis, eccentricity = table.semi_major_axis.at(context), table.eccentricity.at(context)
+    if not axis > 0:
+        raise _fail(
+            number, "orbit.semi_major_axis", f"given {context.nstr(axis, 8)} m; a positive length is allowed"
+        )
+    if not 0 <= eccentricity < 1:
+        raise _fail(
+            number,
+            "orbit.eccentricity",
+            f"given {context.nstr(eccentricity, 8)}; 0 (a circle) to below 1 is allowed",
+        )
+    motion = context.sqrt(strength / axis**3)
+    if table.period is not None:
+        if table.period.sign <= 0:
+            raise _fail(
+                number, "orbit.period", f"given {float(table.period):g} s; a positive time is allowed"
+            )
+        motion = 2 * context.pi / table.period.at(context)
+    return KeplerOrbit(
+        axis,
+        eccentricity,
+        *(
+            getattr(table, key).at(context)
+            for key in (
+                "inclination",
+                "ascending_node",
+                "periapsis",
+                "mean_anomaly",
+                "node_rate",
+                "periapsis_rate",
+            )
+        ),
+        motion,
+    )
