@@ -171,8 +171,12 @@ def _axial(m: Mechanics) -> str | None:
     return why + (", and no torque acts" if not m.torque else "")
 
 
+def _pulled(m: Mechanics) -> bool:
+    return any(x != 0 for vector, _ in m.force for x in vector)
+
+
 def _linear(m: Mechanics) -> str | None:
-    return "no force acts" if m.numbers.up is None and m.velocity is not None else None
+    return "no force acts" if m.velocity is not None and not _pulled(m) else None
 
 
 def _along_symmetry_axis(m: Mechanics) -> list[Expression]:

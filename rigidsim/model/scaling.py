@@ -117,7 +117,7 @@ def tidal_amplitude(scene: Scene) -> Any:
     for load in scene.loads:
         if isinstance(load, GravityGradient):
             if load.orbit is None:
-                distance = norm(context, load.position)
+                distance = norm(context, load.position or [])
             else:
                 distance = load.orbit.semi_major_axis * (1 - load.orbit.eccentricity)
         elif isinstance(load, CentralGravity):
@@ -138,7 +138,7 @@ def orbital_rate(scene: Scene) -> Any:
             fastest = max(fastest, load.orbit.mean_motion * context.sqrt(1 - e * e) / (1 - e) ** 2)
         elif isinstance(load, CentralGravity):
             nearest = nearest_approach(scene, load)
-            offset, speed = _relative(scene, load)
+            offset, _speed = _relative(scene, load)
             momentum = norm(context, cross(offset, scene.velocity)) if scene.velocity else context.zero
             fastest = max(fastest, momentum / nearest**2)
     return fastest

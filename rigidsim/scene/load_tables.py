@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from decimal import Decimal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, PlainValidator, WithJsonSchema
 
 from rigidsim.scene.exact import ZERO, ExactNumber, parse_number
+from rigidsim.scene.messages import shown
 from rigidsim.scene.tables import (
     Acceleration,
     Angle,
@@ -18,7 +20,13 @@ from rigidsim.scene.tables import (
     Second,
     Table,
     Triple,
+    refuse,
 )
+
+RATE_NAMES = ("wx", "wy", "wz")
+ATTITUDE_NAMES = ("qw", "qx", "qy", "qz", "phi", "theta", "psi")
+FLIGHT_NAMES = ("x", "y", "z", "vx", "vy", "vz")
+"""Names of the state in expressions, beside t."""
 
 
 def _standard_gravity() -> list[ExactNumber]:
@@ -74,7 +82,39 @@ class ViscousTorque(Table):
     coefficients: Triple[Damping]
 
 
+def _component(value: Any) -> str:
+    """An expression; a bare number is one too."""
+    if isinstance(value, bool) or not isinstance(value, str | int | Decimal | float):
+        raise refuse(f'given {shown(value)}; an expression in quotes is allowed, such as "k*sin(t)^2"')
+    return value if isinstance(value, str) else str(value)
+
+
+Formula = Annotated[
+    str, PlainValidator(_component), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
+]
+
+
+class AppliedTorque(Table):
+    """A torque as expressions of t, the state and [parameters], N m."""
+
+    kind: Literal["torque"]
+    components: Triple[Formula]
+    frame: Literal["body", "space"] = "body"
+
+
+class AppliedForce(Table):
+    """A force as expressions, N, at a point of the body (from the reference point; default the centre of
+    mass).
+    """
+
+    kind: Literal["force"]
+    components: Triple[Formula]
+    frame: Literal["body", "space"] = "space"
+    point: Triple[Metre] | None = None
+
+
 LoadTable = Annotated[
-    UniformGravity | GravityGradient | CentralGravity | ViscousTorque, Field(discriminator="kind")
+    UniformGravity | GravityGradient | CentralGravity | AppliedTorque | AppliedForce | ViscousTorque,
+    Field(discriminator="kind"),
 ]
 """Any of them."""

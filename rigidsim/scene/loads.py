@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import load_tables
 from rigidsim.scene.context import Vector
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions import Expression, ExpressionError, names_used, parse_expression
+from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
 
 
 @dataclass(frozen=True)
@@ -83,18 +87,50 @@ class ViscousTorque:
     coefficients: Vector
 
 
-Load = UniformGravity | GravityGradient | CentralGravity | ViscousTorque
+@dataclass(frozen=True)
+class Applied:
+    """A torque (N m) or a force (N) as expressions of time and the state.
+
+    Attributes:
+        kind: "torque" or "force".
+        frame: "body" or "space", of the components.
+        point: where a force acts, body axes, m; None for the centre of mass.
+        number: place in the config, for messages.
+    """
+
+    kind: str
+    components: tuple[Expression, Expression, Expression]
+    frame: str
+    point: Vector | None
+    number: int
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Names that the expressions use."""
+        return frozenset().union(*(names_used(c) for c in self.components))
+
+
+Load = UniformGravity | GravityGradient | CentralGravity | ViscousTorque | Applied
 
 
 def _fail(number: int, key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[[loads]] number {number + 1} {key}", text))
 
 
-def resolve_load(table: load_tables.LoadTable, number: int, context: Any) -> Load:
+def resolve_load(
+    table: load_tables.LoadTable,
+    number: int,
+    context: Any,
+    *,
+    parameters: Mapping[str, ExactNumber],
+    free_flight: bool,
+) -> Load:
     """Work out one load.
 
     Args:
         number: its place in the config, for messages.
+        parameters: named constants of expressions.
+        free_flight: whether the body has a position that expressions may read.
 
     Raises:
         ConfigError: a contradiction or a value out of range.
@@ -108,6 +144,8 @@ def resolve_load(table: load_tables.LoadTable, number: int, context: Any) -> Loa
                     number, f"coefficients[{i}]", f"given {float(coefficient):g}; zero or more is allowed"
                 )
         return ViscousTorque([c.at(context) for c in table.coefficients])
+    if isinstance(table, load_tables.AppliedTorque | load_tables.AppliedForce):
+        return _applied(table, number, context, parameters, free_flight)
     strength = table.gravitational_parameter
     if strength.sign <= 0:
         raise _fail(
@@ -127,6 +165,27 @@ def resolve_load(table: load_tables.LoadTable, number: int, context: Any) -> Loa
     return GravityGradient(
         strength.at(context), _orbit(table.orbit, strength.at(context), number, context), None
     )
+
+
+def _applied(
+    table: load_tables.AppliedTorque | load_tables.AppliedForce,
+    number: int,
+    context: Any,
+    parameters: Mapping[str, ExactNumber],
+    free_flight: bool,
+) -> Applied:
+    names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if free_flight else ()))
+    components = []
+    for i, text in enumerate(table.components):
+        try:
+            components.append(parse_expression(text, names, parameters=parameters))
+        except ExpressionError as error:
+            raise _fail(number, f"components[{i}]", str(error)) from None
+    point = None
+    if isinstance(table, load_tables.AppliedForce) and table.point is not None:
+        point = [x.at(context) for x in table.point]
+    first, second, third = components
+    return Applied(table.kind, (first, second, third), table.frame, point, number)
 
 
 def _orbit(table: load_tables.Orbit, strength: Any, number: int, context: Any) -> KeplerOrbit:
@@ -149,18 +208,13 @@ def _orbit(table: load_tables.Orbit, strength: Any, number: int, context: Any) -
             )
         motion = 2 * context.pi / table.period.at(context)
     return KeplerOrbit(
-        axis,
-        eccentricity,
-        *(
-            getattr(table, key).at(context)
-            for key in (
-                "inclination",
-                "ascending_node",
-                "periapsis",
-                "mean_anomaly",
-                "node_rate",
-                "periapsis_rate",
-            )
-        ),
-        motion,
+        semi_major_axis=axis,
+        eccentricity=eccentricity,
+        inclination=table.inclination.at(context),
+        ascending_node=table.ascending_node.at(context),
+        periapsis=table.periapsis.at(context),
+        mean_anomaly=table.mean_anomaly.at(context),
+        node_rate=table.node_rate.at(context),
+        periapsis_rate=table.periapsis_rate.at(context),
+        mean_motion=motion,
     )

@@ -12,7 +12,6 @@ from pydantic import BaseModel, ValidationError
 from rigidsim.errors import ConfigError, Problem
 
 _LATER: dict[tuple[str, ...], str] = {
-    ("parameters",): "named constants belong to expression loads, which this version doesn't have yet",
     ("events",): "events are not in this version yet",
     ("sweep",): "sweeps are not in this version yet",
     ("integrator", "accuracy"): "not in this version yet; choose a precision and a tolerance",
@@ -26,7 +25,6 @@ _LATER_VALUES: dict[tuple[str, ...], tuple[Any, str]] = {
     ),
     ("output", "lyapunov"): (True, "not in this version yet; allowed: false"),
 }
-_LATER_LOADS = ("torque", "force")
 _TABLES = (
     "body",
     "initial",
@@ -47,6 +45,8 @@ UNION_TAGS = (
     "gravity_gradient",
     "central_gravity",
     "viscous_torque",
+    "torque",
+    "force",
 )
 """Names of a union's alternatives; they are no part of the user's key."""
 
@@ -101,18 +101,6 @@ def later_features(table: Mapping[str, Any]) -> list[Problem]:
         given = _value_at(table, path)
         if type(given) is type(value) and given == value:
             problems.append(Problem(place(path), f"given {shown(given)}: {why}"))
-    loads = table.get("loads")
-    for number, load in enumerate(loads if isinstance(loads, list) else []):
-        kind = _value_at(load, ("kind",))
-        if kind in _LATER_LOADS:
-            where = place(("loads", number, "kind"))
-            problems.append(
-                Problem(
-                    where,
-                    f"given {shown(kind)}: not in this version yet; allowed: "
-                    "uniform_gravity, gravity_gradient, central_gravity, viscous_torque",
-                )
-            )
     return problems
 
 

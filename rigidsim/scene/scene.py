@@ -116,9 +116,14 @@ def build_scene(experiment: Experiment) -> Scene:
     start, end, samples = times
     try:
         inverse = inverse_inertia(context, body)
-        resolved = [loads.resolve_load(table, i, context) for i, table in enumerate(config.loads)]
-        gravity = _gravity(resolved, context)
         position, velocity = _translation(config, body, context)
+        resolved = [
+            loads.resolve_load(
+                table, i, context, parameters=config.parameters, free_flight=position is not None
+            )
+            for i, table in enumerate(config.loads)
+        ]
+        gravity = _gravity(resolved, context)
         _check_loads(resolved, position)
         if gravity is not None and body.mass is None:
             off_center = any(x != 0 for x in body.center_of_mass)

@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, StrictBool, StrictInt, StrictStr, Tag, field_validator
 
 from rigidsim.scene.exact import ZERO, parse_number
-from rigidsim.scene.load_tables import LoadTable
+from rigidsim.scene.expressions import RESERVED
+from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, LoadTable
 from rigidsim.scene.messages import nearest, shown
 from rigidsim.scene.shapes import SHAPES
 from rigidsim.scene.tables import (
@@ -56,6 +57,7 @@ RECORDABLE = (
     "work",
     "energy_balance",
 )
+STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
 EULER_SEQUENCES = tuple(
     first + second + third
     for first in "xyz"
@@ -232,6 +234,7 @@ class Config(Table):
 
     name: StrictStr
     description: StrictStr = ""
+    parameters: dict[StrictStr, Dimensionless] = Field(default_factory=dict)
     body: Body
     initial: Initial
     loads: list[LoadTable] = Field(default_factory=list)
@@ -239,6 +242,16 @@ class Config(Table):
     integrator: Integrator = Field(default_factory=Integrator)
     output: Output = Field(default_factory=Output)
     limits: Limits = Field(default_factory=Limits)
+
+    @field_validator("parameters")
+    @classmethod
+    def _parameter_names(cls, value: dict[str, Any]) -> dict[str, Any]:
+        for name in value:
+            if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,40}", name):
+                raise refuse(f'given the name "{name[:40]}"; allowed: letters, digits and underscores')
+            if name in STATE_NAMES or name in RESERVED:
+                raise refuse(f'given the name "{name}", which expressions use already; rename it')
+        return value
 
     @field_validator("name")
     @classmethod

@@ -1,0 +1,417 @@
+"""Expressions mean what Python's arithmetic means, stay exact, and nothing else gets past the parser."""
+
+from __future__ import annotations
+
+import random
+import re
+import time
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rigidsim.scene.context import context_for
+from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.expressions import (
+    DEEPEST_NESTING,
+    FUNCTIONS,
+    LONGEST_TEXT,
+    Expression,
+    ExpressionError,
+    Name,
+    Number,
+    Operation,
+    constant_value,
+    evaluate,
+    fold,
+    names_used,
+    parse_expression,
+)
+
+NAMES = ("t", "wx", "wy")
+CONTEXT = context_for(50)
+# A few dozen operations, each right to the context's last bit, on numbers of order one.
+CLOSE = mpmath.mpf(2) ** (12 - CONTEXT.prec)
+PARAMETERS = {
+    "k": parse_number("1/4", "1"),
+    "zero": parse_number("0", "1"),
+    "turn": parse_number("1 deg", "rad"),
+}
+
+
+def parse(text: str) -> Expression:
+    return parse_expression(text, NAMES, parameters=PARAMETERS)
+
+
+def value(text: str, **values: Any) -> Any:
+    return evaluate(parse(text), {n: CONTEXT.mpf(v) for n, v in values.items()}, CONTEXT)
+
+
+def exact(text: str) -> Fraction:
+    """The number that an expression was folded to."""
+    root = parse(text).root
+    assert isinstance(root, Number), root
+    assert root.value.pi_power == 0
+    return root.value.rational
+
+
+def refused(text: str) -> ExpressionError:
+    with pytest.raises(ExpressionError) as caught:
+        parse(text)
+    return caught.value
+
+
+# ---- meaning ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1+2*3", 7),
+        ("(1+2)*3", 9),
+        ("7-2-1", 4),
+        ("7-(2-1)", 6),
+        ("12/3/2", 2),
+        ("12/3*2", 8),
+        ("2^3^2", 512),
+        ("2**3**2", 512),
+        ("(2^3)^2", 64),
+        ("-2^2", -4),
+        ("(-2)^2", 4),
+        ("2^-1", Fraction(1, 2)),
+        ("2^-2^2", Fraction(1, 16)),
+        ("2*-3", -6),
+        ("2--3", 5),
+        ("-+-3", 3),
+        ("--2^2", 4),
+        (" 1\t+ 1 ", 2),
+        ("1e3", 1000),
+        (".5", Fraction(1, 2)),
+        ("5.", 5),
+        ("1_000", 1000),
+        ("1.5E-1", Fraction(3, 20)),
+        ("0^0", 1),
+    ],
+)
+def test_precedence_and_associativity(text: str, expected: Fraction | int) -> None:
+    assert exact(text) == expected
+
+
+def test_decimals_and_parameters_stay_exact() -> None:
+    assert exact("0.1 + 0.2") == Fraction(3, 10)
+    assert exact("1/3 + 1/6 - k") == Fraction(1, 4)
+    assert exact("0.1^20") == Fraction(1, 10**20)
+    assert exact("pi/pi") == 1
+    assert exact("zero*5") == 0
+    assert parse("180*turn").root == Number(ExactNumber(Fraction(1), 1), (0, 0))
+    assert parse("2*pi*3").root == parse("6*pi").root
+
+
+def test_a_product_has_one_exact_number() -> None:
+    two_thirds = Number(ExactNumber(Fraction(2, 3)), (0, 0))
+    expected = Operation("product", (two_thirds, Name("wx", (0, 0))), (0, 0))
+    for text in "2*wx/3", "wx*2/3", "wx/3*2", "(2/3)*wx", "2/3*wx":
+        assert parse(text).root == expected
+
+
+def test_a_chain_is_one_operation() -> None:
+    root = parse("+".join(["wx", "wy"] * 300)).root
+    assert isinstance(root, Operation)
+    assert len(root.operands) == 600
+
+
+rational = st.recursive(
+    st.sampled_from([*NAMES, "2", "3", "0.1", "1.5e-1", "7."]),
+    lambda inner: st.one_of(
+        st.tuples(inner, st.sampled_from(["+", "-", "*", "/", " - ", " / "]), inner).map("".join),
+        inner.map(lambda a: f"({a})"),
+        inner.map(lambda a: f"-{a}"),
+        st.tuples(inner, st.sampled_from(["^2", "**3", "^-1", "^(1+1)", "^-2"])).map("".join),
+    ),
+    max_leaves=10,
+)
+RATIONALS = {"t": Fraction(3, 4), "wx": Fraction(-5, 8), "wy": Fraction(7, 2)}
+
+
+@settings(max_examples=250)
+@given(rational)
+def test_arithmetic_is_that_of_pythons_fractions(text: str) -> None:
+    """Python reads the same text, written in the test itself, with its own precedence and exact fractions."""
+    try:
+        expression = parse(text)
+    except ExpressionError as error:
+        assume("beyond 64" not in str(error))
+        assert "division by" in str(error) or "isn't real" in str(error)  # noqa: PT017
+        expression = None
+    python = re.sub(r"(?<![\w.])(\d+\.?\d*(?:e-?\d+)?)", r"F('\1')", text.replace("^", "**"))
+    python = python.replace("7.'", "7'")
+    try:
+        expected = eval(python, {"__builtins__": {}, "F": Fraction}, dict(RATIONALS))
+    except (ZeroDivisionError, OverflowError):
+        return  # what is zero only after rounding needn't be noticed
+    assume(isinstance(expected, Fraction))  # a fractional power makes it a float
+    assert expression is not None
+    context = mpmath.MPContext()
+    context.prec = 4000
+    assume(max(abs(expected.numerator), expected.denominator).bit_length() < 500)
+    values = {name: context.mpf(x.numerator) / x.denominator for name, x in RATIONALS.items()}
+    got = evaluate(expression, values, context)
+    assert abs(got - context.mpf(expected.numerator) / expected.denominator) < context.mpf(2) ** -2000
+
+
+def test_functions_are_mpmaths_own() -> None:
+    x = CONTEXT.mpf("0.3")
+    for name in set(FUNCTIONS) - {"sigmoid", "atan2"}:
+        assert abs(value(f"{name}(wx)", wx=x) - getattr(CONTEXT, name)(x)) < CLOSE
+    assert abs(value("atan2(wx, -1)", wx=x) - CONTEXT.atan2(x, -1)) < CLOSE
+    for y in (x, -x, CONTEXT.mpf(400)):
+        assert abs(value("sigmoid(wx)", wx=y) - 1 / (1 + CONTEXT.exp(-y))) < CLOSE
+    assert value("sigmoid(wx)", wx=-(10**9)) >= 0
+    assert abs(value("e^(1/2)*pi") - CONTEXT.sqrt(CONTEXT.e) * CONTEXT.pi) < CLOSE
+
+
+def test_values_follow_the_contexts_precision() -> None:
+    expression = parse("sin(1/3)*sqrt(2)")
+    for digits in 20, 300:
+        context = context_for(digits)
+        expected = context.sin(context.mpf(1) / 3) * context.sqrt(2)
+        assert abs(evaluate(expression, {}, context) - expected) < context.mpf(2) ** (4 - context.prec)
+
+
+def test_names_used_and_constants() -> None:
+    assert names_used(parse("k*sin(t)^2 + wx - pi + e")) == {"t", "wx"}
+    assert names_used(parse("k")) == frozenset()
+    assert constant_value(parse("2*wx"), CONTEXT) is None
+    assert abs(constant_value(parse("cos(pi/3)"), CONTEXT) - CONTEXT.mpf("0.5")) < CLOSE
+
+
+def test_fold_needs_no_recursion() -> None:
+    """2000 characters of left-associative divisions are a tree a thousand levels deep."""
+    expression = parse("/".join(["t"] * 1000))
+    assert fold(expression, lambda _, operands: 1 + max(operands, default=0)) == 1000
+    assert value(expression.text, t=1) == 1
+
+
+# ---- refusals ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "message"),
+    [
+        ("", None, "an empty expression; write a number or a formula"),
+        (" \t", None, "an empty expression"),
+        ("wx + why", 6, 'unknown name "why"; did you mean "wy"?; allowed: t, wx, wy, k, zero, turn, pi, e'),
+        ("2*WX", 3, 'unknown name "WX"; did you mean "wx"?'),
+        ("1+sine(t)", 3, 'unknown function "sine"; did you mean "sin"?; allowed: sin, cos, '),
+        ("abs(t)", 1, 'unknown function "abs"; write sqrt((...)^2)'),
+        ("t(2)", 1, '"t" is no function; a product has its *, as in t*(...)'),
+        ("sin t", 1, 'the function "sin" has its arguments in parentheses; write sin(x)'),
+        ("sin()", 4, 'given 0 arguments; "sin" takes 1; write sin(x)'),
+        ("sin(1, t)", 4, 'given 2 arguments; "sin" takes 1'),
+        ("atan2(t)", 6, 'given 1 arguments; "atan2" takes 2; write atan2(y, x)'),
+        ("()", 1, "given 0 arguments; one value stands in parentheses"),
+        ("(t, 1)", 1, "given 2 arguments; one value stands in parentheses"),
+        ("2*(t+1", 7, 'a ")" is missing for the "(" in column 3'),
+        ("sin(t", 6, 'a ")" is missing for the "(" in column 4'),
+        ("t+1)", 4, 'a ")" without its "("'),
+        ("t, 1", 2, "a comma stands only between the arguments of a function"),
+        ("2 t", 3, 'an operator is missing before "t"; a product has its *, as in 2*t'),
+        ("2(t)", 2, 'an operator is missing before "("'),
+        ("1 +", 4, 'a number, a name or "(" is missing before the end'),
+        ("1//2", 3, 'a number, a name or "(" is missing before /'),
+        ("1.2.3", 1, '"1.2.3" is no number, such as 2, 0.5 or 1e-3'),
+        ("2t", 1, '"2t" is no number'),
+        ("t+1e", 3, '"1e" is no number'),
+        ("0x10", 1, '"0x10" is no number'),
+        ("2*1e5001", 3, 'given "1e5001"; digits and exponent of a number may make at most 5000'),
+        ("wx = 2", 4, "without assignments; write only what stands right of the ="),
+        ("wx == 2", 4, "without comparisons; an event takes the difference of both sides"),
+        ("wx <= 2", 4, "without comparisons"),
+        ("wx != 2", 4, "without comparisons"),
+        ("wx^t", 4, "an exponent must be constant; write exp(y*log(x)) for x^y"),
+        ("wx^65", 4, 'the exponent "65" is beyond 64; -64 to 64 are allowed'),
+        ("wx^-64.5", 4, 'the exponent "-64.5" is beyond 64'),
+        ("wx^exp(5)", 4, 'the exponent "exp(5)" is beyond 64'),
+        ("1/0", 3, 'division by the zero in "0"'),
+        ("wx/(0.1+0.2-0.3)", 5, 'division by the zero in "0.1+0.2-0.3"'),
+        ("wx/sin(zero)", 4, 'division by the zero in "sin(zero)"'),
+        ("wx/zero", 4, 'division by the zero in "zero"'),
+        ("zero^-1", 1, 'a power that isn\'t real and finite (of zero or of a negative number) in "zero^-1"'),
+        ("(-8)^(1/3)", 1, "a power that isn't real and finite"),
+        ("wx*log(-1)", 4, 'log needs a number above zero in "log(-1)"'),
+        ("log(0)", 1, "log needs a number above zero"),
+        ("sqrt(-k)", 1, 'sqrt needs a number of at least zero in "sqrt(-k)"'),
+        ("asin(2)", 1, "an inverse sine or cosine needs a number from -1 to 1"),
+        ("atan2(0, zero)", 1, "atan2 needs two numbers that aren't both zero"),
+        ("exp(1e5)", 1, 'a value beyond 1e6000 in "exp(1e5)"'),
+        ("t*(1e4000*1e4000)", 4, "a value beyond 1e6000"),
+    ],
+)
+def test_errors_say_what_is_wrong_and_where(text: str, column: int | None, message: str) -> None:
+    error = refused(text)
+    assert message in str(error)
+    assert error.column == column
+    if column is not None:
+        first, shown, caret = str(error).split("\n")
+        assert first.startswith(f"column {column}: ")
+        assert shown == "  " + text.replace("\t", " ")
+        assert caret == "  " + " " * (column - 1) + "^"
+
+
+@pytest.mark.parametrize(
+    ("text", "column"),
+    [
+        ("wx.__class__", 3),
+        ("().__class__", 1),
+        ("__import__('os')", 1),
+        ('open("x")', 1),
+        ("lambda: 0", 7),
+        ('f"{t}"', 2),
+        ("t[0]", 2),
+        ("{t}", 1),
+        ("t; wx", 2),
+        ("t@wx", 2),
+        ("t # comment", 3),
+        ("t if wx else 1", 3),
+        ("t\nwx", 2),
+        ("t\\", 2),
+        ("t\0", 2),
+        ("\ufefft", 1),
+        ("wх", 2),  # a Cyrillic letter
+        ("２*t", 1),  # a full-width digit
+        ("1٣", 1),  # an Arabic digit
+        ("t²", 2),
+        ("t−1", 2),  # a minus sign that isn't the keyboard's
+        ("\u00a01", 1),
+        ("exec(t)", 1),
+        ("10**10**10", 5),
+        ("9**9**9**9", 7),
+        ("exp(exp(exp(20)))", 5),
+        ("(" * 1000, DEEPEST_NESTING + 2),
+        ("-" * 1000 + "1", DEEPEST_NESTING + 2),
+        ("2^" * 900 + "1", None),
+        ("sin(" * 400, None),
+        ("(" * 10**5 + ")" * 10**5, None),
+        ("t+" * 10**6 + "t", None),
+        ("1" * 10**7, None),
+    ],
+)
+def test_hostile_texts_are_refused_quickly(text: str, column: int | None) -> None:
+    start = time.process_time()
+    error = refused(text)
+    assert time.process_time() - start < 1.0  # a hang is what this is about; a refusal takes well under 0.1 s
+    assert len(str(error)) < 500
+    assert column is None or error.column == column
+
+
+def test_the_slowest_texts_are_still_quick() -> None:
+    """What the limits let through, at their edge: big integers and arguments, tiny values, divisions."""
+    for text in (
+        "*".join(["1e4999"] * 280),
+        "/".join(["1e-4999"] * 240),
+        "((((9e99^64)^64)^64)^64)^64",
+        "sin(exp(exp(9)))",
+        "1+" + "tanh(" * 10 + "exp(-exp(9000))" + ")" * 10,
+        "(" * 60 + "t" + "/3)" * 60,
+        "(1/" * 60 + "cos(1)" + ")" * 60,
+        "log(1-erf(1e4999))",
+    ):
+        start = time.process_time()
+        try:
+            parse(text)
+        except ExpressionError as error:
+            assert "1e6000" in str(error) or "log" in str(error)  # noqa: PT017
+        assert time.process_time() - start < 3.0
+
+
+def test_limits_are_the_ones_stated() -> None:
+    assert parse("(" * DEEPEST_NESTING + "t" + ")" * DEEPEST_NESTING).root == Name("t", (0, 0))
+    assert "at most 64 levels" in str(refused("(" * (DEEPEST_NESTING + 1) + "t"))
+    assert parse("t" + " " * (LONGEST_TEXT - 1)).root == Name("t", (0, 0))
+    assert "an expression of 2001 characters; at most 2000" in str(refused("t" + " " * LONGEST_TEXT))
+    assert parse("wx^64 + wx^-64")
+    # depth counts what is open, not what was closed
+    assert parse("+".join(["((t))"] * 200))
+
+
+def test_a_long_text_is_shown_around_the_place() -> None:
+    error = refused("1+" * 400 + "what" + "+1" * 400)
+    _, shown, caret = str(error).split("\n")
+    assert error.column == 801
+    assert shown[caret.index("^") :].startswith("what")
+    assert len(shown) < 120
+
+
+@pytest.mark.parametrize("name", ["t", "sin", "pi", "e"])
+def test_a_parameter_has_a_name_of_its_own(name: str) -> None:
+    with pytest.raises(ExpressionError, match=f'the parameter "{name}" has the name of a variable'):
+        parse_expression("1", NAMES, parameters={name: ExactNumber(Fraction(1))})
+
+
+@pytest.mark.parametrize(
+    ("text", "wx", "message"),
+    [
+        ("1 + 1/(wx-1)", 1, 'column 5: division by zero in "1/(wx-1)"'),
+        ("log(wx)", 0, "log needs a number above zero"),
+        ("2*sqrt(wx)", -1, 'column 3: sqrt needs a number of at least zero in "sqrt(wx)"'),
+        ("wx^-2", 0, "a power that isn't real and finite"),
+        ("wx^0.5", -1, "a power that isn't real and finite"),
+        ("acos(wx)", 1.5, "from -1 to 1"),
+        ("atan2(wx, -wx)", 0, "aren't both zero"),
+        ("cosh(wx)", -20000, 'a value beyond 1e6000 in "cosh(wx)"'),
+        ("wx^64*wx^64", mpmath.mpf("1e100"), "a value beyond 1e6000"),
+    ],
+)
+def test_evaluation_names_the_part_at_fault(text: str, wx: Any, message: str) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        value(text, wx=wx)
+    assert message in str(caught.value)
+    assert str(caught.value).endswith("^")
+
+
+NASTY = [
+    *"()+-*/^.,_=<>!@#$%&|~`'\"[]{};:?\\ \t\n\0\x7f",
+    *"0123456789eExXjJ²٣２хαπ−×\u200b\ud800",
+    *[
+        "**",
+        "wx",
+        "t",
+        "sin(",
+        "atan2(",
+        "e",
+        "pi",
+        "k",
+        "zero",
+        "1e",
+        "1e-",
+        "__class__",
+        "lambda",
+        "import",
+        "0x",
+    ],
+]
+
+
+def test_random_texts_give_a_tree_or_an_error() -> None:
+    """2000 texts over a nasty alphabet, half of them from the characters of expressions alone."""
+    dice = random.Random(20240607)
+    tame = [c for c in NASTY if c.isascii() and re.fullmatch(r"[\w.()+*/^,-]+", c)]
+    understood = 0
+    start = time.process_time()
+    for n in range(2000):
+        alphabet = tame if n % 2 else NASTY
+        text = "".join(dice.choice(alphabet) for _ in range(dice.randint(1, 5 if n % 3 else 60)))
+        try:
+            expression = parse(text)
+        except ExpressionError as error:
+            assert str(error)  # noqa: PT017
+            continue
+        understood += 1
+        kinds = fold(expression, lambda node, operands: {type(node)}.union(*operands))
+        assert kinds <= {Number, Name, Operation}
+        assert names_used(expression) <= set(NAMES)
+    assert understood > 50
+    assert time.process_time() - start < 30
