@@ -144,8 +144,9 @@ class Mechanics:
 
     @cached_property
     def symmetry_direction(self) -> list[Any] | None:
-        """Unit axis about which the tensor is symmetric, body axes (mpf); None for an asymmetric body, and for
-        a sphere without a weight to mark an axis.
+        """Unit axis about which the tensor is symmetric, body axes (mpf).
+
+        None for an asymmetric body, and for a sphere without a weight to mark an axis.
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes

@@ -258,12 +258,14 @@ OBSERVABLES: tuple[Observable, ...] = (
         _conservative, energy_scale,
     ),
     Observable(
-        "total_angular_momentum", SPACE, "kg m2 s-1", "angular momentum about the attracting point, orbital plus spin",
+        "total_angular_momentum", SPACE, "kg m2 s-1",
+        "angular momentum about the attracting point, orbital plus spin",
         _total_momentum, _same(_MOMENTUM, 3), "space axes", ("attractor",), _central, total_momentum_scale,
     ),
     Observable(
-        "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [m.carried(m.jacobi)], _same(_ENERGY, 1), "",
-        ("jacobi",), lambda m: "the only load is a gravity gradient on a circular orbit", energy_scale,
+        "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [m.carried(m.jacobi)],
+        _same(_ENERGY, 1), "", ("jacobi",),
+        lambda m: "the only load is a gravity gradient on a circular orbit", energy_scale,
     ),
     Observable(
         "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],

@@ -9,6 +9,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.catalogue import load_models
 from rigidsim.model.dynamics import (
     Number,
     flight_equations,
@@ -18,9 +19,10 @@ from rigidsim.model.dynamics import (
     vertical_from_attitude,
 )
 from rigidsim.model.formulations import BUILDERS, AttitudeStates
-from rigidsim.model.loads import CentralGravityModel, LoadModel, load_models
+from rigidsim.model.loads import LoadModel
 from rigidsim.model.mechanics import Mechanics, in_common_unit
-from rigidsim.model.observables import OBSERVABLES, WORK, Observable, work_is_needed
+from rigidsim.model.observables import WORK, work_is_needed
+from rigidsim.model.recording import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.requirements import Requirements, choose_requirements
 from rigidsim.model.rotations import Expression
 from rigidsim.model.scaling import Scaling, choose_scaling, largest_rates
@@ -30,52 +32,6 @@ from rigidsim.scene.scene import Scene
 
 _LARGEST_EXPONENT = 1000
 """Of a recorded variable in SI: float64 ends at 2^1024, and the size of a variable is known roughly."""
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """One variable of the dataset.
-
-    Attributes:
-        first, count: its components among ``System.outputs``.
-        exponents: binary exponents that bring the components to SI.
-        continuity: how samples are joined: "" (as they are), "winding" (angles that are states),
-            "unwrap" (angles found from another formulation), "parity" and "nearest" (quaternion signs).
-    """
-
-    name: str
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    frame: str
-    first: int
-    count: int
-    exponents: list[int]
-    invariant: bool
-    continuity: str = ""
-
-
-@dataclass(frozen=True)
-class Invariant:
-    """Something that the motion conserves, and the drift that is watched.
-
-    Attributes:
-        why: the reason that it is conserved.
-        expressions: its components, in internal units.
-        exponents: binary exponents of the components' units.
-        scale: what drifts are relative to, SI (mpf); ``scale_name`` says what it is.
-        numerical: True for what only the numerical representation has (a quaternion's norm).
-    """
-
-    name: str
-    why: str
-    units: str
-    long_name: str
-    expressions: list[Expression]
-    exponents: list[int]
-    scale: Any
-    scale_name: str
-    numerical: bool = False
 
 
 @dataclass(frozen=True)
@@ -192,9 +148,9 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         exponents.append(scaling.energy)
         requirements.reasons.append((WORK, "work of the loads without a potential, to check the energy"))
     _refuse_singular_start(scene, attitude)
-    recorded, outputs = _recorded(mechanics, requirements)
-    invariants = _invariants(mechanics, norms)
-    outputs += _drifts(invariants, context, number)
+    recorded, outputs = recorded_variables(mechanics, requirements)
+    invariants = find_invariants(mechanics, norms)
+    outputs += drift_outputs(invariants, context, number)
     angle_states = tuple(3 + i for i in attitude.angles) if attitude else ()
     _refuse_out_of_range(initial, [*recorded, *invariants], number)
     return System(
@@ -243,126 +199,3 @@ def _refuse_out_of_range(
         largest = max(variable.exponents, key=abs)
         if abs(largest) > _LARGEST_EXPONENT:
             raise OverflowError(f"{variable.name} would be about 2^{largest} {variable.units}")
-
-
-def _available(m: Mechanics, observable: Observable) -> bool:
-    has = {
-        "attitude": m.attitude is not None,
-        "vertical": m.vertical is not None and m.numbers.arm is not None,
-        "flight": m.velocity is not None,
-        "gravity": m.potential_energy is not None,
-        "symmetry": m.symmetry_direction is not None,
-        "energy": m.velocity is not None or not m.scene.free_flight,
-        "work": work_is_needed(m),
-        "jacobi": m.attitude is not None and m.jacobi is not None,
-        "attractor": m.velocity is not None and any(isinstance(x, CentralGravityModel) for x in m.loads),
-    }
-    return all(has[need] for need in observable.needs)
-
-
-def _by_default(m: Mechanics, observable: Observable) -> bool:
-    if observable.name == "euler_angles":
-        return m.attitude is not None and m.attitude.kind == "euler_angles"
-    if observable.name == "rotation_matrix":
-        return m.attitude is not None and m.attitude.kind == "rotation_matrix"
-    if observable.name == "rotational_energy":
-        return m.scene.free_flight
-    return True
-
-
-def _recorded(m: Mechanics, requirements: Requirements) -> tuple[list[Recorded], list[Expression]]:
-    recorded: list[Recorded] = []
-    outputs: list[Expression] = []
-    asked = requirements.record
-    for observable in OBSERVABLES:
-        wanted = _by_default(m, observable) if asked is None else observable.name in asked
-        if not wanted:
-            continue
-        if not _available(m, observable):
-            if asked is not None:
-                raise ConfigError(
-                    Problem(
-                        "[output] record", f'given "{observable.name}": this scene has none; leave it out'
-                    )
-                )
-            continue
-        components = observable.expressions(m)
-        continuity = ""
-        if m.attitude is not None and observable.name == "euler_angles":
-            continuity = "winding" if m.attitude.kind == "euler_angles" else "unwrap"
-        if m.attitude is not None and observable.name == "quaternion":
-            signs = {"state": "", "winding": "parity", "nearest": "nearest"}
-            continuity = signs[m.attitude.quaternion_sign]
-        recorded.append(
-            Recorded(
-                observable.name,
-                observable.dims,
-                observable.units,
-                observable.long_name,
-                observable.frame,
-                len(outputs),
-                len(components),
-                observable.exponents(m),
-                observable.conserved(m) is not None,
-                continuity,
-            )
-        )
-        outputs += components
-    return recorded, outputs
-
-
-def _invariants(m: Mechanics, norms: list[Expression]) -> list[Invariant]:
-    found = []
-    for observable in OBSERVABLES:
-        if observable.drift_scale is None or not _available(m, observable):
-            continue
-        why = observable.conserved(m)
-        if why is None:
-            continue
-        scale, scale_name = observable.drift_scale(m)
-        found.append(
-            Invariant(
-                observable.name,
-                why,
-                observable.units,
-                observable.long_name,
-                observable.expressions(m),
-                observable.exponents(m),
-                scale,
-                scale_name,
-            )
-        )
-    for number, expression in enumerate(norms):
-        found.append(
-            Invariant(f"orbit_norm_{number + 1}", "it is so by definition", "1",
-                      "norm of a cosine and sine that an orbit is carried by", [expression], [0],
-                      m.scene.context.one, "1", numerical=True)
-        )  # fmt: skip
-    if m.attitude is not None and m.attitude.defect is not None:
-        name, long_name, expression = m.attitude.defect
-        found.append(
-            Invariant(name, "it is so by definition", "1", long_name, [expression], [0],
-                      m.scene.context.one, "1", numerical=True)
-        )  # fmt: skip
-    if m.attitude is None and m.vertical is not None:
-        norm = hy.sqrt(hy.sum([v * v for v in m.vertical]))
-        found.append(
-            Invariant("vertical_norm", "it is so by definition", "1", "norm of the vertical in body axes",
-                      [norm], [0], m.scene.context.one, "1", numerical=True)
-        )  # fmt: skip
-    return found
-
-
-def _drifts(invariants: list[Invariant], context: Any, number: Number) -> list[Expression]:
-    """(value - initial) / scale; of a vector, the norm of the difference over the scale."""
-    drifts = []
-    first = 0
-    for invariant in invariants:
-        inverse = number(context.ldexp(1, invariant.exponents[0]) / invariant.scale)
-        differences = [x - hy.par[first + n] for n, x in enumerate(invariant.expressions)]
-        first += len(differences)
-        if len(differences) == 1:
-            drifts.append(inverse * differences[0])
-        else:
-            drifts.append(inverse * hy.sqrt(hy.sum([d * d for d in differences])))
-    return drifts

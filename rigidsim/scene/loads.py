@@ -10,8 +10,9 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import load_tables
 from rigidsim.scene.context import Vector
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions import Expression, ExpressionError, names_used, parse_expression
+from rigidsim.scene.expressions import Expression, ExpressionError, names_used
 from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
+from rigidsim.scene.parser import parse_expression
 
 
 @dataclass(frozen=True)

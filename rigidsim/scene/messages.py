@@ -113,35 +113,38 @@ def _value_at(table: Any, path: tuple[str, ...]) -> Any:
 
 
 def _model_at(model: type[BaseModel], location: tuple[str | int, ...]) -> type[BaseModel] | None:
-    """The table that holds the last key of ``location``."""
-    current: type[BaseModel] | None = model
+    """The table that holds the last key of ``location``, in which alternatives go by their ``kind``."""
+    candidates = [model]
     for key in location[:-1]:
-        if isinstance(key, int) or current is None:
+        if isinstance(key, int):
             continue
-        field = current.model_fields.get(key)
-        current = _first_model(field.annotation) if field else None
-    return current
+        if key in UNION_TAGS:
+            candidates = [m for m in candidates if key in _kinds(m)] or candidates
+            continue
+        fields = [m.model_fields[key] for m in candidates if key in m.model_fields]
+        candidates = [m for field in fields for m in _models(field.annotation)]
+    return candidates[0] if candidates else None
 
 
-def _first_model(annotation: Any) -> type[BaseModel] | None:
+def _kinds(model: type[BaseModel]) -> tuple[Any, ...]:
+    field = model.model_fields.get("kind")
+    return get_args(field.annotation) if field else ()
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in get_args(annotation):
-        found = _first_model(argument)
-        if found is not None:
-            return found
-    return None
+        return [annotation]
+    return [model for argument in get_args(annotation) for model in _models(argument)]
 
 
-def _what(model: type[BaseModel], error: Mapping[str, Any]) -> str:
+def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
     kind, context = error["type"], error.get("ctx", {})
     location, given = tuple(error["loc"]), error["input"]
     if kind == "extra_forbidden":
-        table = _model_at(model, location)
         fields = sorted(table.model_fields) if table else []
         near = nearest(str(location[-1]), fields)
         return f"unknown key{near}; allowed: {', '.join(fields)}"
-    if kind == "missing":
+    if kind in ("missing", "union_tag_not_found"):
         return "missing; it must be given"
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = context.get("expected", context.get("expected_tags", ""))
@@ -172,7 +175,12 @@ def config_error(model: type[BaseModel], error: ValidationError) -> ConfigError:
     for item in error.errors(include_url=False):
         # the alternatives of a union each report; their names are no part of the user's key
         location = tuple(part for part in item["loc"] if part not in UNION_TAGS)
+        given = item["input"]
+        if item["type"].startswith("union_tag"):  # a table told apart by its kind: the key at fault is kind
+            location = (*location, "kind")
+            given = _value_at(given, ("kind",))
         where = place(location)
-        problem = Problem(where, _what(model, {**item, "loc": location}))
+        table = _model_at(model, tuple(item["loc"]))
+        problem = Problem(where, _what(table, {**item, "loc": location, "input": given}))
         problems.setdefault(where, problem)
     return ConfigError(list(problems.values()))

@@ -8,7 +8,8 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.system import Recorded, System
+from rigidsim.model.recording import Recorded
+from rigidsim.model.system import System
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.winding import Winding
 

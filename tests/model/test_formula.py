@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from rigidsim.model.formula import to_heyoka
 from rigidsim.scene import expressions
 from rigidsim.scene.context import context_for
-from rigidsim.scene.expressions import Expression, ExpressionError, evaluate, fold, operate, parse_expression
+from rigidsim.scene.expressions import Expression, ExpressionError, evaluate, fold, operate
+from rigidsim.scene.parser import parse_expression
 from rigidsim.solve.precision import Precision, precision_of
 
 NAMES = ("t", "wx", "wy")

@@ -869,7 +869,21 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         [LATER, "remove the key"],
     ),
     "sweep": ({"more": '[sweep]\nmode = "zip"'}, "[sweep]", [LATER, "remove the key"]),
-    "parameters": ({"more": "[parameters]\nk = 1"}, "[parameters]", ["doesn't have yet", "remove the key"]),
+    "parameter named as a state": (
+        {"more": "[parameters]\nwx = 1"},
+        "[parameters]",
+        ['given the name "wx"', "which expressions use already", "rename it"],
+    ),
+    "parameter named with a blank": (
+        {"more": '[parameters]\n"a b" = 1'},
+        "[parameters]",
+        ['given the name "a b"', "allowed: letters, digits and underscores"],
+    ),
+    "parameter with a unit": (
+        {"more": '[parameters]\nk = "1 m"'},
+        "[parameters] k",
+        ["without one is allowed"],
+    ),
     "accuracy": (
         {"integrator": "accuracy = 1e-9"},
         "[integrator] accuracy",
@@ -891,10 +905,87 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[integrator] formulation",
         ['given "canonical"', LATER, "allowed: auto"],
     ),
-    "load of a later version": (
-        {"loads": 'kind = "gravity_gradient"\norbit = {semi_major_axis = 1}'},
+    "gradient without a source": (
+        {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1'},
+        "[[loads]] number 1 orbit",
+        ["given neither of orbit and position", "exactly one is needed"],
+    ),
+    "gradient with two sources": (
+        {
+            "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\nposition = [1, 0, 0]\n'
+            "orbit = {semi_major_axis = 1}"
+        },
+        "[[loads]] number 1 orbit",
+        ["given both of orbit and position"],
+    ),
+    "gradient from the body's own place": (
+        {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\nposition = [0, 0, 0]'},
+        "[[loads]] number 1 position",
+        ["given the origin", "another point is allowed"],
+    ),
+    "negative gravitational parameter": (
+        {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = -1\nposition = [1, 0, 0]'},
+        "[[loads]] number 1 gravitational_parameter",
+        ["given -1", "a positive number is allowed"],
+    ),
+    "parabolic orbit": (
+        {
+            "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+            "orbit = {semi_major_axis = 1, eccentricity = 1}"
+        },
+        "[[loads]] number 1 orbit.eccentricity",
+        ["given 1.0", "below 1 is allowed"],
+    ),
+    "orbit without a size": (
+        {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {eccentricity = 0.1}'},
+        "[[loads]] number 1 orbit.semi_major_axis",
+        ["missing"],
+    ),
+    "orbit of negative size": (
+        {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = -1}'},
+        "[[loads]] number 1 orbit.semi_major_axis",
+        ["given -1.0 m", "a positive length is allowed"],
+    ),
+    "orbital element misspelt": (
+        {
+            "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+            "orbit = {semi_major_axis = 1, eccentricty = 0.1}"
+        },
+        "[[loads]] number 1 orbit.eccentricty",
+        ["unknown key", 'did you mean "eccentricity"?'],
+    ),
+    "central gravity without a position": (
+        {"loads": 'kind = "central_gravity"\ngravitational_parameter = 1'},
         "[[loads]] number 1 kind",
-        ['given "gravity_gradient"', LATER, "allowed: uniform_gravity"],
+        ['given "central_gravity" for a body without a position', "gravity_gradient"],
+    ),
+    "negative damping": (
+        {"loads": 'kind = "viscous_torque"\ncoefficients = [1, -2, 3]'},
+        "[[loads]] number 1 coefficients[1]",
+        ["given -2", "zero or more is allowed"],
+    ),
+    "torque in an unknown frame": (
+        {"loads": 'kind = "torque"\ncomponents = ["0", "0", "1"]\nframe = "bdy"'},
+        "[[loads]] number 1 frame",
+        ['given "bdy"', 'did you mean "body"?', "allowed: body, space"],
+    ),
+    "expression with an unknown name": (
+        {"loads": 'kind = "torque"\ncomponents = ["0", "2*vx", "1"]'},
+        "[[loads]] number 1 components[1]",
+        ['column 3: unknown name "vx"', "allowed: t, wx"],
+    ),
+    "expression that would run code": (
+        {"loads": """kind = "torque"\ncomponents = ["().__class__", "0", "1"]"""},
+        "[[loads]] number 1 components[0]",
+        ["column"],
+    ),
+    "rates alone where a load reads the attitude": (
+        {
+            "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\nposition = [1, 0, 0]',
+            "integrator": 'formulation = "rates"',
+        },
+        "[integrator] formulation",
+        ['given "rates", but gravity_gradient reads the attitude', 'choose "auto"'],
     ),
 }
 
@@ -980,7 +1071,7 @@ def test_all_problems_of_the_file_are_reported_at_once() -> None:
     )
     problems = refused(lambda: prepare(parse(text)))
     assert sorted(problem.where for problem in problems) == [
-        "[[loads]] number 1 kind",
+        "[[loads]] number 1 components",
         "[body] mas",
         "[body] principal_moments[1]",
         "[integrator] hold_invariants",

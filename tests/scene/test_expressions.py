@@ -16,9 +16,7 @@ from hypothesis import strategies as st
 from rigidsim.scene.context import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.expressions import (
-    DEEPEST_NESTING,
     FUNCTIONS,
-    LONGEST_TEXT,
     Expression,
     ExpressionError,
     Name,
@@ -28,8 +26,8 @@ from rigidsim.scene.expressions import (
     evaluate,
     fold,
     names_used,
-    parse_expression,
 )
+from rigidsim.scene.parser import DEEPEST_NESTING, LONGEST_TEXT, parse_expression
 
 NAMES = ("t", "wx", "wy")
 CONTEXT = context_for(50)
