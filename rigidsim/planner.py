@@ -79,8 +79,9 @@ def plan(experiment: Experiment) -> dict[str, Any]:
             else 0.0,
             "attitude_error_rad": None
             if growth is None
-            else round_off_law(prepared.effective_tolerance, int(steps), rate, duration) * growth.factor,
-            "amplification": None if growth is None else growth.factor,
+            else round_off_law(prepared.effective_tolerance, int(steps), rate, duration)
+            * growth.at(duration),
+            "amplification": None if growth is None else growth.at(duration),
         },
         "body": {
             "source": prepared.scene.body.source,

@@ -120,7 +120,8 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
     if estimate is not None:
         factor = accuracy.get("amplification", 1)
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        _line(out, "attitude", f"uncertain by about {estimate:.1e} rad at the end (round-off law{unstable})")
+        size = f"uncertain by about {estimate:.1e} rad" if estimate < math.pi else "unknown"
+        _line(out, "attitude", f"{size} at the end (round-off law{unstable})")
     for warning in summary["warnings"]:
         _line(out, "warning", warning, "bold red")
     _line(out, "folder", folder)

@@ -121,8 +121,8 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
     estimate = attitude_error(prepared, progress, growth)
     if estimate is not None and estimate > _LOST_DIGITS:
         found.append(
-            f"the attitude is uncertain by about {estimate:.2g} rad at the end, so its digits are gone; "
-            "choose a higher precision or a nearer end"
+            f"the attitude is uncertain by about {min(estimate, math.pi):.2g} rad at the end, so its "
+            f"digits are gone{_since(prepared, progress, growth)}; choose a higher precision or a nearer end"
         )
     turns = float(system.rate_bound) * largest_spacing(prepared) / math.pi
     joined = [r.name for r in system.recorded if r.continuity in ("unwrap", "nearest")]
@@ -132,6 +132,15 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
             "degrees between samples; sample more often, or choose the formulation that carries them"
         )
     return found
+
+
+def _since(prepared: Prepared, progress: Progress, growth: Growth | None) -> str:
+    horizon = predictable_seconds(prepared, progress, growth)
+    if horizon is None or growth is None:
+        return ""
+    start = float(prepared.scene.start)
+    since = start + max(horizon, 0.0)
+    return f" from about {since:.3g} s on (errors grow e-fold every {1 / growth.rate:.3g} s)"
 
 
 def largest_spacing(prepared: Prepared) -> float:
@@ -149,8 +158,24 @@ def attitude_error(prepared: Prepared, progress: Progress, growth: Growth | None
         return None
     duration = abs(progress.time - float(prepared.scene.start))
     rate = float(prepared.system.rate_bound)
-    estimate = round_off_law(prepared.effective_tolerance, progress.steps, rate, duration) * growth.factor
+    law = round_off_law(prepared.effective_tolerance, progress.steps, rate, duration)
+    estimate = law * growth.at(duration)
     return estimate if math.isfinite(estimate) else sys.float_info.max
+
+
+def predictable_seconds(prepared: Prepared, progress: Progress, growth: Growth | None) -> float | None:
+    """Time after the start from which the attitude's digits are gone, by the estimate.
+
+    None for motions whose errors don't grow exponentially.
+    """
+    if growth is None or growth.rate == 0.0:
+        return None
+    duration = abs(progress.time - float(prepared.scene.start))
+    rate = float(prepared.system.rate_bound)
+    law = round_off_law(prepared.effective_tolerance, progress.steps, rate, duration)
+    if law == 0.0:
+        return None
+    return growth.window + math.log(_LOST_DIGITS / (law * growth.factor)) / growth.rate
 
 
 def summarise(
@@ -168,6 +193,7 @@ def summarise(
     """The content of ``summary.json``."""
     scene, system = prepared.scene, prepared.system
     estimate = attitude_error(prepared, progress, growth)
+    duration = abs(progress.time - float(scene.start))
     return {
         "name": scene.name,
         "description": scene.description,
@@ -195,7 +221,9 @@ def summarise(
             "requested": None,
             "estimated_attitude_error": estimate,
             "estimated_how": "round-off law (tolerance/2) sqrt(steps) |w| t / sqrt 3, times amplification",
-            "amplification": None if growth is None else min(growth.factor, sys.float_info.max),
+            "amplification": None if growth is None else min(growth.at(duration), sys.float_info.max),
+            "error_growth_rate": None if growth is None else growth.rate,
+            "predictable_seconds": predictable_seconds(prepared, progress, growth),
             "amplification_seconds": None if growth is None else growth.seconds,
             "amplification_how": "growth of small offsets over the linear growth of a stable motion, "
             "measured on the beginning of the motion; 1 for a stable one",

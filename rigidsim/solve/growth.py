@@ -23,6 +23,11 @@ _WINDOW = 64  # comparisons after each launch
 _OFFSET = 2.0**-30  # of the scaled states: far above rounding, far below the motion
 _STABLE = 4.0
 """Stable motions show up to about this, since an offset is no pure change of frequency."""
+_DOUBLING = math.log(
+    2.0
+)  # growth of a linear law from half a window to a whole one, measured as 0.69 +- 0.03
+_EXPONENTIAL = _DOUBLING + 1.0
+_LARGEST_EXPONENT = 600.0  # keeps products within doubles
 
 
 @dataclass(frozen=True)
@@ -33,10 +38,19 @@ class Growth:
         factor: largest growth of an offset in rates and attitude, over the linear growth |w| t / sqrt 3 of
             a stable motion; 1 where it is no larger than a few times that.
         seconds: how much of the motion was looked at.
+        rate: of exponential growth beyond each comparison's window, 1/s; zero where growth is linear.
+        window: length of a comparison, seconds.
     """
 
     factor: float
     seconds: float
+    rate: float
+    window: float
+
+    def at(self, seconds: float) -> float:
+        """Amplification over a run of this length."""
+        exponent = self.rate * max(0.0, seconds - self.window)
+        return self.factor * math.exp(min(exponent, _LARGEST_EXPONENT))
 
 
 def measure_growth(system: System, precision: Precision, start: float, end: float) -> Growth:
@@ -58,18 +72,32 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
     rate = math.ldexp(float(system.rate_bound), system.scaling.time)
     generator = np.random.default_rng(0)  # the same offsets each time
     other = Stepper(system, precision, None, precision.scalar(start))
-    largest = 0.0
+    largest, slopes, window = 0.0, [], 0.0
     for launch in np.linspace(0, max(len(marks) - 2, 0), _LAUNCHES).astype(int):
         offset = np.zeros(len(system.states))
         offset[followed] = generator.standard_normal(len(followed))
         offset *= _OFFSET / np.linalg.norm(offset)
         other.back_to(marks[launch], 0)
         other.state[:] = marks[launch].state + offset
+        grown: list[float] = []
         for look in range(launch + 1, min(launch + 1 + _WINDOW, len(marks))):
             if not other.to(times[look]):
                 break
             distance = float(np.linalg.norm((other.state - marks[look].state)[followed]))
             linear = max(1.0, rate * (times[look] - times[launch]) / math.sqrt(3))
             largest = max(largest, distance / _OFFSET / linear)
-    seconds = math.ldexp(min(times[-1], end) - start, system.scaling.time)
-    return Growth(largest if largest > _STABLE else 1.0, seconds)
+            grown.append(distance)
+        half = len(grown) // 2
+        if half >= _WINDOW // 4 and min(max(grown[:half]), max(grown[half:])) > 0:
+            span = times[launch + 2 * half] - times[launch + half]
+            slopes.append((math.log(max(grown[half:]) / max(grown[:half])), span))
+            window = max(window, times[launch + 2 * half] - times[launch])
+    unit = math.ldexp(1.0, system.scaling.time)
+    slope, span = sorted(slopes)[len(slopes) // 2] if slopes else (0.0, 1.0)
+    exponential = slope > _EXPONENTIAL
+    return Growth(
+        factor=largest if largest > _STABLE else 1.0,
+        seconds=(min(times[-1], end) - start) * unit,
+        rate=(slope - _DOUBLING) / span / unit if exponential else 0.0,
+        window=window * unit,
+    )

@@ -43,3 +43,43 @@ def test_lost_digits_are_said(runs: Path) -> None:
     assert any("digits are gone" in warning for warning in lost.summary["warnings"])
     kept = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), runs, 'integrator.precision="quadruple"')
     assert not kept.summary["warnings"]
+
+
+SATELLITE = """
+name = "satellite"
+[body]
+principal_moments = [0.59555, 0.85945, 1]
+[initial]
+angular_velocity = {rates}
+euler_angles = [0, 0.3, 0]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 1
+orbit = {{semi_major_axis = 1, eccentricity = {eccentricity}}}
+[time]
+end = 600
+samples = 601
+"""
+
+
+def test_hyperion_tumbles_beyond_prediction(runs: Path) -> None:
+    """Wisdom, Peale & Mignard 1984: errors grow e-fold in about 8 / n; double has 15 digits to lose."""
+    chaotic = run_text(SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1), runs)
+    accuracy = chaotic.summary["accuracy"]
+    # the pilot sees some 40 orbits, over which the rate itself is uncertain by a factor of two
+    assert 0.06 < accuracy["error_growth_rate"] < 0.24
+    digits = 34.5  # natural logarithm of 1e15
+    assert digits / 0.24 / 2 < accuracy["predictable_seconds"] < digits / 0.06
+    assert any("digits are gone from about" in warning for warning in chaotic.summary["warnings"])
+    quadruple = run_text(
+        SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1), runs, 'integrator.precision="quadruple"'
+    )
+    longer = quadruple.summary["accuracy"]["predictable_seconds"]
+    assert longer > 1.8 * accuracy["predictable_seconds"]
+
+
+def test_fast_spin_on_a_circular_orbit_is_predictable(runs: Path) -> None:
+    regular = run_text(SATELLITE.format(rates="[0, 0, 20]", eccentricity=0), runs)
+    assert regular.summary["accuracy"]["error_growth_rate"] == 0
+    assert regular.summary["accuracy"]["predictable_seconds"] is None
+    assert not regular.summary["warnings"]
