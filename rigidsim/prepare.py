@@ -99,6 +99,21 @@ def prepare(experiment: Experiment) -> Prepared:
     return Prepared(experiment, scene, precision, system, clock, tolerance)
 
 
+def double_twin(prepared: Prepared) -> System:
+    """The same motion in double precision and, where an attitude is carried, in quaternions: for questions
+    about the motion itself, such as its stability.
+    """
+    config = prepared.scene.config
+    formulation = "rates" if prepared.system.requirements.formulation == "rates" else "quaternion"
+    record = ["angular_velocity"] if formulation == "rates" else ["quaternion"]
+    integrator = config.integrator.model_copy(update={"formulation": formulation})
+    output = config.output.model_copy(update={"record": record})
+    plain = replace(
+        prepared.scene, config=config.model_copy(update={"integrator": integrator, "output": output})
+    )
+    return build_system(plain, precision_of("double").number)
+
+
 def motion_growth(prepared: Prepared) -> Growth | None:
     """How strongly the motion itself amplifies errors (some 30 ms); None where no attitude is carried.
 
@@ -106,13 +121,6 @@ def motion_growth(prepared: Prepared) -> Growth | None:
     """
     if prepared.system.requirements.formulation == "rates":
         return None
-    config = prepared.scene.config
-    integrator = config.integrator.model_copy(update={"formulation": "quaternion"})
-    output = config.output.model_copy(update={"record": ["quaternion"]})
-    plain = replace(
-        prepared.scene, config=config.model_copy(update={"integrator": integrator, "output": output})
-    )
-    double = precision_of("double")
-    system = build_system(plain, double.number)
+    system = double_twin(prepared)
     clock, last = prepared.clock, prepared.clock.count - 1
-    return measure_growth(system, double, float(clock.at(0)), float(clock.at(last)))
+    return measure_growth(system, precision_of("double"), float(clock.at(0)), float(clock.at(last)))

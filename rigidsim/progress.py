@@ -23,7 +23,11 @@ from rigidsim.solve.advance import Progress
 _LINE_EVERY = 5.0  # seconds between plain lines
 _TITLE = 24  # letters of a run's name beside the bar
 _WIDE = 100  # columns from which simulated time has room
-_PHASES = {"dataset": "writing dataset.h5", "timeline": "drawing timeline.rrd"}
+_PHASES = {
+    "lyapunov": "Lyapunov exponents",
+    "dataset": "writing dataset.h5",
+    "timeline": "drawing timeline.rrd",
+}
 
 
 class TerminalObserver(Observer):

@@ -122,6 +122,13 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
         size = f"uncertain by about {estimate:.1e} rad" if estimate < math.pi else "unknown"
         _line(out, "attitude", f"{size} at the end (round-off law{unstable})")
+    chaos = summary.get("lyapunov")
+    if chaos:
+        what = "chaotic" if chaos["chaotic"] else "regular"
+        moved = f"moved by {chaos['moved_over_second_half']:.1g} over the second half"
+        _line(
+            out, "motion", f"{what}: largest Lyapunov exponent {chaos['largest_exponent']:.3g} 1/s ({moved})"
+        )
     for warning in summary["warnings"]:
         _line(out, "warning", warning, "bold red")
     _line(out, "folder", folder)

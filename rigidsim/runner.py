@@ -12,16 +12,17 @@ import numpy as np
 import rigidsim.summary as summaries
 from rigidsim.archive import Run
 from rigidsim.guards import Guards, Interruption, Observer
-from rigidsim.prepare import Prepared, motion_growth, prepare
+from rigidsim.prepare import Prepared, double_twin, motion_growth, prepare
 from rigidsim.scene.reading import Experiment, load
 from rigidsim.solve.advance import Advance, Progress
 from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.lyapunov import LyapunovSpectrum, lyapunov_spectrum
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.winding import Winding
 from rigidsim.store import netcdf, provenance, segments
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.variables import SCHEMA_VERSION
+from rigidsim.store.variables import SCHEMA_VERSION, Extra
 
 if TYPE_CHECKING:
     pass
@@ -88,14 +89,23 @@ def run(
         progress = advance.run()
         if not progress.status.final:
             writer.flush()
-    clock.next("integrate_and_record")
-    observer.progressed(progress)
+        clock.next("integrate_and_record")
+        observer.progressed(progress)
+        spectrum = None
+        if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
+            observer.phase("lyapunov")
+            spectrum = _lyapunov(prepared, interruption)
+            clock.next("lyapunov")
+            if interruption.requested:
+                progress.status = Status.INTERRUPTED
+                writer.flush()
     message = _message(prepared, progress, evaluator)
     summary = summaries.summarise(
         prepared,
         progress,
         watch,
         growth,
+        spectrum,
         message=message,
         initial=evaluator.initial_invariants(),
         seconds=clock.seconds,
@@ -105,7 +115,7 @@ def run(
     summary["cost"]["seconds"]["engine"] = progress.integration_seconds
     try:
         if progress.status.final:
-            _complete(prepared, folder, writer, attributes, summary, clock, observer)
+            _complete(prepared, folder, writer, attributes, summary, spectrum, clock, observer)
     except KeyboardInterrupt:
         kept = "the dataset is complete, the timeline is missing"
         if not folder.dataset.exists():
@@ -124,6 +134,7 @@ def _complete(
     writer: segments.SegmentWriter,
     attributes: dict[str, Any],
     summary: dict[str, Any],
+    spectrum: LyapunovSpectrum | None,
     clock: _Phases,
     observer: Observer,
 ) -> None:
@@ -140,7 +151,7 @@ def _complete(
         "cpu_seconds": cost["cpu_seconds"],
         "finished_at": provenance.now(),
     }
-    writer.complete(folder.dataset, final)
+    writer.complete(folder.dataset, final, _extras(spectrum))
     summary["dataset_sha256"] = provenance.file_sha256(folder.dataset)
     clock.next("dataset")
     output = prepared.scene.config.output
@@ -151,6 +162,25 @@ def _complete(
         with Run(folder, summary).dataset as dataset:
             write_timeline(dataset, folder.timeline, rows=output.timeline_rows)
         clock.next("timeline")
+
+
+def _lyapunov(prepared: Prepared, interruption: Interruption) -> LyapunovSpectrum | None:
+    clock, last = prepared.clock, prepared.clock.count - 1
+    system = double_twin(prepared)
+    start, end = float(clock.at(0)), float(clock.at(last))
+    return lyapunov_spectrum(system, start, end, lambda _: not interruption.requested)
+
+
+def _extras(spectrum: LyapunovSpectrum | None) -> list[Extra]:
+    """The convergence of the exponents, as variables of the dataset."""
+    if spectrum is None:
+        return []
+    along = {"units": "s", "long_name": "time since the run's start, of the estimates"}
+    what = {"units": "s-1", "long_name": "Lyapunov exponents of the scaled states so far, largest first"}
+    return [
+        Extra("lyapunov_time", ("lyapunov_time",), spectrum.times, along),
+        Extra("lyapunov_exponents", ("lyapunov_time", "lyapunov_index"), spectrum.exponents, what),
+    ]
 
 
 class _Phases:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from rigidsim.prepare import Prepared
 from rigidsim.solve.advance import Progress
 from rigidsim.solve.growth import Growth
+from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.status import Status
 
 DRIFT_FACTOR = 50.0
@@ -134,6 +135,32 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
     return found
 
 
+def _with_spectrum(growth: Growth | None, spectrum: LyapunovSpectrum | None, rate: float) -> Growth | None:
+    """What the whole run's exponents say stands above what the beginning alone showed."""
+    if growth is None or spectrum is None:
+        return growth
+    if spectrum.chaotic(rate):
+        return replace(growth, factor=1.0, window=0.0, rate=spectrum.largest)
+    return replace(growth, rate=0.0)
+
+
+def _lyapunov(
+    prepared: Prepared, progress: Progress, growth: Growth | None, spectrum: LyapunovSpectrum | None
+) -> dict[str, Any] | None:
+    if spectrum is None:
+        return None
+    chaotic = spectrum.chaotic(float(prepared.system.rate_bound))
+    return {
+        "chaotic": chaotic,
+        "largest_exponent": spectrum.largest,
+        "moved_over_second_half": spectrum.spread,
+        "e_folding_seconds": 1 / spectrum.largest if chaotic else None,
+        "predictable_seconds": predictable_seconds(prepared, progress, growth),
+        "exponents": [float(x) for x in spectrum.exponents[-1]],
+        "units": "s-1",
+    }
+
+
 def _since(prepared: Prepared, progress: Progress, growth: Growth | None) -> str:
     horizon = predictable_seconds(prepared, progress, growth)
     if horizon is None or growth is None:
@@ -175,7 +202,11 @@ def predictable_seconds(prepared: Prepared, progress: Progress, growth: Growth |
     law = round_off_law(prepared.effective_tolerance, progress.steps, rate, duration)
     if law == 0.0:
         return None
-    return growth.window + math.log(_LOST_DIGITS / (law * growth.factor)) / growth.rate
+    horizon = duration
+    for _ in range(50):  # a contraction: the law grows like t^1.5, the motion's growth exponentially
+        seed = law * (max(horizon, 1e-3 * duration) / duration) ** 1.5 * growth.factor
+        horizon = growth.window + math.log(_LOST_DIGITS / seed) / growth.rate
+    return horizon
 
 
 def summarise(
@@ -183,6 +214,7 @@ def summarise(
     progress: Progress,
     watch: Watch,
     growth: Growth | None,
+    spectrum: LyapunovSpectrum | None,
     *,
     message: str,
     initial: dict[str, list[float]],
@@ -192,6 +224,7 @@ def summarise(
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     scene, system = prepared.scene, prepared.system
+    growth = _with_spectrum(growth, spectrum, float(system.rate_bound))
     estimate = attitude_error(prepared, progress, growth)
     duration = abs(progress.time - float(scene.start))
     return {
@@ -230,6 +263,7 @@ def summarise(
             "certified": None,
             "how": "not certified against an independent solution",
         },
+        "lyapunov": _lyapunov(prepared, progress, growth, spectrum),
         "body": {
             "source": scene.body.source,
             "principal_moments": [float(m) for m in scene.body.principal_moments],

@@ -23,7 +23,6 @@ _LATER_VALUES: dict[tuple[str, ...], tuple[Any, str]] = {
         "canonical",
         "not in this version yet; allowed: auto, rates, quaternion, euler_angles, rotation_matrix",
     ),
-    ("output", "lyapunov"): (True, "not in this version yet; allowed: false"),
 }
 _TABLES = (
     "body",

@@ -17,7 +17,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from rigidsim.store.variables import LABELS, Variable
+from rigidsim.store.variables import LABELS, Extra, Variable
 
 CHUNK_ROWS = 8192
 GZIP_LEVEL = 4  # with shuffle: every reader opens it (other filters fail in some)
@@ -85,6 +85,18 @@ def declare(
                 created.attrs[key] = value
     for key, value in attributes.items():
         file.attrs[key] = value
+
+
+def add_extras(file: Any, extras: Sequence[Extra]) -> None:
+    """Write variables with dimensions of their own."""
+    for extra in extras:
+        for dim, size in zip(extra.dims, extra.values.shape, strict=True):
+            if dim not in file.dimensions:
+                file.dimensions[dim] = size
+        created = file.create_variable(extra.name, extra.dims, np.dtype("<f8"))
+        created[...] = extra.values
+        for key, value in extra.attributes.items():
+            created.attrs[key] = value
 
 
 def fill(file: Any, variables: Sequence[Variable], block: Block, first: int, rows: int) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store import netcdf
-from rigidsim.store.variables import Variable
+from rigidsim.store.variables import Extra, Variable
 
 SEGMENT_BYTES = 32_000_000
 SEGMENT_SECONDS = 30.0
@@ -97,7 +97,7 @@ class SegmentWriter:
             for v in self._variables
         }
 
-    def complete(self, target: Path, attributes: Mapping[str, Any]) -> int:
+    def complete(self, target: Path, attributes: Mapping[str, Any], extras: Sequence[Extra] = ()) -> int:
         """Stream all segments, and what is still in memory, into one compressed dataset.
 
         The dataset appears atomically; then the segments go. Returns its rows.
@@ -117,6 +117,7 @@ class SegmentWriter:
                     first += _copy(path, file, self._variables, first)
                 if self._blocks:
                     netcdf.fill(file, self._variables, self._collected(), first, self._rows)
+                netcdf.add_extras(file, extras)
         remove(self._folder)
         return rows
 

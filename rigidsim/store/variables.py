@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 LABELS: dict[str, list[str]] = {
     "body_axis": ["x", "y", "z"],
     "space_axis": ["X", "Y", "Z"],
@@ -65,3 +67,18 @@ def time_variable(parts: int) -> Variable:
         {"units": "s", "long_name": "time since the start of the scene", "axis": "T"},
         parts,
     )
+
+
+@dataclass(frozen=True)
+class Extra:
+    """A variable with dimensions of its own, small enough to be held in memory.
+
+    Attributes:
+        dims: names; a variable with the name of its only dimension is that dimension's coordinate.
+        values: float64.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    values: np.ndarray
+    attributes: Mapping[str, Any] = field(default_factory=dict)

@@ -889,7 +889,11 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[integrator] accuracy",
         [LATER, "choose a precision and a tolerance"],
     ),
-    "lyapunov": ({"output": "lyapunov = true"}, "[output] lyapunov", ["given true", LATER, "allowed: false"]),
+    "lyapunov a number": (
+        {"output": "lyapunov = 1"},
+        "[output] lyapunov",
+        ["given 1; true or false is allowed"],
+    ),
     "hold_invariants": (
         {"integrator": "hold_invariants = true"},
         "[integrator] hold_invariants",

@@ -1,0 +1,100 @@
+"""Lyapunov exponents: zero for what is integrable, in pairs, and the same in other units of time."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import run_text
+
+import rigidsim
+
+SATELLITE = """
+name = "satellite"
+[body]
+principal_moments = [0.59555, 0.85945, 1]
+[initial]
+angular_velocity = {rates}
+euler_angles = [{angle}, 0, 0]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = {strength}
+orbit = {{semi_major_axis = 1, eccentricity = 0.1}}
+[time]
+end = {end}
+samples = 501
+[output]
+lyapunov = true
+record = ["angular_velocity", "quaternion"]
+"""
+
+
+def chaotic(out: Path, unit: float = 1.0, end: float = 4000.0) -> rigidsim.Run:
+    """Wisdom, Peale & Mignard 1984: start at 90 degrees with w = n; a tiny tilt of w lets it tumble."""
+    rates = f"[{1e-3 / unit!r}, {1e-3 / unit!r}, {1 / unit!r}]"
+    text = SATELLITE.format(rates=rates, angle=math.pi / 2, strength=repr(unit**-2.0), end=repr(end * unit))
+    return run_text(text, out)
+
+
+def test_hyperion_is_chaotic_and_its_exponents_come_in_pairs(runs: Path) -> None:
+    run = chaotic(runs)
+    chaos = run.summary["lyapunov"]
+    assert chaos["chaotic"]
+    # "about 0.1 n" (1984); 0.120 re-computed over 2000 orbits: 640 orbits leave a third of statistical error
+    assert 0.08 < chaos["largest_exponent"] < 0.17
+    exponents = np.array(chaos["exponents"])
+    # a system with a Hamiltonian: pairs of opposite sign, up to the constraints' and the clock's zeros
+    assert abs(exponents.sum()) < 0.02 * chaos["largest_exponent"] * len(exponents)
+    assert exponents[0] == pytest.approx(-exponents[-1], rel=0.05)
+    assert chaos["e_folding_seconds"] == pytest.approx(1 / chaos["largest_exponent"])
+    # 1e-16 grows to 1e-2 in ln(1e14) e-foldings; the round-off that adds on the way takes some of them
+    assert 0.5 * 32 < chaos["predictable_seconds"] * chaos["largest_exponent"] < 33
+    assert any("digits are gone from about" in warning for warning in run.summary["warnings"])
+
+
+def test_convergence_is_in_the_dataset(runs: Path) -> None:
+    run = chaotic(runs, end=500.0)
+    estimates = run.dataset["lyapunov_exponents"]
+    assert estimates.dims == ("lyapunov_time", "lyapunov_index")
+    assert estimates.attrs["units"] == "s-1"
+    assert estimates.sizes["lyapunov_index"] == len(run.summary["states"])
+    assert float(run.dataset["lyapunov_time"][-1]) == pytest.approx(500.0, rel=1e-12)
+    assert (np.diff(estimates.values, axis=1) <= 0).all()
+    assert float(estimates[-1, 0]) == run.summary["lyapunov"]["largest_exponent"]
+
+
+def test_exponents_scale_with_the_unit_of_time(runs: Path) -> None:
+    one = chaotic(runs, end=300.0).summary["lyapunov"]["largest_exponent"]
+    other = chaotic(runs, unit=1024.0, end=300.0).summary["lyapunov"]["largest_exponent"]
+    # the same motion in units of 1024 s; scaling is by powers of two, only the texts of numbers are rounded,
+    # and 300 units amplify that by e^36 times 1e-16
+    assert other * 1024 == pytest.approx(one, rel=0.2)
+
+
+def test_a_free_body_is_regular(runs: Path) -> None:
+    text = """
+    name = "free"
+    [body]
+    principal_moments = [1, 2, 3]
+    [initial]
+    angular_velocity = [0.5, 0.25, 1]
+    [time]
+    end = 2000
+    samples = 11
+    [output]
+    lyapunov = true
+    record = {record}
+    """
+    for record in ('["angular_velocity"]', '["quaternion"]'):
+        run = run_text(text.format(record=record), runs)
+        chaos = run.summary["lyapunov"]
+        assert not chaos["chaotic"]
+        assert chaos["predictable_seconds"] is None
+        # integrable: offsets grow linearly, so that the estimate falls like log(t)/t
+        assert 0 <= chaos["largest_exponent"] < 2 * math.log(2000) / 2000
+        assert len(chaos["exponents"]) == len(run.summary["states"])
+    plain = run_text(text.format(record='["quaternion"]').replace("lyapunov = true", ""), runs)
+    assert plain.summary["lyapunov"] is None
+    assert "lyapunov_exponents" not in plain.dataset
