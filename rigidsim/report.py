@@ -122,6 +122,8 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
         size = f"uncertain by about {estimate:.1e} rad" if estimate < math.pi else "unknown"
         _line(out, "attitude", f"{size} at the end (round-off law{unstable})")
+    if summary.get("events"):
+        _line(out, "events", ", ".join(f"{name} {count:,}" for name, count in summary["events"].items()))
     chaos = summary.get("lyapunov")
     if chaos:
         what = "chaotic" if chaos["chaotic"] else "regular"

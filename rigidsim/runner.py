@@ -11,11 +11,13 @@ import numpy as np
 
 import rigidsim.summary as summaries
 from rigidsim.archive import Run
+from rigidsim.crossings import event_counts, event_variables
 from rigidsim.guards import Guards, Interruption, Observer
 from rigidsim.prepare import Prepared, double_twin, motion_growth, prepare
 from rigidsim.scene.reading import Experiment, load
 from rigidsim.solve.advance import Advance, Progress
 from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.events import EventLog
 from rigidsim.solve.lyapunov import LyapunovSpectrum, lyapunov_spectrum
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
@@ -61,7 +63,8 @@ def run(
     netcdf.write_bytes(folder.config, experiment.text.encode())
 
     winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
+    log = EventLog([c.stop for c in prepared.system.crossings], winding.turns)
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0), log)
     evaluator = Evaluator(prepared.system, prepared.precision, winding)
     growth = motion_growth(prepared)
     attributes = _attributes(prepared, stepper)
@@ -112,10 +115,13 @@ def run(
         cpu_seconds=time.process_time() - cpu,
         provenance=_plain(attributes),
     )
+    last = float(prepared.clock.at(prepared.clock.count - 1))
+    extras = event_variables(prepared, log, evaluator, last) + _extras(spectrum)
+    summary["events"] = event_counts(prepared, log, last)
     summary["cost"]["seconds"]["engine"] = progress.integration_seconds
     try:
         if progress.status.final:
-            _complete(prepared, folder, writer, attributes, summary, spectrum, clock, observer)
+            _complete(prepared, folder, writer, attributes, summary, extras, clock, observer)
     except KeyboardInterrupt:
         kept = "the dataset is complete, the timeline is missing"
         if not folder.dataset.exists():
@@ -134,7 +140,7 @@ def _complete(
     writer: segments.SegmentWriter,
     attributes: dict[str, Any],
     summary: dict[str, Any],
-    spectrum: LyapunovSpectrum | None,
+    extras: list[Extra],
     clock: _Phases,
     observer: Observer,
 ) -> None:
@@ -151,7 +157,7 @@ def _complete(
         "cpu_seconds": cost["cpu_seconds"],
         "finished_at": provenance.now(),
     }
-    writer.complete(folder.dataset, final, _extras(spectrum))
+    writer.complete(folder.dataset, final, extras)
     summary["dataset_sha256"] = provenance.file_sha256(folder.dataset)
     clock.next("dataset")
     output = prepared.scene.config.output

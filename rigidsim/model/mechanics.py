@@ -126,8 +126,8 @@ class Mechanics:
 
     @property
     def conserves_energy(self) -> bool:
-        """Whether every load has a potential that doesn't depend on time."""
-        return all(load.conservative for load in self.loads)
+        """Whether every load that acts has a potential that doesn't depend on time."""
+        return all(load.conservative or not (load.torque(self) or load.force(self)) for load in self.loads)
 
     @cached_property
     def energy(self) -> Expression:
@@ -166,7 +166,9 @@ class Mechanics:
     def keeps_axial(self) -> bool:
         """Whether the angular momentum along the symmetry axis is conserved."""
         axis = self.symmetry_direction
-        return axis is not None and all(load.keeps_axial(self, axis) for load in self.loads)
+        if axis is None:
+            return False
+        return all(load.keeps_axial(self, axis) or not load.torque(self) for load in self.loads)
 
     @cached_property
     def jacobi(self) -> Expression | None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.loads import LoadModel
+from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES
 from rigidsim.scene.scene import Scene
 
 ATTITUDE_RECORDS = ("quaternion", "euler_angles", "rotation_matrix", "angular_momentum")
@@ -50,6 +51,10 @@ def choose_requirements(scene: Scene, loads: Sequence[LoadModel] = ()) -> Requir
     record = scene.config.output.record
     _check_recordable(scene, asked, record)
     readers = {need: [load.title for load in loads if need in load.reads] for need in ("attitude", "flight")}
+    for event in scene.events:
+        for need, names in (("attitude", ATTITUDE_NAMES), ("flight", FLIGHT_NAMES)):
+            if event.reads & set(names):
+                readers[need].append(f"event {event.name}")
     _check_readers(asked, readers)
     reasons = [("wx wy wz", _why_rates(scene, record))]
     left_out: list[tuple[str, str]] = []

@@ -9,6 +9,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.applied import state_names
 from rigidsim.model.catalogue import load_models
 from rigidsim.model.dynamics import (
     Number,
@@ -18,6 +19,7 @@ from rigidsim.model.dynamics import (
     vertical_equations,
     vertical_from_attitude,
 )
+from rigidsim.model.formula import to_heyoka
 from rigidsim.model.formulations import BUILDERS, AttitudeStates
 from rigidsim.model.loads import LoadModel
 from rigidsim.model.mechanics import Mechanics, in_common_unit
@@ -35,6 +37,16 @@ _LARGEST_EXPONENT = 1000
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """An event as an expression of the states; ``direction`` is -1, 0 (any) or 1."""
+
+    name: str
+    expression: Expression
+    direction: int
+    stop: bool
+
+
+@dataclass(frozen=True)
 class System:
     """First-order equations with scaled states, and everything recorded as expressions of them.
 
@@ -47,6 +59,7 @@ class System:
             are ``par[..]`` in the order of the invariants' components.
         angle_states: positions of states that are angles growing without bound.
         singular_factor: expression that vanishes where the formulation breaks down, or None.
+        crossings: events to be found along the way.
         rate_bound: upper bound of the absolute angular velocity, rad/s (mpf).
     """
 
@@ -64,6 +77,7 @@ class System:
     singular_factor: Expression | None
     sequence: str
     rate_bound: Any
+    crossings: list[Crossing]
 
     @property
     def variables(self) -> list[Expression]:
@@ -168,7 +182,21 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         singular_factor=attitude.singular_factor if attitude else None,
         sequence=scene.config.integrator.euler_sequence,
         rate_bound=max(largest_rates(scene)),
+        crossings=_crossings(mechanics),
     )
+
+
+def _crossings(m: Mechanics) -> list[Crossing]:
+    signs = {"any": 0, "up": 1, "down": -1}
+    return [
+        Crossing(
+            event.name,
+            to_heyoka(event.expression, state_names(m, event.reads), m.number, m.scene.context),
+            signs[event.direction],
+            event.stop,
+        )
+        for event in m.scene.events
+    ]
 
 
 def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:

@@ -12,7 +12,6 @@ from pydantic import BaseModel, ValidationError
 from rigidsim.errors import ConfigError, Problem
 
 _LATER: dict[tuple[str, ...], str] = {
-    ("events",): "events are not in this version yet",
     ("sweep",): "sweeps are not in this version yet",
     ("integrator", "accuracy"): "not in this version yet; choose a precision and a tolerance",
 }

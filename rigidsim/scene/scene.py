@@ -11,6 +11,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import attitude, loads, schema
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.context import Matrix, Vector, apply, context_for, dot, transpose
+from rigidsim.scene.events import Event, resolve_events
 from rigidsim.scene.messages import shown
 from rigidsim.scene.reading import Experiment
 
@@ -54,6 +55,7 @@ class Scene:
         position, velocity: of the centre of mass, space axes; None unless the body moves freely.
         gravity: uniform acceleration in space axes, m/s^2, or None without such a load.
         loads: the others.
+        events: crossings that are recorded, or end the run.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
     """
 
@@ -69,6 +71,7 @@ class Scene:
     velocity: Vector | None
     gravity: Vector | None
     loads: tuple[loads.Load, ...]
+    events: tuple[Event, ...]
     start: Any
     end: Any
     samples: SampleTimes
@@ -142,6 +145,7 @@ def build_scene(experiment: Experiment) -> Scene:
             velocity=velocity,
             gravity=gravity,
             loads=tuple(load for load in resolved if not isinstance(load, loads.UniformGravity)),
+            events=resolve_events(config, free_flight=position is not None),
             start=start,
             end=end,
             samples=samples,

@@ -221,6 +221,24 @@ class Output(Table):
         return value
 
 
+class EventTable(Table):
+    """``[[events]]``: where an expression of time and the state crosses zero."""
+
+    name: StrictStr
+    expression: StrictStr
+    direction: Literal["any", "up", "down"] = "any"
+    action: Literal["record", "stop"] = "record"
+
+    @field_validator("name")
+    @classmethod
+    def _variable_name(cls, value: str) -> str:
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", value):
+            raise refuse(
+                f'given "{value[:40]}"; allowed: letters, digits and underscores, beginning with a letter'
+            )
+        return value
+
+
 class Limits(Table):
     """``[limits]``: guards that stop the run, resumable, with the reason named."""
 
@@ -238,10 +256,20 @@ class Config(Table):
     body: Body
     initial: Initial
     loads: list[LoadTable] = Field(default_factory=list)
+    events: list[EventTable] = Field(default_factory=list)
     time: Time
     integrator: Integrator = Field(default_factory=Integrator)
     output: Output = Field(default_factory=Output)
     limits: Limits = Field(default_factory=Limits)
+
+    @field_validator("events")
+    @classmethod
+    def _event_names(cls, value: list[EventTable]) -> list[EventTable]:
+        names = [event.name for event in value]
+        for name in names:
+            if names.count(name) > 1:
+                raise refuse(f'two events are named "{name}"; give each a name of its own')
+        return value
 
     @field_validator("parameters")
     @classmethod

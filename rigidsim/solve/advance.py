@@ -88,7 +88,7 @@ class Advance:
 
     def __post_init__(self) -> None:
         self.progress = Progress(self.clock.count)
-        self._buffer: list[tuple[np.ndarray, np.ndarray]] = []
+        self._buffer: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._buffered = 0
         self._flushed = time.perf_counter()
         self._last = float(self.clock.at(self.clock.count - 1))
@@ -115,6 +115,11 @@ class Advance:
             progress.time = float(np.ldexp(float(self.stepper.time), self.clock.exponent))
             taken = max(self.stepper.steps - before, 1)
             self._pace = taken / max(elapsed, 1e-9)
+            if self.stepper.log.stop is not None:
+                self._drop_after(self.stepper.log.stop)
+                self._flush()
+                progress.status = Status.EVENT
+                return progress
             if not fine:
                 self._flush()
                 progress.status = Status.NON_FINITE
@@ -256,8 +261,18 @@ class Advance:
 
     def _keep(self, times: np.ndarray, states: np.ndarray) -> None:
         turns = np.tile(self.winding.turns, (len(times), 1))
-        self._buffer.append((times, states, turns))  # type: ignore[arg-type]
+        self._buffer.append((times, states, turns))
         self._buffered += len(times)
+
+    def _drop_after(self, time: Any) -> None:
+        """Forget buffered samples past a time (an event that ends the run)."""
+        kept = []
+        for times, states, turns in self._buffer:
+            inside = times <= time
+            if inside.any():
+                kept.append((times[inside], states[inside], turns[inside]))
+        self._buffer = kept
+        self._buffered = sum(len(times) for times, _, _ in kept)
 
     def _flush(self) -> None:
         """Hand the buffered samples over, in blocks of bounded size."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -108,6 +109,14 @@ class Evaluator:
             drift = values[first + n].astype(np.float64)
             result[f"{invariant.name}_drift"] = [drift[:, None]]
         return result
+
+    def evaluate_apart(self, states: np.ndarray, turns: np.ndarray) -> dict[str, list[np.ndarray]]:
+        """As ``evaluate``, for states that aren't among the samples: nothing is joined to them later."""
+        memory = copy.deepcopy(self.memory)
+        try:
+            return self.evaluate(states, turns)
+        finally:
+            self.memory = memory
 
     def _joined(self, variable: Recorded, block: np.ndarray, turns: np.ndarray) -> np.ndarray:
         if variable.continuity == "winding":

@@ -10,6 +10,7 @@ class Status(Enum):
 
     RUNNING = "running"
     FINISHED = "finished"
+    EVENT = "finished: event"
     INTERRUPTED = "interrupted"
     WALL_TIME = "stopped: wall_time"
     MAX_STEPS = "stopped: max_steps"
@@ -25,19 +26,20 @@ class Status(Enum):
     @property
     def exit_code(self) -> int:
         """Of the command line."""
-        if self is Status.FINISHED:
+        if self in (Status.FINISHED, Status.EVENT):
             return 0
         return 130 if self is Status.INTERRUPTED else 3
 
     @property
     def final(self) -> bool:
         """True where going on could not help, so that the dataset is completed as it is."""
-        return self in (Status.FINISHED, Status.NON_FINITE, Status.COLLAPSED)
+        return self in (Status.FINISHED, Status.EVENT, Status.NON_FINITE, Status.COLLAPSED)
 
 
 _MESSAGES = {
     Status.RUNNING: "the run is under way, or was killed",
     Status.FINISHED: "the run reached its last sample",
+    Status.EVENT: "the run ended at an event, as asked",
     Status.INTERRUPTED: "the run was interrupted; what was integrated is kept",
     Status.WALL_TIME: "the guard [limits] wall_time was reached; what was integrated is kept",
     Status.MAX_STEPS: "the guard [limits] max_steps was reached; what was integrated is kept",

@@ -14,6 +14,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision
 
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
@@ -28,6 +29,7 @@ class Mark:
 
     time: tuple[Any, Any]
     state: np.ndarray
+    events: int = 0
 
 
 class Stepper:
@@ -35,12 +37,23 @@ class Stepper:
 
     Attributes:
         steps: natural steps taken and kept.
+        log: the events found along the way.
         smallest, largest: step sizes of the latest call, internal units.
     """
 
-    def __init__(self, system: System, precision: Precision, tolerance: Any, start: Any) -> None:
+    def __init__(
+        self,
+        system: System,
+        precision: Precision,
+        tolerance: Any,
+        start: Any,
+        log: EventLog | None = None,
+    ) -> None:
         self._precision = precision
+        self.log = log or EventLog([], np.zeros(0, dtype=np.int64))
         options = dict(precision.options)
+        if log is not None and system.crossings:
+            options["nt_events"] = engine_events(system, precision, log)
         if tolerance is not None:
             options["tol"] = tolerance
         self._integrator = hy.taylor_adaptive(
@@ -73,12 +86,13 @@ class Stepper:
 
     def mark(self) -> Mark:
         """Remember this boundary."""
-        return Mark(self._integrator.dtime, np.array(self._integrator.state))
+        return Mark(self._integrator.dtime, np.array(self._integrator.state), len(self.log.found))
 
     def back_to(self, mark: Mark, steps: int) -> None:
         """Return to a boundary; ``steps`` is the count that it had."""
         self._integrator.dtime = mark.time
         self._integrator.state[:] = mark.state
+        self.log.back_to(mark.events)
         self.steps = steps
 
     def step(self) -> bool:

@@ -68,7 +68,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "table misspelt": (
         {"more": '[integratr]\nprecision = "double"'},
         "integratr",
-        ["unknown key", 'did you mean "integrator"?', "allowed: body, description, initial"],
+        ["unknown key", 'did you mean "integrator"?', "allowed: body, description, events, initial"],
     ),
     "top key misspelt": ({"top": 'name = "x"\nnmae = "y"'}, "nmae", ["unknown key", 'did you mean "name"?']),
     "body key misspelt": (
@@ -863,10 +863,10 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "key twice": ({"top": 'name = "a"\nname = "b"'}, "TOML", ["can't be read", "at line 2, column"]),
     "table twice": ({"more": "[time]\nend = 2"}, "TOML", ['Cannot declare "time" twice', "line"]),
     # what the interface promises for later
-    "events": (
-        {"more": '[[events]]\nname = "flip"\nexpression = "wy"'},
-        "[[events]]",
-        [LATER, "remove the key"],
+    "event without an expression": (
+        {"more": '[[events]]\nname = "flip"'},
+        "[[events]] number 1 expression",
+        ["missing"],
     ),
     "sweep": ({"more": '[sweep]\nmode = "zip"'}, "[sweep]", [LATER, "remove the key"]),
     "parameter named as a state": (
@@ -1141,7 +1141,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["run", "plan"])
 @pytest.mark.parametrize(
-    "case", ["triangle inequality", "key twice", "samples too dense", "events", "table misspelt"]
+    "case", ["triangle inequality", "key twice", "samples too dense", "sweep", "table misspelt"]
 )
 def test_the_command_line_says_it_and_leaves_no_folder(tmp_path: Path, command: str, case: str) -> None:
     tables, where, phrases = CASES[case]

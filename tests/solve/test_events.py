@@ -1,0 +1,171 @@
+"""Events: crossings to full precision, found however the run is driven."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from support import run_text
+
+from rigidsim.errors import ConfigError
+from rigidsim.solve import advance
+
+FLIPS = """
+name = "flips"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.0625, 1, 0.0625]
+euler_angles = [0.1, 1, 0.2]
+[time]
+end = 200
+samples = {samples}
+"""
+FLIP = """
+[[events]]
+name = "flip"
+expression = "wy"
+"""
+
+
+def flip_interval() -> mpmath.mpf:
+    """2 K(k) / p of the asymmetric free top (Landau & Lifshitz, Mechanics, section 37)."""
+    with mpmath.workdps(50):
+        i1, i2, i3 = mpmath.mpf(1), mpmath.mpf(2), mpmath.mpf(3)
+        w1, w2, w3 = mpmath.mpf(1) / 16, mpmath.mpf(1), mpmath.mpf(1) / 16
+        energy2 = i1 * w1**2 + i2 * w2**2 + i3 * w3**2
+        square = (i1 * w1) ** 2 + (i2 * w2) ** 2 + (i3 * w3) ** 2
+        if square < energy2 * i2:  # the axis that L circles is the other one
+            i1, i3 = i3, i1
+        p = mpmath.sqrt((square - energy2 * i1) * (i3 - i2) / (i1 * i2 * i3))
+        m = (square - energy2 * i3) * (i1 - i2) / ((square - energy2 * i1) * (i3 - i2))
+        return 2 * mpmath.ellipk(m) / p
+
+
+@pytest.mark.parametrize(("precision", "epsilon"), [("double", 2.0**-52), ("quadruple", 2.0**-112)])
+def test_flips_come_at_the_interval_of_the_closed_form(precision: str, epsilon: float, runs: Path) -> None:
+    run = run_text(FLIPS.format(samples=11) + FLIP, runs, f'integrator.precision="{precision}"')
+    names = [n for n in ("flip_time", "flip_time_lo", "flip_time_lo2") if n in run.dataset]
+    with mpmath.workdps(50):
+        times = [
+            sum(mpmath.mpf(float(x)) for x in reversed(parts))
+            for parts in zip(*(run.dataset[n].values for n in names), strict=True)
+        ]
+        intervals = [b - a for a, b in pairwise(times)]
+        # an error e of the invariants shifts a flip by e over the square of the offset 1/16 (and over a rate
+        # of about 0.6); errors of some steps' rounding at each of some hundred steps
+        allowed = 100 * epsilon * 16**2
+        assert len(intervals) > 10
+        assert max(abs(x - flip_interval()) for x in intervals) < allowed
+    # at the crossing the rate is zero to the rounding of its dense output
+    assert np.abs(run.dataset["flip_angular_velocity"].values[:, 1]).max() < 100 * epsilon
+    assert run.summary["events"] == {"flip": len(times)}
+
+
+def test_directions_alternate(runs: Path) -> None:
+    both = FLIP + FLIP.replace('"flip"', '"down"') + 'direction = "down"\n'
+    run = run_text(FLIPS.format(samples=11) + both, runs)
+    assert np.array_equal(run.dataset["down_time"], run.dataset["flip_time"][::2])
+
+
+def test_events_change_the_motion_by_rounding_alone(runs: Path) -> None:
+    """Their expressions take part in heyoka's choice of steps."""
+    plain = run_text(FLIPS.format(samples=2001), runs, 'name="plain"').dataset
+    watched = run_text(FLIPS.format(samples=2001) + FLIP, runs, 'name="watched"').dataset
+    difference = np.abs(plain["quaternion"].values - watched["quaternion"].values).max()
+    # rounding of some hundred steps, amplified by the inverse square of the offset 1/16
+    assert difference < 100 * 2.0**-52 * 16**2
+
+
+@pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rotation_matrix"])
+def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven(
+    formulation: str, runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting = f'integrator.formulation="{formulation}"'
+    expected = run_text(FLIPS.format(samples=2001) + FLIP, runs, setting).dataset.load()
+    sparse = run_text(FLIPS.format(samples=3) + FLIP, runs, setting, 'name="sparse"').dataset
+    assert np.array_equal(expected["flip_time"], sparse["flip_time"])
+    # skips that go too far are taken back, and their events with them
+    for name, value in {"_MARGIN": 1.7, "_MEAN_MARGIN": 1.4, "_LONG_GAP": 10.0, "_SPARSE": 2.0}.items():
+        monkeypatch.setattr(advance, name, value)
+    driven = run_text(FLIPS.format(samples=3) + FLIP, runs, setting, 'name="driven"')
+    assert driven.summary["cost"]["steps_redone"] > 0
+    assert np.array_equal(expected["flip_time"], driven.dataset["flip_time"])
+    assert np.array_equal(sparse["flip_quaternion"], driven.dataset["flip_quaternion"])
+
+
+def test_a_run_can_end_at_an_event(runs: Path) -> None:
+    whole = run_text(FLIPS.format(samples=2001) + FLIP, runs, 'name="whole"').dataset
+    run = run_text(FLIPS.format(samples=2001) + FLIP + 'action = "stop"\n', runs)
+    assert run.status == "finished: event"
+    assert run.summary["exit_code"] == 0
+    first = float(whole["flip_time"][0])
+    assert run.dataset["flip_time"].values.tolist() == [first]
+    times = run.dataset["time"].values
+    assert times[-1] <= first < times[-1] + 0.1
+    assert np.array_equal(run.dataset["quaternion"], whole["quaternion"][: len(times)])
+
+
+def test_events_read_attitude_position_and_time(runs: Path) -> None:
+    text = """
+    name = "throw"
+    [parameters]
+    h = 1
+    [body]
+    shape = "sphere"
+    mass = 1
+    radius = 0.1
+    [initial]
+    angular_velocity = [0, 0, 3]
+    velocity = [0, 0, 10]
+    [[loads]]
+    kind = "uniform_gravity"
+    acceleration = [0, 0, -10]
+    [time]
+    end = 2
+    samples = 3
+    [[events]]
+    name = "top"
+    expression = "vz"
+    [[events]]
+    name = "rising"
+    expression = "z - h"
+    direction = "up"
+    [[events]]
+    name = "turned"
+    expression = "qz - sin(3*t/2) + t - 1"
+    """
+    data = run_text(text, runs).dataset
+    # z = 10 t - 5 t^2
+    assert data["top_time"].values == pytest.approx([1.0], abs=1e-14)
+    assert data["rising_time"].values == pytest.approx([1 - np.sqrt(0.8)], abs=1e-14)
+    assert data["turned_time"].values == pytest.approx([1.0], abs=1e-13)  # qz = sin(3 t / 2) exactly
+    assert data["top_position"].values[0, 2] == pytest.approx(5.0, abs=1e-13)
+
+
+def test_an_event_that_never_happens_is_an_empty_variable(runs: Path) -> None:
+    run = run_text(FLIPS.format(samples=11) + FLIP.replace('"wy"', '"wy - 5"'), runs)
+    assert run.dataset.sizes["flip"] == 0
+    assert run.summary["events"] == {"flip": 0}
+
+
+@pytest.mark.parametrize(
+    ("event", "message"),
+    [
+        ('name = "a b"\nexpression = "wy"', "allowed: letters, digits and underscores"),
+        ('name = "a"\nexpression = "x"', 'unknown name "x"'),
+        ('name = "a"\nexpression = "1 + 2"', "which never changes"),
+        ('name = "a"\nexpression = "wy > 0"', "an event takes the difference"),
+        ('name = "a"\nexpression = "wy"\naction = "halt"', "allowed: record, stop"),
+        (
+            'name = "a"\nexpression = "wy"\n[[events]]\nname = "a"\nexpression = "wx"',
+            'two events are named "a"',
+        ),
+    ],
+)
+def test_bad_events_are_refused(event: str, message: str, runs: Path) -> None:
+    with pytest.raises(ConfigError, match=message):
+        run_text(FLIPS.format(samples=11) + f"[[events]]\n{event}\n", runs)
