@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.loads import LoadModel
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.reading import Experiment
 from rigidsim.scene.scene import Scene, build_scene
@@ -21,6 +23,7 @@ class Prepared:
 
     Attributes:
         tolerance: scalar of the precision, or None for its epsilon.
+        python_loads: loads given from Python, of which the config knows nothing.
     """
 
     experiment: Experiment
@@ -29,6 +32,7 @@ class Prepared:
     system: System
     clock: SampleClock
     tolerance: Any | None
+    python_loads: tuple[LoadModel, ...] = ()
 
     @property
     def effective_tolerance(self) -> float:
@@ -74,8 +78,11 @@ class Prepared:
         return result
 
 
-def prepare(experiment: Experiment) -> Prepared:
+def prepare(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> Prepared:
     """Work out an experiment up to its equations.
+
+    Args:
+        loads: loads of one's own, beside those of the config.
 
     Raises:
         ConfigError: with what was given, what is allowed and where.
@@ -85,7 +92,7 @@ def prepare(experiment: Experiment) -> Prepared:
         precision = precision_of(scene.config.integrator.precision)
         asked = scene.config.integrator.tolerance
         tolerance = None if isinstance(asked, str) else precision.number(asked.at(scene.context))
-        system = build_system(scene, precision.number)
+        system = build_system(scene, precision.number, loads)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
     except ConfigError as error:
         raise error.at(experiment.source) from None
@@ -96,7 +103,7 @@ def prepare(experiment: Experiment) -> Prepared:
             f"({error}); choose a higher precision or check the units",
         )
         raise ConfigError(problem, experiment.source) from None
-    return Prepared(experiment, scene, precision, system, clock, tolerance)
+    return Prepared(experiment, scene, precision, system, clock, tolerance, tuple(loads))
 
 
 def double_twin(prepared: Prepared) -> System:
@@ -111,7 +118,7 @@ def double_twin(prepared: Prepared) -> System:
     plain = replace(
         prepared.scene, config=config.model_copy(update={"integrator": integrator, "output": output})
     )
-    return build_system(plain, precision_of("double").number)
+    return build_system(plain, precision_of("double").number, prepared.python_loads)
 
 
 def motion_growth(prepared: Prepared) -> Growth | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ from rigidsim.store.folder import RunFolder
 from rigidsim.store.variables import SCHEMA_VERSION, Extra
 
 if TYPE_CHECKING:
-    pass
+    from rigidsim.model.loads import LoadModel
 
 
 def run(
@@ -36,6 +37,7 @@ def run(
     out: str | Path = "runs",
     force: bool = False,
     observer: Observer | None = None,
+    loads: Sequence[LoadModel] = (),
 ) -> Run:
     """Run an experiment and save it in ``out/<name>/``.
 
@@ -44,6 +46,7 @@ def run(
         out: folder of the run folders.
         force: replace a run of the same name.
         observer: is told how it goes.
+        loads: loads of one's own, beside those of the config, which alone can't reproduce the run then.
 
     Returns:
         The run; its ``status`` tells how it ended, which need not be "finished".
@@ -57,7 +60,7 @@ def run(
     observer = observer or Observer()
     clock = _Phases()
     cpu = time.process_time()
-    prepared = prepare(experiment)
+    prepared = prepare(experiment, loads=loads)
     folder = RunFolder(Path(out) / prepared.scene.name)
     folder.create(force=force)
     netcdf.write_bytes(folder.config, experiment.text.encode())
@@ -225,7 +228,7 @@ def _attributes(prepared: Prepared, stepper: Stepper) -> dict[str, Any]:
         "tolerance": prepared.effective_tolerance,
         "integrator": "heyoka Taylor, natural steps, dense output",
         "taylor_order": int(stepper.integrator.order),
-        "compact_mode": int(prepared.precision.compact),
+        "compact_mode": int(prepared.precision.compact or system.wide),
         "high_accuracy": 0,
         "batch_size": 1,
         "unit_exponents": json.dumps(
@@ -237,6 +240,7 @@ def _attributes(prepared: Prepared, stepper: Stepper) -> dict[str, Any]:
         "inertia_tensor": json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
         "body_source": scene.body.source,
         "drawing": json.dumps(scene.body.drawing),
+        "python_loads": " ".join(type(load).__name__ for load in prepared.python_loads),
         "cpu_model": provenance.cpu_model(),
         "started_at": provenance.now(),
         **found,

@@ -271,8 +271,10 @@ def summarise(
             "mass": None if scene.body.mass is None else float(scene.body.mass),
         },
         "bit_for_bit": {
-            "claim": progress.status is Status.FINISHED,
-            "holds_for": "the same config, versions and CPU features as recorded in provenance",
+            "claim": progress.status is Status.FINISHED and not prepared.python_loads,
+            "holds_for": "the same config, versions and CPU features as recorded in provenance"
+            if not prepared.python_loads
+            else "nothing: loads given from Python are not in the config",
         },
         "provenance": provenance,
     }

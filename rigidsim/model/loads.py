@@ -2,7 +2,7 @@
 
 A load is one small class. Torques and forces are sums of terms, each a constant vector (mpf, worked out
 with guard bits) times an expression of the state, so that constants are rounded once, with those of the
-inertia tensor already in them. A load of one's own derives from ``LoadModel``; see experiments/README.md.
+inertia tensor already in them. A load of one's own derives from ``LoadModel``; see README.md.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import heyoka as hy
 
+from rigidsim.model.ephemeris import MEAN_DISTANCE, Place, place
 from rigidsim.model.rotations import Expression, apply, transpose
 from rigidsim.scene.context import Vector, cross, norm
 from rigidsim.scene.loads import CentralGravity, GravityGradient, ViscousTorque
@@ -46,9 +47,11 @@ class LoadModel:
         title: in reasons and messages.
         reads: what it must find among the states: "attitude", "vertical", "flight".
         conservative: whether it has a potential that doesn't depend on time.
+        wide: whether its expressions are too many to be unrolled (series of thousands of terms).
     """
 
     title = "load"
+    wide = False
     reads: frozenset[str] = frozenset()
     conservative = False
 
@@ -65,7 +68,9 @@ class LoadModel:
         return []
 
     def potential(self, m: Mechanics) -> Expression | None:
-        """Potential energy in internal units; part of the total energy where ``conservative``."""
+        """Potential energy in internal units; part of the total energy where ``conservative``, and of the
+        Hamiltonian of the canonical formulation in any case.
+        """
         return None
 
     def keeps_axial(self, m: Mechanics, axis: Vector) -> bool:
@@ -155,7 +160,8 @@ class GravityGradientModel(LoadModel):
     def __init__(self, spec: GravityGradient, tag: str) -> None:
         self.spec = spec
         self.tag = tag
-        self.conservative = spec.orbit is None
+        self.conservative = spec.position is not None
+        self.wide = spec.ephemeris is not None
 
     def orbit(self, m: Mechanics) -> OrbitStates | None:
         """The orbit's states and direction."""
@@ -174,11 +180,18 @@ class GravityGradientModel(LoadModel):
             return None
         return ExtraStates(orbit.names, orbit.derivatives, orbit.initial, orbit.norms)
 
+    def _place(self, m: Mechanics) -> Place:
+        assert self.spec.ephemeris is not None
+        unit = m.number(m.scene.context.ldexp(m.scene.context.one, m.scaling.time))
+        return place(self.spec.ephemeris, unit * hy.time)
+
     def direction(self, m: Mechanics) -> list[Expression]:
         """Unit vector towards the attracting body, body axes."""
         orbit = self.orbit(m)
         if orbit is not None:
             return apply(transpose(m.matrix), orbit.direction)
+        if self.spec.ephemeris is not None:
+            return apply(transpose(m.matrix), self._place(m).direction)
         assert self.spec.position is not None
         length = norm(m.scene.context, self.spec.position)
         fixed = [hy.expression(m.number(x / length)) for x in self.spec.position]
@@ -188,24 +201,24 @@ class GravityGradientModel(LoadModel):
         """G M / R^3 in internal units."""
         context = m.scene.context
         orbit = self.orbit(m)
-        if orbit is None:
-            assert self.spec.position is not None
-            distance = norm(context, self.spec.position)
-        else:
-            assert self.spec.orbit is not None
+        factor = None if orbit is None else orbit.inverse_distance**3
+        if self.spec.ephemeris is not None:
+            distance = context.mpf(MEAN_DISTANCE[self.spec.ephemeris])
+            factor = self._place(m).inverse_distance ** 3
+        elif self.spec.orbit is not None:
             distance = self.spec.orbit.semi_major_axis
+        else:
+            distance = norm(context, m.carried(self.spec.position))
         value = context.ldexp(self.spec.gravitational_parameter / distance**3, 2 * m.scaling.time)
         constant = hy.expression(m.number(value))
-        return constant if orbit is None else constant * orbit.inverse_distance**3
+        return constant if factor is None else constant * factor
 
     def torque(self, m: Mechanics) -> list[Term]:
         """(3 G M / R^3) c x (I c)."""
         return gradient_terms(m, self.direction(m), self.strength(m))
 
     def potential(self, m: Mechanics) -> Expression | None:
-        """(3 G M / 2 R^3) c . I c, of a fixed source (the constant part is left out)."""
-        if not self.conservative:
-            return None
+        """(3 G M / 2 R^3) c . I c (the part that doesn't depend on the attitude is left out)."""
         return 1.5 * self.strength(m) * quadratic_form(m, self.direction(m))
 
     def keeps_axial(self, m: Mechanics, axis: Vector) -> bool:

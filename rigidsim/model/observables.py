@@ -12,7 +12,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model import rotations
+from rigidsim.model import integrable, rotations
 from rigidsim.model.loads import CentralGravityModel
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Expression
@@ -38,7 +38,7 @@ class Observable:
         units: SI.
         long_name: for readers.
         frame: "body axes", "space axes" or "".
-        needs: what must be carried: "attitude", "vertical", "flight", "gravity", "symmetry".
+        needs: what must be carried: "attitude", "vertical", "flight", "gravity", "symmetry", ...
         expressions: components as expressions of the state, in internal units.
         exponents: binary exponents of the components' internal units.
         conserved: why it is an invariant of this scene, or None where it isn't.
@@ -266,6 +266,21 @@ OBSERVABLES: tuple[Observable, ...] = (
         "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [m.carried(m.jacobi)],
         _same(_ENERGY, 1), "", ("jacobi",),
         lambda m: "the only load is a gravity gradient on a circular orbit", energy_scale,
+    ),
+    Observable(
+        "kovalevskaya_constant", (), "rad4 s-4", "Kovalevskaya's constant",
+        lambda m: [integrable.kovalevskaya_constant(m)], _same(lambda m: -4 * m.scaling.time, 1), "",
+        ("kovalevskaya",),
+        lambda m: "A = B = 2 C, and the centre of mass lies in the equatorial plane (Kovalevskaya)",
+        integrable.kovalevskaya_scale,
+    ),
+    Observable(
+        "goryachev_chaplygin_constant", (), "rad3 s-3", "Goryachev's and Chaplygin's constant",
+        lambda m: [integrable.goryachev_chaplygin_constant(m)], _same(lambda m: -3 * m.scaling.time, 1), "",
+        ("goryachev_chaplygin",),
+        lambda m: "A = B = 4 C, the centre of mass lies in the equatorial plane, and L_z = 0 (Goryachev, "
+        "Chaplygin)",
+        integrable.goryachev_chaplygin_scale,
     ),
     Observable(
         "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],

@@ -9,6 +9,7 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.dynamics import Number
+from rigidsim.model.integrable import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.loads import CentralGravityModel
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables import OBSERVABLES, Observable, work_is_needed
@@ -72,6 +73,8 @@ def _available(m: Mechanics, observable: Observable) -> bool:
         "energy": m.velocity is not None or not m.scene.free_flight,
         "work": work_is_needed(m),
         "jacobi": m.attitude is not None and m.jacobi is not None,
+        "kovalevskaya": kovalevskaya_top(m) is not None,
+        "goryachev_chaplygin": goryachev_chaplygin_top(m) is not None,
         "attractor": m.velocity is not None and any(isinstance(x, CentralGravityModel) for x in m.loads),
     }
     return all(has[need] for need in observable.needs)

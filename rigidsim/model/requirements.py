@@ -56,7 +56,7 @@ def choose_requirements(scene: Scene, loads: Sequence[LoadModel] = ()) -> Requir
             if event.reads & set(names):
                 readers[need].append(f"event {event.name}")
     _check_readers(asked, readers)
-    reasons = [("wx wy wz", _why_rates(scene, record))]
+    reasons = [] if asked == "canonical" else [("wx wy wz", _why_rates(scene, record))]
     left_out: list[tuple[str, str]] = []
     wants_attitude = [name for name in record or () if name in ATTITUDE_RECORDS]
     if asked != "auto":
@@ -82,7 +82,11 @@ def choose_requirements(scene: Scene, loads: Sequence[LoadModel] = ()) -> Requir
                  "attitude (Euler-Poisson equations)")
             )  # fmt: skip
     else:
-        states = {"quaternion": "qw qx qy qz", "euler_angles": "phi theta psi"}
+        states = {
+            "quaternion": "qw qx qy qz",
+            "euler_angles": "phi theta psi",
+            "canonical": "phi theta psi p_phi p_theta p_psi",
+        }
         also = "; gravity's torque reads it" if torque else ""
         if readers["attitude"] and "reads it" not in why_attitude:
             also += f"; {', '.join(readers['attitude'])} reads it"

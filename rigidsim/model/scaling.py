@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from rigidsim.model.ephemeris import MEAN_DISTANCE
 from rigidsim.scene.context import cross, dot, norm
 from rigidsim.scene.loads import CentralGravity, GravityGradient
 from rigidsim.scene.scene import Scene
@@ -54,12 +55,15 @@ def exponent(context: Any, value: Any) -> int:
     return int(power) - 1 if mantissa == 0.5 else int(power)
 
 
-def largest_rates(scene: Scene) -> list[Any]:
+def largest_rates(scene: Scene, *, driven: bool = False) -> list[Any]:
     """Upper bounds of the absolute body rates over the whole motion, from energy and momentum, rad/s.
 
     For a free body in principal axes both 2 E I_max - L^2 and L^2 - 2 E I_min are sums of squares with
     positive weights, so each bounds two rates and the smaller bound is sharp (Landau & Lifshitz, section 37).
     Otherwise |w_i| <= sqrt(2 E_kin,max (I^-1)_ii).
+
+    Args:
+        driven: whether loads act of which the scene knows nothing.
     """
     context, body, w = scene.context, scene.body, scene.angular_velocity
     inertia, inverse = body.inertia, scene.inverse_inertia
@@ -67,7 +71,7 @@ def largest_rates(scene: Scene) -> list[Any]:
     weighted = [dot(row, w) for row in inertia]
     twice_energy = dot(w, weighted)
     swing = 4 * potential_amplitude(scene)
-    if scene.loads:  # energy may come from an orbit: a bound for the body carried along with it
+    if scene.loads or driven:  # energy may come from an orbit: a bound for the body carried along with it
         carried = orbital_rate(scene)
         fed = context.sqrt(max(twice_energy, zero) + swing + 4 * tidal_amplitude(scene))
         return [fed * context.sqrt(inverse[i][i]) + carried for i in range(3)]
@@ -116,7 +120,9 @@ def tidal_amplitude(scene: Scene) -> Any:
     total = context.zero
     for load in scene.loads:
         if isinstance(load, GravityGradient):
-            if load.orbit is None:
+            if load.ephemeris is not None:
+                distance = context.mpf(MEAN_DISTANCE[load.ephemeris])
+            elif load.orbit is None:
                 distance = norm(context, load.position or [])
             else:
                 distance = load.orbit.semi_major_axis * (1 - load.orbit.eccentricity)
@@ -189,10 +195,10 @@ def _flight_scales(scene: Scene) -> tuple[Any, Any]:
     return norm(context, scene.position) + swiftest * horizon, swiftest
 
 
-def choose_scaling(scene: Scene) -> Scaling:
+def choose_scaling(scene: Scene, *, driven: bool = False) -> Scaling:
     """The units of a scene; a pure function of it, so that the same config gives the same bits."""
     context, body = scene.context, scene.body
-    bounds = largest_rates(scene)
+    bounds = largest_rates(scene, driven=driven)
     fastest = max(bounds)
     potential = potential_amplitude(scene)
     if potential != 0:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.applied import state_names
+from rigidsim.model.canonical import MOMENTA, canonical_states, hamilton_equations
 from rigidsim.model.catalogue import load_models
 from rigidsim.model.dynamics import (
     Number,
@@ -60,6 +61,7 @@ class System:
         angle_states: positions of states that are angles growing without bound.
         singular_factor: expression that vanishes where the formulation breaks down, or None.
         crossings: events to be found along the way.
+        wide: whether the equations are too long to be compiled unrolled.
         rate_bound: upper bound of the absolute angular velocity, rad/s (mpf).
     """
 
@@ -78,6 +80,7 @@ class System:
     sequence: str
     rate_bound: Any
     crossings: list[Crossing]
+    wide: bool
 
     @property
     def variables(self) -> list[Expression]:
@@ -97,26 +100,39 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
     """
     loads = [*load_models(scene), *extra_loads]
     requirements = choose_requirements(scene, loads)
-    scaling = choose_scaling(scene)
+    scaling = choose_scaling(scene, driven=bool(extra_loads))
     numbers = scaled_numbers(scene, scaling)
     context = scene.context
 
-    rate_names = ["wx", "wy", "wz"]
-    rate_states = list(hy.make_vars(*rate_names))
-    rates = in_common_unit(rate_states, numbers.rate_units, number)
     attitude: AttitudeStates | None = None
     vertical: list[Expression] | None = None
-    names, derivatives = list(rate_names), []
-    initial = [
-        context.ldexp(w, scaling.time - e) for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
-    ]
-    exponents = [e - scaling.time for e in scaling.rates]
-    if requirements.formulation != "rates":
+    canonical = requirements.formulation == "canonical"
+    names: list[str] = []
+    derivatives: list[Expression] = []
+    if canonical:
+        scaling = replace(scaling, rates=(0, 0, 0))
+        numbers = scaled_numbers(scene, scaling)
+        states = canonical_states(scene, scaling, numbers, number)
+        attitude, rate_states = states.attitude, states.rates
+        names += [*attitude.names, *MOMENTA]
+        initial = [*attitude.initial, *states.initial_momenta]
+        exponents = [0] * 3 + [scaling.momentum] * 3
+    else:
+        names += ["wx", "wy", "wz"]
+        rate_states = list(hy.make_vars(*names))
+        initial = [
+            context.ldexp(w, scaling.time - e)
+            for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
+        ]
+        exponents = [e - scaling.time for e in scaling.rates]
+    rates = in_common_unit(rate_states, numbers.rate_units, number)
+    if not canonical and requirements.formulation != "rates":
         attitude = BUILDERS[requirements.formulation](scene, rates)
         names += attitude.names
         derivatives += attitude.derivatives
         initial += attitude.initial
         exponents += [0] * len(attitude.names)
+    if attitude is not None:
         if numbers.arm is not None:
             vertical = vertical_from_attitude(attitude.matrix, numbers, number)
     elif requirements.vertical:
@@ -140,7 +156,8 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
     mechanics = Mechanics(
         scene, scaling, numbers, rate_states, attitude, vertical, position, velocity, number, loads
     )
-    derivatives = rate_equations(mechanics, mechanics.torque) + derivatives
+    turning = hamilton_equations(mechanics) if canonical else rate_equations(mechanics, mechanics.torque)
+    derivatives = turning + derivatives
     if requirements.flight:
         x_rates, v_rates = flight_equations(mechanics, mechanics.force)
         derivatives += x_rates + v_rates
@@ -165,7 +182,8 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
     recorded, outputs = recorded_variables(mechanics, requirements)
     invariants = find_invariants(mechanics, norms)
     outputs += drift_outputs(invariants, context, number)
-    angle_states = tuple(3 + i for i in attitude.angles) if attitude else ()
+    first_angle = 0 if canonical else 3
+    angle_states = tuple(first_angle + i for i in attitude.angles) if attitude else ()
     _refuse_out_of_range(initial, [*recorded, *invariants], number)
     return System(
         scene=scene,
@@ -181,8 +199,9 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         angle_states=angle_states,
         singular_factor=attitude.singular_factor if attitude else None,
         sequence=scene.config.integrator.euler_sequence,
-        rate_bound=max(largest_rates(scene)),
+        rate_bound=max(largest_rates(scene, driven=bool(extra_loads))),
         crossings=_crossings(mechanics),
+        wide=any(load.wide for load in loads),
     )
 
 

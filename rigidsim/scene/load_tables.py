@@ -65,6 +65,7 @@ class GravityGradient(Table):
     gravitational_parameter: GravitationalParameter
     orbit: Orbit | None = None
     position: Triple[Metre] | None = None
+    ephemeris: Literal["sun", "moon"] | None = None
 
 
 class CentralGravity(Table):

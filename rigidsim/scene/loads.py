@@ -66,11 +66,15 @@ class KeplerOrbit:
 
 @dataclass(frozen=True)
 class GravityGradient:
-    """Torque of a distant body: on an ``orbit``, or fixed at ``position`` (space axes, m)."""
+    """Torque of a distant body: on an ``orbit``, fixed at ``position`` (space axes, m), or where an analytic
+    series has the Sun or the Moon as seen from the Earth (``ephemeris``; space axes are the mean ecliptic and
+    equinox of J2000, time counts from J2000).
+    """
 
     gravitational_parameter: Any
-    orbit: KeplerOrbit | None
-    position: Vector | None
+    orbit: KeplerOrbit | None = None
+    position: Vector | None = None
+    ephemeris: str | None = None
 
 
 @dataclass(frozen=True)
@@ -154,17 +158,20 @@ def resolve_load(
         )
     if isinstance(table, load_tables.CentralGravity):
         return CentralGravity(strength.at(context), [x.at(context) for x in table.position])
-    if (table.orbit is None) == (table.position is None):
-        given = "neither" if table.orbit is None else "both"
-        raise _fail(number, "orbit", f"given {given} of orbit and position; exactly one is needed")
+    given = [key for key in ("orbit", "position", "ephemeris") if getattr(table, key) is not None]
+    if len(given) != 1:
+        found = " and ".join(given) or "none"
+        raise _fail(number, "orbit", f"given {found}; exactly one of orbit, position and ephemeris is needed")
+    if table.ephemeris is not None:
+        return GravityGradient(strength.at(context), ephemeris=table.ephemeris)
     if table.position is not None:
         position = [x.at(context) for x in table.position]
         if all(x == 0 for x in position):
             raise _fail(number, "position", "given the origin, where the body is; another point is allowed")
-        return GravityGradient(strength.at(context), None, position)
+        return GravityGradient(strength.at(context), position=position)
     assert table.orbit is not None
     return GravityGradient(
-        strength.at(context), _orbit(table.orbit, strength.at(context), number, context), None
+        strength.at(context), orbit=_orbit(table.orbit, strength.at(context), number, context)
     )
 
 

@@ -18,10 +18,6 @@ _LATER: dict[tuple[str, ...], str] = {
 _LATER_VALUES: dict[tuple[str, ...], tuple[Any, str]] = {
     ("integrator", "method"): ("closed_form", "not in this version yet; allowed: taylor"),
     ("integrator", "hold_invariants"): (True, "not in this version yet; allowed: false"),
-    ("integrator", "formulation"): (
-        "canonical",
-        "not in this version yet; allowed: auto, rates, quaternion, euler_angles, rotation_matrix",
-    ),
 }
 _TABLES = (
     "body",

@@ -36,7 +36,7 @@ from rigidsim.scene.tables import (
 # room for numbers down to 1e-70.
 LARGEST_DIGITS = 250
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
-FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix")
+FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical")
 RECORDABLE = (
     "angular_velocity",
     "quaternion",
@@ -54,6 +54,8 @@ RECORDABLE = (
     "linear_momentum",
     "total_angular_momentum",
     "jacobi_constant",
+    "kovalevskaya_constant",
+    "goryachev_chaplygin_constant",
     "work",
     "energy_balance",
 )
@@ -161,7 +163,9 @@ class Integrator(Table):
 
     precision: Literal["single", "double", "extended", "quadruple"] | StrictInt = "double"
     tolerance: Literal["auto"] | Dimensionless = "auto"
-    formulation: Literal["auto", "rates", "quaternion", "euler_angles", "rotation_matrix"] = "auto"
+    formulation: Literal["auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical"] = (
+        "auto"
+    )
     euler_sequence: StrictStr = "zxz"
     method: Literal["taylor"] = "taylor"
     hold_invariants: StrictBool = False

@@ -78,7 +78,7 @@ class Evaluator:
         return hy.cfunc(
             expressions,
             self._system.variables,
-            compact_mode=self._precision.compact,
+            compact_mode=self._precision.compact or self._system.wide,
             **self._precision.options,
         )
 

@@ -1,8 +1,8 @@
 """Crossings found along the way: their times and states in the run's own precision.
 
 heyoka finds them on the dense output of each step. Their expressions take part in its choice of steps, so
-that a run with events differs from one without by rounding. A step that is taken back takes its crossings with
-it.
+that a run with events differs from one without by rounding. A step that is taken back takes its crossings
+with it.
 """
 
 from __future__ import annotations

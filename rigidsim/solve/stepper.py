@@ -60,7 +60,7 @@ class Stepper:
             system.equations,
             precision.array(system.initial),
             time=start,
-            compact_mode=precision.compact,
+            compact_mode=precision.compact or system.wide,
             **options,
         )
         far = 1e37 if precision.scalar is np.float32 else _FAR

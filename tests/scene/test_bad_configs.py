@@ -904,15 +904,15 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[integrator] method",
         ['given "closed_form"', LATER, "taylor"],
     ),
-    "canonical": (
+    "canonical from its singularity": (
         {"integrator": 'formulation = "canonical"'},
         "[integrator] formulation",
-        ['given "canonical"', LATER, "allowed: auto"],
+        ["singularity of the sequence zxz", 'choose formulation = "quaternion"'],
     ),
     "gradient without a source": (
         {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1'},
         "[[loads]] number 1 orbit",
-        ["given neither of orbit and position", "exactly one is needed"],
+        ["given none", "exactly one of orbit, position and ephemeris is needed"],
     ),
     "gradient with two sources": (
         {
@@ -920,7 +920,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
             "orbit = {semi_major_axis = 1}"
         },
         "[[loads]] number 1 orbit",
-        ["given both of orbit and position"],
+        ["given orbit and position", "exactly one of"],
     ),
     "gradient from the body's own place": (
         {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\nposition = [0, 0, 0]'},

@@ -1,0 +1,95 @@
+"""The symbolic equations of a scene, evaluated in SI, and mechanics in numpy to hold them against."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rigidsim.model.system import System
+from rigidsim.prepare import Prepared, prepare
+from rigidsim.scene.reading import parse
+
+EPS = np.finfo(float).eps
+# Expressions of at most some tens of operations in double, on numbers of order one.
+CLOSE = 100 * EPS
+GRAVITY = 'kind = "uniform_gravity"\n'
+
+
+def array(value: Any) -> str:
+    """Numbers as TOML, every bit of the doubles kept."""
+    return repr(np.asarray(value, dtype=float).tolist())
+
+
+def prepared(
+    body: str,
+    initial: str,
+    loads: str = "",
+    record: str = "",
+    integrator: str = "",
+    end: float = 1.0,
+    *,
+    start: float = 0.0,
+    parameters: str = "",
+) -> Prepared:
+    output = f"[output]\nrecord = {record}" if record else ""
+    load = f"[[loads]]\n{loads}" if loads else ""
+    return prepare(
+        parse(
+            f'name = "scene"\n[parameters]\n{parameters}\n[body]\n{body}\n[initial]\n{initial}\n{load}\n'
+            f"[time]\nstart = {start!r}\nend = {end!r}\n[integrator]\n{integrator}\n{output}\n"
+        )
+    )
+
+
+def internal(system: System, state: np.ndarray) -> np.ndarray:
+    """SI to the system's own units: powers of two, nothing is rounded."""
+    return np.ldexp(state, -np.array(system.state_exponents))
+
+
+def derivative(system: System, state: np.ndarray, time: float = 0.0) -> np.ndarray:
+    """Time derivative of the states, SI, at a state in SI and a time in seconds."""
+    rhs = hy.cfunc([rhs for _, rhs in system.equations], system.variables)
+    rates = rhs(internal(system, state), time=float(np.ldexp(time, -system.scaling.time)))
+    return np.ldexp(rates, np.array(system.state_exponents) - system.scaling.time)
+
+
+def observed(system: System, state: np.ndarray) -> dict[str, np.ndarray]:
+    """All recorded variables, SI, at a state in SI."""
+    count = sum(r.count for r in system.recorded)
+    values = hy.cfunc(system.outputs[:count], system.variables)(internal(system, state))
+    return {r.name: np.ldexp(values[r.first : r.first + r.count], r.exponents) for r in system.recorded}
+
+
+class Random:
+    """Seeded scenes; every test has its own."""
+
+    def __init__(self, seed: int) -> None:
+        self.generator = np.random.default_rng(seed)
+
+    def vector(self, size: float = 1.0) -> np.ndarray:
+        return size * self.generator.uniform(-1, 1, 3)
+
+    def quaternion(self) -> np.ndarray:
+        q = self.generator.normal(size=4)
+        return q / np.linalg.norm(q)
+
+    def tensor(self) -> np.ndarray:
+        """A tensor in general axes that some body has: I = tr(S) 1 - S with S positive."""
+        a = self.generator.uniform(-1, 1, (3, 3))
+        s = a @ a.T + 0.1 * np.eye(3)
+        return np.trace(s) * np.eye(3) - (s + s.T) / 2
+
+
+def matrix(q: np.ndarray) -> np.ndarray:
+    return Rotation.from_quat([*q[1:], q[0]]).as_matrix()
+
+
+def skew(w: np.ndarray) -> np.ndarray:
+    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+
+
+def general_body(tensor: np.ndarray, mass: float = 1.0, center: Any = (0, 0, 0)) -> str:
+    return f"inertia_tensor = {array(tensor)}\nmass = {mass!r}\ncenter_of_mass = {array(center)}"

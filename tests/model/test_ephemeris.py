@@ -1,0 +1,74 @@
+"""Where heyoka's series put the Sun and the Moon, against an almanac, and the torque that follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import heyoka as hy
+import numpy as np
+import pytest
+from support import run_text
+
+from rigidsim.model.ephemeris import MEAN_DISTANCE, place
+
+
+def at(body: str, seconds: float) -> tuple[float, float, float]:
+    """Ecliptic longitude and latitude (degrees) and distance (m)."""
+    found = place(body, hy.time)
+    function = hy.cfunc([*found.direction, found.inverse_distance], [hy.make_vars("none")], compact_mode=True)
+    x, y, z, inverse = function([0.0], time=seconds)
+    assert x * x + y * y + z * z == pytest.approx(1, abs=1e-14)
+    return (
+        np.degrees(np.arctan2(y, x)) % 360,
+        np.degrees(np.arcsin(z)),
+        float(MEAN_DISTANCE[body] / inverse),
+    )
+
+
+def test_the_sun_and_the_moon_at_j2000() -> None:
+    """2000 January 1, 12 h: Sun at 280.37 deg and 0.98333 au; Moon at 223.32 deg, 5.17 deg, 402,449 km
+    (Astronomical Almanac 2000; the last printed digit).
+    """
+    longitude, latitude, distance = at("sun", 0.0)
+    assert longitude == pytest.approx(280.37, abs=0.02)
+    assert latitude == pytest.approx(0, abs=0.001)
+    # VSOP2013 has the barycentre of Earth and Moon, up to 4,670 km from the Earth, and the digit's half
+    assert distance / 149597870700 == pytest.approx(0.98333, abs=4.67e6 / 1.496e11 + 5e-6)
+    longitude, latitude, distance = at("moon", 0.0)
+    assert longitude == pytest.approx(223.32, abs=0.02)
+    assert latitude == pytest.approx(5.17, abs=0.01)
+    assert distance == pytest.approx(402_449e3, abs=5e3)
+
+
+def test_the_sun_comes_round_in_a_sidereal_year_and_the_moon_in_a_sidereal_month() -> None:
+    begin, end = at("sun", 0.0)[0], at("sun", 86400 * 365.256363)[0]
+    assert abs(end - begin) < 0.02  # perturbations of the Earth's place by the Moon: some 10 arcsec
+    months = 20
+    begin, end = at("moon", 0.0)[0], at("moon", months * 86400 * 27.321661)[0]
+    assert abs((end - begin + 180) % 360 - 180) < 15  # inequalities of up to 7.5 degrees at either end
+
+
+def test_the_torque_of_the_ephemeris_is_that_of_the_place(runs: Path) -> None:
+    """The Sun nearly stands still in an hour: a fixed source in its place gives the same motion."""
+    load = '[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.32712440018e20\n'
+    text = """
+    name = "satellite"
+    [body]
+    principal_moments = [1, 2, 2.5]
+    [initial]
+    angular_velocity = [0, 0, 0]
+    quaternion = [0.7, 0.4, 0.5, 0.3]
+    [time]
+    end = 3600
+    samples = 3
+    """
+    longitude, latitude, distance = (at("sun", 1800.0)[i] for i in range(3))
+    lon, lat = np.radians(longitude), np.radians(latitude)
+    vector = distance * np.array([np.cos(lon) * np.cos(lat), np.sin(lon) * np.cos(lat), np.sin(lat)])
+    fixed = run_text(text + load + f"position = {[float(x) for x in vector]}", runs, 'name="fixed"')
+    moving = run_text(text + load + 'ephemeris = "sun"', runs, 'name="moving"')
+    a, b = (run.dataset["angular_velocity"].values[-1] for run in (fixed, moving))
+    # the Sun moves by 7e-4 rad in the hour, 4e-4 rad to either side of the fixed place
+    assert np.abs(a - b).max() < 1e-3 * np.abs(a).max()
+    assert np.abs(a).max() > 0
+    assert moving.dataset.attrs["compact_mode"] == 1

@@ -1,0 +1,122 @@
+"""Loads given from Python: the example of README.md, and how such runs are marked."""
+
+from __future__ import annotations
+
+import re
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from equations import CLOSE, Random, derivative, general_body, matrix
+
+import rigidsim
+from rigidsim.model.loads import LoadModel
+from rigidsim.prepare import motion_growth, prepare
+
+ROOT = Path(__file__).parents[2]
+FREE = """name = "free"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.5, 0.25, 1]
+[time]
+end = 10
+[output]
+timeline = false
+"""
+
+
+def example() -> str:
+    (code,) = re.findall(
+        r"<!-- test: own load -->\n```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S
+    )
+    return str(code)
+
+
+@pytest.fixture
+def names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the example defines, run in an empty folder."""
+    (tmp_path / "configs").symlink_to(ROOT / "configs")
+    monkeypatch.chdir(tmp_path)
+    found: dict[str, Any] = {}
+    printed = StringIO()
+    with redirect_stdout(printed):
+        exec(compile(example(), "README.md", "exec"), found)
+    return found | {"printed": printed.getvalue()}
+
+
+def test_the_example_of_the_readme(names: dict[str, Any]) -> None:
+    run = names["run"]
+    assert float(names["printed"]) == run.summary["invariants"]["energy"]["largest_drift"]
+    row = run.summary["invariants"]["energy"]
+    assert run.status == "finished"
+    assert 0 < row["largest_drift"] <= row["bound"]
+    assert "angular_momentum" not in run.summary["invariants"]  # a torque acts
+    potential = run.dataset["potential_energy"].values
+    assert np.ptp(potential) > 0.1
+    first_row = np.array([matrix(q)[0] for q in run.dataset["quaternion"].values[:100]])
+    np.testing.assert_allclose(potential[:100], -0.3 * first_row[:, 2], rtol=0, atol=CLOSE)
+    momentum = run.dataset["angular_momentum"].values
+    assert np.ptp(momentum, axis=0)[1:].max() > 0.1
+    assert np.ptp(momentum[:, 0]) < 1e-11  # no torque about the field
+    with h5py.File(run.folder.dataset) as file:
+        assert file.attrs["python_loads"] == "Magnet"
+    assert run.summary["bit_for_bit"]["claim"] is False
+    assert "Python" in run.summary["bit_for_bit"]["holds_for"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_its_torque(names: dict[str, Any], seed: int) -> None:
+    random = Random(2000 + seed)
+    tensor, q, w = random.tensor(), random.quaternion(), random.vector()
+    text = FREE.replace("principal_moments = [1, 2, 3]", general_body(tensor))
+    system = prepare(rigidsim.parse(text), loads=[names["Magnet"]("0.7")]).system
+    got = derivative(system, np.concatenate([w, q]))[:3]
+    torque = np.cross([0, 0, 0.7], matrix(q).T @ [1, 0, 0])
+    expected = np.linalg.solve(tensor, np.cross(tensor @ w, w) + torque)
+    np.testing.assert_allclose(got, expected, rtol=0, atol=CLOSE * np.linalg.norm(np.linalg.inv(tensor)) * 10)
+
+
+def test_the_growth_of_errors_knows_the_load(names: dict[str, Any]) -> None:
+    """Upside down in the field, at rest: unstable only because of the load."""
+    text = FREE.replace("[0.5, 0.25, 1]", "[1e-3, 0, 0]\nquaternion = [1, 0, -1, 0]")  # body z along -X
+    text = text.replace("end = 10", "end = 40")
+    pushed = motion_growth(prepare(rigidsim.parse(text), loads=[names["Magnet"]("1")]))
+    alone = motion_growth(prepare(rigidsim.parse(text)))
+    assert pushed is not None
+    assert alone is not None
+    assert pushed.factor > 10 * alone.factor
+
+
+def test_a_run_without_them_claims_what_it_did(tmp_path: Path) -> None:
+    run = rigidsim.run(rigidsim.parse(FREE), out=tmp_path)
+    assert run.summary["bit_for_bit"]["claim"] is True
+    with h5py.File(run.folder.dataset) as file:
+        assert file.attrs["python_loads"] == ""
+
+
+def test_a_load_without_a_potential_does_work(tmp_path: Path) -> None:
+    """Two loads at once; one that takes energy makes its balance the invariant."""
+
+    class Drag(LoadModel):
+        title = "drag"
+
+        def torque(self, m: Any) -> list[Any]:
+            size = m.scene.context.ldexp(m.scene.context.mpf(-1) / 8, -m.scaling.momentum)
+            return [([size if i == j else 0 for j in range(3)], m.rates[i]) for i in range(3)]
+
+    run = rigidsim.run(rigidsim.parse(FREE), out=tmp_path, loads=[Drag(), Drag()])
+    names = {name for name, row in run.summary["invariants"].items() if not row["numerical"]}
+    assert names == {"energy_balance"}
+    row = run.summary["invariants"]["energy_balance"]
+    assert 0 < row["largest_drift"] <= row["bound"]
+    dataset = run.dataset
+    slope = np.gradient(dataset["energy"].values, dataset["time"].values, edge_order=2)
+    power = -0.25 * (dataset["angular_velocity"].values ** 2).sum(axis=1)
+    np.testing.assert_allclose(slope, power, rtol=0, atol=1e-3)  # differences of second order at 0.01 s
+    with h5py.File(run.folder.dataset) as file:
+        assert file.attrs["python_loads"] == "Drag Drag"
