@@ -29,6 +29,8 @@ STUDIES = (
     "flip_period",
     "free_flight_energy",
     "bodies_table",
+    "luni_solar_precession",
+    "hyperion",
 )
 
 
