@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import RigidsimError, RunFolderError
 
 app = typer.Typer(
     name="rigidsim",
@@ -167,7 +167,10 @@ def view(
 
         with opened.dataset as dataset:
             write_timeline(dataset, timeline)
-    raise typer.Exit(open_viewer(timeline, web=web))
+    try:
+        raise typer.Exit(open_viewer(timeline, web=web))
+    except FileNotFoundError as error:
+        raise RunFolderError(str(error)) from None
 
 
 @app.command()
