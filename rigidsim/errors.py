@@ -55,7 +55,3 @@ class StoppedError(RigidsimError):
     """A run could not go on; the last good state was kept."""
 
     exit_code = 3
-
-
-class MissingExtraError(RigidsimError):
-    """A command needs an optional dependency that isn't installed."""

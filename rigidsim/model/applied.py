@@ -40,11 +40,6 @@ class AppliedModel(LoadModel):
             reads.add("flight")
         self.reads = frozenset(reads)
 
-    @property
-    def timed(self) -> bool:
-        """Whether it depends on time explicitly."""
-        return "t" in self.spec.reads
-
     def _components(self, m: Mechanics) -> list[Expression]:
         variables = state_names(m, self.spec.reads)
         context = m.scene.context

@@ -22,7 +22,7 @@ class Shape:
         dimensions: names of the keys that size it, each with how many numbers it takes.
         moments: (context, dimensions) -> principal moments per unit mass about the centre of mass, m^2.
         landmarks: named points that a body can turn about, from the centre of mass, metres.
-        meaning: one line for messages and the docs.
+        meaning: how it lies in its own axes, for readers of the table.
     """
 
     dimensions: Mapping[str, int]

@@ -17,7 +17,7 @@ from typing import Any
 import heyoka as hy
 import mpmath
 import numpy as np
-from mpmath.libmp import from_man_exp, mpf_pos, round_nearest
+from mpmath.libmp import mpf_pos, round_nearest
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.context import working_bits
@@ -168,13 +168,3 @@ def precision_of(name: str | int) -> Precision:
         )
     title = name if isinstance(name, str) else f"{name} digits"
     return Precision(title, bits, hy.real, cheap=False, compact=True)
-
-
-def mpf_from_parts(parts: list[float]) -> Any:
-    """The exact sum of float64 parts as an mpf."""
-    total = from_man_exp(0, 0)
-    value = mpmath.mpf(total)
-    with mpmath.workprec(4096):
-        for part in parts:
-            value += mpmath.mpf(float(part))
-    return value

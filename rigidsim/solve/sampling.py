@@ -27,8 +27,6 @@ class SampleClock:
         self.count = samples.count
         self.exponent = exponent
         self._precision = precision
-        # a float32 grid is computed in double and rounded once: i alone may not fit 24 bits
-        self._type: Any = np.float64 if precision.narrow else precision.scalar
         unit = samples.start.context.mpf(2) ** exponent
         if samples.times is not None:
             self._list: np.ndarray | None = precision.array([t / unit for t in samples.times])
@@ -77,6 +75,7 @@ class SampleClock:
 
 
 def _double_or(precision: Precision) -> Any:
+    """Conversion for grids: single precision computes them in double, since i alone may not fit 24 bits."""
     if not precision.narrow:
         return precision.number
 
