@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rigidsim.errors import RunFolderError
 from rigidsim.store import segments
 from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.seal import check_seal, read_seal
+from rigidsim.store.variables import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     import xarray
@@ -46,16 +48,38 @@ class Run:
         import xarray
 
         if self.folder.dataset.exists():
-            return _opened(self.folder.dataset)
-        paths = segments.segment_paths(self.folder.segments)
-        if not paths:
+            return _opened(_whole(self.folder.dataset))
+        chain = segments.read_chain(self.folder.segments)
+        if chain.damage is not None:
+            raise RunFolderError(f"{chain.damage}; rigidsim resume sets it aside and goes on before it")
+        if not chain.paths:
             raise RunFolderError(f"{self.folder.path}: nothing was saved")
-        pieces = [_opened(path) for path in paths]
+        opened = [_opened(path) for path in chain.paths]
+        pieces = [piece for piece in opened if piece.sizes["time"]] or opened[:1]
         joined = xarray.concat(
             pieces, dim="time", data_vars="minimal", coords="minimal", compat="override", join="override"
         )
         joined.attrs = dict(pieces[0].attrs, status=self.status)
         return joined
+
+
+def _whole(path: Path) -> Path:
+    """A dataset's path, after its seal was checked; datasets of the first schema version had none.
+
+    Raises:
+        RunFolderError: damaged, edited, or of a version that is newer than this rigidsim.
+    """
+    if read_seal(path) is not None:
+        check_seal(path)
+    version = segments.root_attributes(path).get("schema_version")
+    if not isinstance(version, int) or version > SCHEMA_VERSION:
+        raise RunFolderError(
+            f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
+            "install a newer one"
+        )
+    if version > 1 and read_seal(path) is None:
+        raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
+    return path
 
 
 def _opened(path: Path) -> xarray.Dataset:

@@ -7,11 +7,14 @@ import sys
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rigidsim.errors import RigidsimError, RunFolderError
+
+if TYPE_CHECKING:
+    from rigidsim.archive import Run
 
 app = typer.Typer(
     name="rigidsim",
@@ -71,7 +74,13 @@ def main(
 @app.command()
 @_user_errors
 def run(
-    configs: Annotated[list[Path], typer.Argument(metavar="CONFIG...", help="TOML files.")],
+    configs: Annotated[
+        list[Path] | None, typer.Argument(metavar="CONFIG...", help="TOML files.", show_default=False)
+    ] = None,
+    dataset: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds."),
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")] = Path(
         "runs"
     ),
@@ -83,26 +92,86 @@ def run(
 
     Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
     """
-    from rigidsim import progress, report
+    from rigidsim import progress
     from rigidsim.runner import run as run_experiment
     from rigidsim.scene.reading import load
 
-    experiments = [load(path, overrides=overrides or []) for path in configs]
+    experiments = [load(path, overrides=overrides or []) for path in configs or []]
+    if dataset is not None:
+        from rigidsim.verification import embedded
+
+        experiments.append(embedded(dataset, overrides=overrides or []))
+    if not experiments:
+        raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
     worst = 0
     for experiment in experiments:
         with progress.observer() as observer:
             result = run_experiment(experiment, out=out, force=force, observer=observer)
-        if as_json:
-            print(json.dumps(result.summary))
-        else:
-            report.print_summary(result.summary, str(result.folder.path))
-        code = int(result.summary["exit_code"])
-        if code:
-            print(f"rigidsim: {result.summary['message']}", file=sys.stderr)
+        code = _told(result, as_json)
         worst = worst or code
         if code == 130:
             break
     raise typer.Exit(worst)
+
+
+def _told(result: Run, as_json: bool) -> int:
+    """Print a run's summary; returns its exit code."""
+    from rigidsim import report
+
+    if as_json:
+        print(json.dumps(result.summary))
+    else:
+        report.print_summary(result.summary, str(result.folder.path))
+    code = int(result.summary["exit_code"])
+    if code:
+        print(f"rigidsim: {result.summary['message']}", file=sys.stderr)
+    return code
+
+
+@app.command()
+@_user_errors
+def resume(
+    run_path: RunPath,
+    until: Annotated[
+        str | None, typer.Option("--until", metavar="END", help='A later end, such as "2 h" or 5000.')
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="A guard of this session, such as limits.max_steps=1000000."
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Go on with an interrupted, killed or guarded run; the result is bit for bit the uninterrupted one.
+
+    Example: rigidsim resume runs/intermediate_axis
+    """
+    from rigidsim import progress
+    from rigidsim.resuming import resume as go_on
+
+    with progress.observer() as observer:
+        result = go_on(run_path, until=until, overrides=overrides or [], observer=observer)
+    raise typer.Exit(_told(result, as_json))
+
+
+@app.command()
+@_user_errors
+def verify(run_path: RunPath, as_json: JsonOption = False) -> None:
+    """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
+
+    Example: rigidsim verify runs/intermediate_axis
+    """
+    from rigidsim import progress, report
+    from rigidsim.verification import verify as compare
+
+    with progress.observer() as observer:
+        verdict = compare(run_path, observer=observer)
+    if as_json:
+        print(json.dumps(verdict.as_dict()))
+    else:
+        report.print_verdict(verdict.as_dict())
+    raise typer.Exit(0 if verdict.identical else 1)
 
 
 @app.command()

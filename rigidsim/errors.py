@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+_MOST_SHOWN = 30
+
 
 class RigidsimError(Exception):
     """Base of all errors that rigidsim raises on purpose; its text is meant for the user."""
@@ -25,7 +27,12 @@ class Problem:
     what: str
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.what}"
+        return _visible(f"{self.where}: {self.what}")
+
+
+def _visible(text: str) -> str:
+    """A terminal shows what was given, and obeys none of it: control characters stand as escapes."""
+    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
 
 
 class ConfigError(RigidsimError):
@@ -37,8 +44,10 @@ class ConfigError(RigidsimError):
         super().__init__(self._text())
 
     def _text(self) -> str:
-        lines = "\n".join(f"  {problem}" for problem in self.problems)
-        head = f"{self.source}: " if self.source else ""
+        lines = "\n".join(f"  {problem}" for problem in self.problems[:_MOST_SHOWN])
+        if len(self.problems) > _MOST_SHOWN:
+            lines += f"\n  and {len(self.problems) - _MOST_SHOWN} more"
+        head = f"{_visible(self.source)}: " if self.source else ""
         count = len(self.problems)
         return f"{head}{count} problem{'s' if count > 1 else ''} in the config\n{lines}"
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from rigidsim.prepare import Prepared
 from rigidsim.solve.advance import Progress
 from rigidsim.solve.status import Status
-from rigidsim.store.segments import SegmentWriter
 from rigidsim.summary import Watch
 
 
@@ -54,7 +53,7 @@ class Interruption:
 
 
 class Guards:
-    """The checks between chunks."""
+    """The checks between chunks; ``wall_time`` and ``max_steps`` count anew in each session of a run."""
 
     def __init__(
         self,
@@ -62,16 +61,16 @@ class Guards:
         watch: Watch,
         interruption: Interruption,
         observer: Observer,
-        writer: SegmentWriter,
+        *,
+        steps_before: int = 0,
     ) -> None:
         limits = prepared.scene.config.limits
         self._wall = None if limits.wall_time is None else float(limits.wall_time)
         self._drift = None if limits.max_drift is None else float(limits.max_drift)
-        self._steps = limits.max_steps
+        self._steps = None if limits.max_steps is None else limits.max_steps + steps_before
         self._watch = watch
         self._interruption = interruption
         self._observer = observer
-        self._writer = writer
         self._started = time.monotonic()
         self._reported = 0.0
 
@@ -81,7 +80,6 @@ class Guards:
         if now - self._reported > 0.05:
             self._reported = now
             self._observer.progressed(progress)
-            self._writer.flush_if_due()
         if self._interruption.requested:
             return Status.INTERRUPTED
         if self._wall is not None and now - self._started > self._wall:

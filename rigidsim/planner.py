@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.winding import INTERVAL, Winding
 from rigidsim.summary import round_off_law
 
+if TYPE_CHECKING:
+    from rigidsim.model.loads import LoadModel
+
 PILOT_SECONDS = 0.5
 _PILOT_STEPS = 20_000
 _SHRINK = 0.9  # gzip on doubles whose low bits are noise; measured 0.85 to 0.95
@@ -22,8 +26,11 @@ _TIMELINE_ROW_BYTES = 260.0  # measured; falls with repeated values
 _BASE_MEMORY = 250e6  # interpreter, libraries and compiled code
 
 
-def plan(experiment: Experiment) -> dict[str, Any]:
+def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str, Any]:
     """Explain and predict a run; integrates for about half a second and writes nothing.
+
+    Args:
+        loads: loads of one's own, as of ``rigidsim.run``.
 
     Returns:
         A JSON-like dictionary: states, reasons, invariants, steps, seconds, bytes.
@@ -31,7 +38,7 @@ def plan(experiment: Experiment) -> dict[str, Any]:
     Raises:
         ConfigError: the config can't be run.
     """
-    prepared = prepare(experiment)
+    prepared = prepare(experiment, loads=loads)
     started = time.perf_counter()
     winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
+
+import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.loads import LoadModel
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.reading import Experiment
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.start import check_start
 from rigidsim.solve.growth import Growth, measure_growth
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -92,7 +96,10 @@ def prepare(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> Prepa
         precision = precision_of(scene.config.integrator.precision)
         asked = scene.config.integrator.tolerance
         tolerance = None if isinstance(asked, str) else precision.number(asked.at(scene.context))
+        check_start(scene)
         system = build_system(scene, precision.number, loads)
+        if loads:
+            _refuse_non_finite_start(system, precision)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
     except ConfigError as error:
         raise error.at(experiment.source) from None
@@ -104,6 +111,31 @@ def prepare(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> Prepa
         )
         raise ConfigError(problem, experiment.source) from None
     return Prepared(experiment, scene, precision, system, clock, tolerance, tuple(loads))
+
+
+def _refuse_non_finite_start(system: System, precision: Precision) -> None:
+    """Evaluate the equations once: a load from Python may have no value at the start.
+
+    Raises:
+        ConfigError: names the states whose derivatives aren't finite.
+    """
+    rhs = hy.cfunc(
+        [right for _, right in system.equations],
+        system.variables,
+        compact_mode=True,
+        **precision.options,
+    )
+    start = precision.number(system.scene.context.ldexp(system.scene.start, -system.scaling.time))
+    values = rhs(precision.array(system.initial), time=start)
+    lost = [n for n, v in zip(system.states, values, strict=True) if not math.isfinite(float(v))]
+    if lost:
+        raise ConfigError(
+            Problem(
+                "loads",
+                f"the derivatives of {', '.join(lost)} aren't finite at the start; start elsewhere, or give "
+                "the loads from Python finite torques and forces there",
+            )
+        )
 
 
 def double_twin(prepared: Prepared) -> System:

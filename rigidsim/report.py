@@ -172,3 +172,29 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         out.print(
             f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
         )
+
+
+def print_verdict(verdict: dict[str, Any]) -> None:
+    """A verification in words, from ``Verdict.as_dict``."""
+    out = console()
+    if verdict["identical"]:
+        out.print(f"identical: {verdict['samples']:,} samples, every variable, every bit")
+    else:
+        out.print(f"different: {verdict['path']}")
+    for problem in verdict["problems"]:
+        out.print(f"  {problem}", markup=False)
+    first = verdict["first_difference"]
+    if first is not None:
+        out.print(
+            f"  first difference: {first['variable']} at sample {first['sample']}: saved "
+            f"{first['saved']!r}, again {first['again']!r}, {first['size']:.3g} apart"
+        )
+    names = verdict["differing_variables"]
+    if names:
+        out.print(f"  variables that differ: {', '.join(names)}")
+    if verdict["environment"]:
+        out.print("  changed since, which can explain other bits:")
+        for line in verdict["environment"]:
+            out.print(f"    {line}", markup=False)
+    elif names:
+        out.print("  versions, CPU features and settings are the same, so they don't explain it")

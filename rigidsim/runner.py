@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 import json
+import secrets
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import rigidsim.summary as summaries
+from rigidsim import labels
 from rigidsim.archive import Run
 from rigidsim.crossings import event_counts, event_variables
 from rigidsim.guards import Guards, Interruption, Observer
 from rigidsim.prepare import Prepared, double_twin, motion_growth, prepare
+from rigidsim.recorder import Effort, Recorder
+from rigidsim.restoring import Resumed, restore
 from rigidsim.scene.reading import Experiment, load
-from rigidsim.solve.advance import Advance, Progress
+from rigidsim.solve.advance import Advance
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.lyapunov import LyapunovSpectrum, lyapunov_spectrum
+from rigidsim.solve.rhythm import Rhythm
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.winding import Winding
-from rigidsim.store import netcdf, provenance, segments
+from rigidsim.store import netcdf, provenance
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.variables import SCHEMA_VERSION, Extra
+from rigidsim.store.segments import Chain, SegmentWriter
 
 if TYPE_CHECKING:
     from rigidsim.model.loads import LoadModel
@@ -57,120 +61,161 @@ def run(
     """
     if not isinstance(experiment, Experiment):
         experiment = load(experiment)
-    observer = observer or Observer()
-    clock = _Phases()
-    cpu = time.process_time()
+    session = Session(observer or Observer())
     prepared = prepare(experiment, loads=loads)
     folder = RunFolder(Path(out) / prepared.scene.name)
-    folder.create(force=force)
-    netcdf.write_bytes(folder.config, experiment.text.encode())
+    with folder.locked():
+        folder.create(force=force)
+        netcdf.write_bytes(folder.config, experiment.text.encode())
+        return session.execute(prepared, folder)
 
-    winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
-    log = EventLog([c.stop for c in prepared.system.crossings], winding.turns)
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0), log)
-    evaluator = Evaluator(prepared.system, prepared.precision, winding)
-    growth = motion_growth(prepared)
-    attributes = _attributes(prepared, stepper)
-    writer = segments.SegmentWriter(folder.segments, prepared.variables(), attributes)
-    watch = summaries.Watch()
-    interruption = Interruption()
 
-    def sink(_: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
-        recorded: dict[str, list[np.ndarray]] = evaluator.evaluate(states, turns)
-        exponent = prepared.clock.exponent
-        recorded["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]
-        for invariant in prepared.system.invariants:
-            watch.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
-        factors = evaluator.singular_factors(states)
-        if factors is not None:
-            watch.see_singular(factors, recorded["time"][0])
-        writer.add(recorded)
+@dataclass
+class Session:
+    """One process's work on a run: the whole of it, or what was left.
 
-    clock.next("build")
-    observer.started(prepared, folder.path)
-    observer.phase("integrate")
-    guards = Guards(prepared, watch, interruption, observer, writer)
-    advance = Advance(stepper, prepared.clock, winding, prepared.precision, sink, guards)
-    with interruption.watching():
-        progress = advance.run()
-        if not progress.status.final:
-            writer.flush()
-        clock.next("integrate_and_record")
-        observer.progressed(progress)
-        spectrum = None
-        if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
-            observer.phase("lyapunov")
-            spectrum = _lyapunov(prepared, interruption)
-            clock.next("lyapunov")
-            if interruption.requested:
-                progress.status = Status.INTERRUPTED
-                writer.flush()
-    message = _message(prepared, progress, evaluator)
-    summary = summaries.summarise(
-        prepared,
-        progress,
-        watch,
-        growth,
-        spectrum,
-        message=message,
-        initial=evaluator.initial_invariants(),
-        seconds=clock.seconds,
-        cpu_seconds=time.process_time() - cpu,
-        provenance=_plain(attributes),
-    )
-    last = float(prepared.clock.at(prepared.clock.count - 1))
-    extras = event_variables(prepared, log, evaluator, last) + _extras(spectrum)
-    summary["events"] = event_counts(prepared, log, last)
-    summary["cost"]["seconds"]["engine"] = progress.integration_seconds
-    try:
+    Attributes:
+        remarks: for the summary, on how the session began.
+        mixed: why the parts of this run can't be promised to be one run's bits; empty where they can.
+    """
+
+    observer: Observer
+    remarks: list[str] = field(default_factory=list)
+    mixed: str = ""
+    effort: Effort = field(default_factory=Effort)
+
+    def execute(self, prepared: Prepared, folder: RunFolder, chain: Chain | None = None) -> Run:
+        """Integrate to the end, or to whatever ends it, and complete the files.
+
+        Args:
+            chain: segments to go on from, with the arrays of the last one's checkpoint.
+
+        Raises:
+            RunFolderError: the folder can't be written, or the checkpoint belongs to another system.
+        """
+        clock = _Phases()
+        winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
+        log = EventLog([c.stop for c in prepared.system.crossings], winding.turns)
+        stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0), log)
+        evaluator = Evaluator(prepared.system, prepared.precision, winding)
+        growth = motion_growth(prepared)
+        rhythm = Rhythm(stepper, winding)
+        resumed: Resumed | None = None
+        if chain is not None:
+            resumed = restore(chain, prepared, rhythm, evaluator, log)
+        attributes = labels.root_attributes(
+            prepared, stepper, chain.run if chain is not None else secrets.token_hex(8)
+        )
+        if self.mixed:
+            attributes["mixed_provenance"] = self.mixed
+        writer = SegmentWriter(folder.segments, prepared.variables(), attributes, chain)
+        recorder = Recorder(prepared, evaluator, writer, log, self.effort)
+        interruption = Interruption()
+        clock.next("build")
+        self.observer.started(prepared, folder.path)
+        self.observer.phase("integrate")
+        guards = Guards(prepared, recorder.watch, interruption, self.observer, steps_before=stepper.steps)
+        start = None if resumed is None else resumed.checkpoint
+        advance = Advance(rhythm, prepared.clock, prepared.precision, recorder, guards, start)
+        recorder.progress = advance.progress
+        if resumed is not None:
+            recorder.restore(resumed.arrays, advance.progress)
+        with interruption.watching():
+            progress = advance.run()
+            if not progress.status.final:
+                recorder.save(advance.checkpoint())
+            clock.next("integrate_and_record")
+            self.observer.progressed(progress)
+            spectrum = None
+            if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
+                self.observer.phase("lyapunov")
+                spectrum = _lyapunov(prepared, interruption)
+                clock.next("lyapunov")
+                if interruption.requested:
+                    progress.status = Status.INTERRUPTED
+                    recorder.save(advance.checkpoint())
+        summary = summaries.summarise(
+            prepared,
+            progress,
+            recorder.watch,
+            growth,
+            spectrum,
+            message=labels.closing_words(prepared, progress, evaluator),
+            initial=evaluator.initial_invariants(),
+            seconds=clock.seconds,
+            cpu_seconds=self.effort.cpu,
+            provenance=labels.repeated(attributes),
+            remarks=self.remarks,
+            mixed=self.mixed,
+        )
+        last = float(prepared.clock.at(prepared.clock.count - 1))
+        summary["events"] = event_counts(prepared, log, last)
+        summary["cost"]["sessions"] = self.effort.sessions
+        summary["cost"]["seconds"]["engine"] = progress.integration_seconds
         if progress.status.final:
-            _complete(prepared, folder, writer, attributes, summary, extras, clock, observer)
-    except KeyboardInterrupt:
-        kept = "the dataset is complete, the timeline is missing"
-        if not folder.dataset.exists():
-            writer.flush()
-            kept = "all samples are saved as segments"
-        summary |= {"status": Status.INTERRUPTED.value, "exit_code": Status.INTERRUPTED.exit_code}
-        summary["message"] = f"interrupted after the integration; {kept}"
-    summary["cost"]["cpu_seconds"] = time.process_time() - cpu
-    folder.write_summary(summary)
-    return Run(folder, json.loads(json.dumps(summary, default=str)))
+            extras = event_variables(prepared, log, evaluator, last) + labels.lyapunov_variables(spectrum)
+            finish = _Completion(prepared, folder, writer, recorder, advance, attributes, self.effort)
+            finish.complete(summary, extras, clock, self.observer)
+        summary["cost"]["cpu_seconds"] = self.effort.cpu
+        summary["cost"]["wall_seconds"] = self.effort.wall
+        folder.write_summary(summary)
+        return Run(folder, json.loads(json.dumps(summary, default=str)))
 
 
-def _complete(
-    prepared: Prepared,
-    folder: RunFolder,
-    writer: segments.SegmentWriter,
-    attributes: dict[str, Any],
-    summary: dict[str, Any],
-    extras: list[Extra],
-    clock: _Phases,
-    observer: Observer,
-) -> None:
+@dataclass
+class _Completion:
     """Segments to dataset, dataset to timeline."""
-    observer.phase("dataset")
-    cost = summary["cost"]
-    final = {
-        **attributes,
-        "status": summary["status"],
-        "status_message": summary["message"],
-        "warnings": "\n".join(summary["warnings"]),
-        "steps": cost["steps"],
-        "wall_seconds": sum(clock.seconds.values()),
-        "cpu_seconds": cost["cpu_seconds"],
-        "finished_at": provenance.now(),
-    }
-    writer.complete(folder.dataset, final, extras)
-    summary["dataset_sha256"] = provenance.file_sha256(folder.dataset)
-    clock.next("dataset")
-    output = prepared.scene.config.output
-    if output.timeline and summary["samples"]:
-        observer.phase("timeline")
-        from rigidsim.look.timeline import write_timeline
 
-        with Run(folder, summary).dataset as dataset:
-            write_timeline(dataset, folder.timeline, rows=output.timeline_rows)
-        clock.next("timeline")
+    prepared: Prepared
+    folder: RunFolder
+    writer: SegmentWriter
+    recorder: Recorder
+    advance: Advance
+    attributes: dict[str, Any]
+    effort: Effort
+
+    def complete(
+        self, summary: dict[str, Any], extras: list[Any], clock: _Phases, observer: Observer
+    ) -> None:
+        """Write the files; a Ctrl-C leaves what can be gone on from, and says so in the summary."""
+        try:
+            self._write(summary, extras, clock, observer)
+        except KeyboardInterrupt:
+            kept = "the dataset is complete, the timeline is missing"
+            if not self.folder.dataset.exists():
+                self.recorder.save(self.advance.checkpoint())
+                kept = "all samples are saved as segments"
+            summary |= {"status": Status.INTERRUPTED.value, "exit_code": Status.INTERRUPTED.exit_code}
+            summary["message"] = f"interrupted after the integration; {kept}"
+
+    def _write(self, summary: dict[str, Any], extras: list[Any], clock: _Phases, observer: Observer) -> None:
+        observer.phase("dataset")
+        folder, progress = self.folder, self.advance.progress
+        final = {
+            **self.attributes,
+            "status": summary["status"],
+            "status_message": summary["message"],
+            "warnings": "\n".join(summary["warnings"]),
+            "steps": progress.steps,
+            "wall_seconds": self.effort.wall,
+            "cpu_seconds": self.effort.cpu,
+            "finished_at": provenance.now(),
+        }
+        checkpoint = None
+        if progress.status is Status.FINISHED:
+            arrays = self.recorder.packed(self.advance.checkpoint())
+            checkpoint = folder.checkpoint, arrays, self.recorder.all_events()
+        self.writer.complete(folder.dataset, final, extras, checkpoint=checkpoint)
+        summary["dataset_sha256"] = provenance.file_sha256(folder.dataset)
+        clock.next("dataset")
+        output = self.prepared.scene.config.output
+        if output.timeline and summary["samples"]:
+            observer.phase("timeline")
+            from rigidsim.look.timeline import write_timeline
+
+            with Run(folder, summary).dataset as dataset:
+                write_timeline(dataset, folder.timeline, rows=output.timeline_rows)
+            clock.next("timeline")
 
 
 def _lyapunov(prepared: Prepared, interruption: Interruption) -> LyapunovSpectrum | None:
@@ -178,18 +223,6 @@ def _lyapunov(prepared: Prepared, interruption: Interruption) -> LyapunovSpectru
     system = double_twin(prepared)
     start, end = float(clock.at(0)), float(clock.at(last))
     return lyapunov_spectrum(system, start, end, lambda _: not interruption.requested)
-
-
-def _extras(spectrum: LyapunovSpectrum | None) -> list[Extra]:
-    """The convergence of the exponents, as variables of the dataset."""
-    if spectrum is None:
-        return []
-    along = {"units": "s", "long_name": "time since the run's start, of the estimates"}
-    what = {"units": "s-1", "long_name": "Lyapunov exponents of the scaled states so far, largest first"}
-    return [
-        Extra("lyapunov_time", ("lyapunov_time",), spectrum.times, along),
-        Extra("lyapunov_exponents", ("lyapunov_time", "lyapunov_index"), spectrum.exponents, what),
-    ]
 
 
 class _Phases:
@@ -204,72 +237,3 @@ class _Phases:
         now = time.perf_counter()
         self.seconds[finished] = now - self._since
         self._since = now
-
-
-def _attributes(prepared: Prepared, stepper: Stepper) -> dict[str, Any]:
-    """Root attributes of segments and dataset."""
-    scene, system = prepared.scene, prepared.system
-    found = {f"version_{k}": v for k, v in provenance.versions().items()}
-    found |= {f"code_{k}": v for k, v in provenance.code_target(stepper.integrator).items()}
-    return {
-        "Conventions": "CF-1.11",
-        "title": scene.name,
-        "comment": scene.description,
-        "source": "rigidsim",
-        "schema_version": SCHEMA_VERSION,
-        "status": Status.RUNNING.value,
-        "config": prepared.experiment.text,
-        "config_sha256": prepared.experiment.sha256,
-        "formulation": system.requirements.formulation,
-        "euler_sequence": system.sequence,
-        "states": " ".join(system.states),
-        "precision": prepared.precision.name,
-        "precision_bits": prepared.precision.bits,
-        "tolerance": prepared.effective_tolerance,
-        "integrator": "heyoka Taylor, natural steps, dense output",
-        "taylor_order": int(stepper.integrator.order),
-        "compact_mode": int(prepared.precision.compact or system.wide),
-        "high_accuracy": 0,
-        "batch_size": 1,
-        "unit_exponents": json.dumps(
-            {"time": system.scaling.time, "inertia": system.scaling.inertia,
-             "states": system.state_exponents}
-        ),
-        "principal_moments": json.dumps([float(m) for m in scene.body.principal_moments]),
-        "principal_axes": json.dumps([[float(x) for x in a] for a in scene.body.principal_axes]),
-        "inertia_tensor": json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
-        "body_source": scene.body.source,
-        "drawing": json.dumps(scene.body.drawing),
-        "python_loads": " ".join(type(load).__name__ for load in prepared.python_loads),
-        "cpu_model": provenance.cpu_model(),
-        "started_at": provenance.now(),
-        **found,
-    }  # fmt: skip
-
-
-def _plain(attributes: dict[str, Any]) -> dict[str, Any]:
-    """The attributes that the summary repeats."""
-    kept = ("config_sha256", "cpu_model", "started_at", "taylor_order", "compact_mode", "unit_exponents")
-    return {k: v for k, v in attributes.items() if k in kept or k.startswith(("version_", "code_"))}
-
-
-def _message(prepared: Prepared, progress: Progress, evaluator: Evaluator) -> str:
-    """The status in words, with where and why for a run that broke down."""
-    text = progress.status.message
-    if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
-        return text
-    text += f"; last good state at {progress.time:.9g} s after {progress.steps} steps"
-    if progress.last_good is None:
-        return text
-    state = np.array([progress.last_good.state], dtype=prepared.precision.scalar)
-    factors = evaluator.singular_factors(state)
-    if factors is not None and abs(float(factors[0])) < summaries.NEAR_SINGULAR:
-        middle = float(state[0][prepared.system.states.index("theta")])
-        text += (
-            f"; the middle Euler angle theta = {middle:.9g} rad came within {abs(float(factors[0])):.2g} of "
-            f'the singularity of {prepared.system.sequence}: choose formulation = "quaternion"'
-        )
-    else:
-        largest = int(np.argmax(np.abs(state[0].astype(np.float64))))
-        text += f"; the largest state there was {prepared.system.states[largest]}"
-    return text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -221,6 +222,8 @@ def summarise(
     seconds: dict[str, float],
     cpu_seconds: float,
     provenance: dict[str, Any],
+    remarks: Sequence[str] = (),
+    mixed: str = "",
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     scene, system = prepared.scene, prepared.system
@@ -233,7 +236,7 @@ def summarise(
         "status": progress.status.value,
         "message": message,
         "exit_code": progress.status.exit_code,
-        "warnings": warnings(prepared, progress, watch, growth),
+        "warnings": [*remarks, *warnings(prepared, progress, watch, growth)],
         "samples": progress.next_sample,
         "samples_planned": progress.samples,
         "time_reached": progress.time,
@@ -270,14 +273,19 @@ def summarise(
             "principal_axes": [[float(x) for x in axis] for axis in scene.body.principal_axes],
             "mass": None if scene.body.mass is None else float(scene.body.mass),
         },
-        "bit_for_bit": {
-            "claim": progress.status is Status.FINISHED and not prepared.python_loads,
-            "holds_for": "the same config, versions and CPU features as recorded in provenance"
-            if not prepared.python_loads
-            else "nothing: loads given from Python are not in the config",
-        },
+        "bit_for_bit": _bit_for_bit(prepared, progress, mixed),
         "provenance": provenance,
     }
+
+
+def _bit_for_bit(prepared: Prepared, progress: Progress, mixed: str) -> dict[str, Any]:
+    holds_for = "the same config, versions and CPU features as recorded in provenance"
+    if prepared.python_loads:
+        holds_for = "nothing: loads given from Python are not in the config"
+    elif mixed:
+        holds_for = f"nothing: the run was resumed on another machine or version ({mixed})"
+    claim = progress.status in (Status.FINISHED, Status.EVENT) and not prepared.python_loads and not mixed
+    return {"claim": claim, "holds_for": holds_for}
 
 
 def _seconds(step: float, exponent: int) -> float | None:

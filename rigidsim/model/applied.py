@@ -13,6 +13,7 @@ from rigidsim.model.rotations import Expression, apply, euler_from_matrix, trans
 from rigidsim.scene.context import Vector, cross
 from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
 from rigidsim.scene.loads import Applied
+from rigidsim.scene.narrow import narrow_parts
 
 if TYPE_CHECKING:
     from rigidsim.model.mechanics import Mechanics
@@ -70,6 +71,12 @@ class AppliedModel(LoadModel):
             found = apply(m.matrix, found)
         size = context.ldexp(1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)
         return [(_unit(m, i, size), x) for i, x in enumerate(found)]
+
+    def narrow(self, m: Mechanics) -> list[Expression]:
+        """Arguments of pulses and switches in the components."""
+        variables = state_names(m, self.spec.reads)
+        parts = {part.root: part for c in self.spec.components for part in narrow_parts(c)}
+        return [to_heyoka(part, variables, m.number, m.scene.context) for part in parts.values()]
 
 
 def state_names(m: Mechanics, names: Collection[str]) -> dict[str, Expression]:

@@ -19,6 +19,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.dynamics import Number
+from rigidsim.model.split import rounded
 from rigidsim.scene import expressions
 from rigidsim.scene.expressions import Expression, Name, Node
 
@@ -41,7 +42,7 @@ def to_heyoka(expression: Expression, variables: Mapping[str, Any], number: Numb
         if isinstance(value, hy.expression):
             return value
         try:
-            return hy.expression(number(value))
+            return hy.expression(rounded(number(value)))
         except OverflowError:
             raise expression.error("a constant beyond the range of the working precision", node) from None
 

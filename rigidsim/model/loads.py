@@ -14,6 +14,7 @@ import heyoka as hy
 
 from rigidsim.model.ephemeris import MEAN_DISTANCE, Place, place
 from rigidsim.model.rotations import Expression, apply, transpose
+from rigidsim.model.split import as_factor
 from rigidsim.scene.context import Vector, cross, norm
 from rigidsim.scene.loads import CentralGravity, GravityGradient, ViscousTorque
 
@@ -38,6 +39,13 @@ class ExtraStates:
     derivatives: list[Expression]
     initial: list[Any]
     norms: list[Expression] = field(default_factory=list)
+
+
+def seconds(m: Mechanics) -> Expression:
+    """The scene's time as an expression, s; heyoka's own is in internal units."""
+    context = m.scene.context
+    unit = context.ldexp(context.one, m.scaling.time)
+    return hy.time if unit == 1 else m.number(unit) * hy.time
 
 
 class LoadModel:
@@ -76,6 +84,13 @@ class LoadModel:
     def keeps_axial(self, m: Mechanics, axis: Vector) -> bool:
         """Whether it has no torque about a symmetry axis of the body (mpf, body axes)."""
         return False
+
+    def narrow(self, m: Mechanics) -> list[Expression]:
+        """Dimensionless expressions of ``seconds(m)`` and the states around whose zeros the load changes all
+        at once, such as (t - t0) / width of a pulse or a switch. Steps chosen by the motion alone would pass
+        over it; with them they shorten on the way there.
+        """
+        return []
 
 
 class UniformGravityModel(LoadModel):
@@ -194,7 +209,7 @@ class GravityGradientModel(LoadModel):
             return apply(transpose(m.matrix), self._place(m).direction)
         assert self.spec.position is not None
         length = norm(m.scene.context, self.spec.position)
-        fixed = [hy.expression(m.number(x / length)) for x in self.spec.position]
+        fixed = [as_factor(m.number(x / length)) for x in self.spec.position]
         return apply(transpose(m.matrix), fixed)
 
     def strength(self, m: Mechanics) -> Expression:
@@ -210,7 +225,7 @@ class GravityGradientModel(LoadModel):
         else:
             distance = norm(context, m.carried(self.spec.position))
         value = context.ldexp(self.spec.gravitational_parameter / distance**3, 2 * m.scaling.time)
-        constant = hy.expression(m.number(value))
+        constant = as_factor(m.number(value))
         return constant if factor is None else constant * factor
 
     def torque(self, m: Mechanics) -> list[Term]:

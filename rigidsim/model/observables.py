@@ -57,11 +57,16 @@ class Observable:
     drift_scale: Callable[[Mechanics], tuple[Any, str]] | None = None
 
 
+def _driven(m: Mechanics) -> Any:
+    """Energy that loads of unknown size are estimated to add, J."""
+    return m.scene.context.zero if m.scaling.drive is None else m.scaling.drive.energy
+
+
 def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     """abs(L) at the start, or the momentum that gravity can build up, if that is larger."""
     scene, context = m.scene, m.scene.context
     initial = norm(context, apply(scene.body.inertia, scene.angular_velocity))
-    fed = potential_amplitude(scene) + tidal_amplitude(scene)
+    fed = potential_amplitude(scene) + tidal_amplitude(scene) + _driven(m)
     swing = context.sqrt(2 * max(scene.body.principal_moments) * fed)
     swing = max(swing, max(scene.body.principal_moments) * orbital_rate(scene))
     if initial == 0 and swing == 0:
@@ -77,7 +82,7 @@ def rotational_scale(m: Mechanics) -> tuple[Any, str]:
     momentum = apply(scene.body.inertia, scene.angular_velocity)
     kinetic = dot(scene.angular_velocity, momentum) / 2
     carried = max(scene.body.principal_moments) * orbital_rate(scene) ** 2 / 2
-    amplitude = potential_amplitude(scene) + tidal_amplitude(scene) + carried
+    amplitude = potential_amplitude(scene) + tidal_amplitude(scene) + carried + _driven(m)
     if kinetic + amplitude == 0:
         return context.one, "1 J (the body is at rest)"
     name = "initial rotational energy" + (" plus that of the loads" if amplitude else "")
@@ -92,6 +97,8 @@ def energy_scale(m: Mechanics) -> tuple[Any, str]:
         return scale, name
     pull = norm(context, scene.gravity) if scene.gravity else context.zero
     swiftest = norm(context, scene.velocity) + pull * (scene.end - scene.start)
+    if m.scaling.drive is not None:
+        swiftest += m.scaling.drive.speed
     flight = scene.body.mass * swiftest**2 / 2
     return (scale + flight if flight else scale), name + " plus the flight's largest kinetic energy"
 

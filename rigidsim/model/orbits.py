@@ -17,6 +17,7 @@ import heyoka as hy
 
 from rigidsim.model.dynamics import Number
 from rigidsim.model.rotations import Expression
+from rigidsim.model.split import as_factor
 from rigidsim.scene.loads import KeplerOrbit
 
 
@@ -66,11 +67,11 @@ def orbit_states(
         return c, s
 
     def uniform(rate: Any) -> Expression | None:
-        return None if rate == 0 else hy.expression(number(rate * time_unit))
+        return None if rate == 0 else as_factor(number(rate * time_unit))
 
     e = orbit.eccentricity
     anomaly = orbit.eccentric_anomaly(context, start)
-    motion = hy.expression(number(orbit.mean_motion * time_unit))
+    motion = as_factor(number(orbit.mean_motion * time_unit))
     if orbit.circular:
         c, s = pair("anomaly", anomaly, motion)
         inverse = hy.expression(1.0)
@@ -96,4 +97,4 @@ def orbit_states(
 
 def _constant(value: Any, number: Number) -> Expression:
     """A constant as an expression; exact 0 and 1 vanish from products."""
-    return hy.expression(number(value))
+    return as_factor(number(value))

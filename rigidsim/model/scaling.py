@@ -17,12 +17,26 @@ from rigidsim.scene.scene import Scene
 
 
 @dataclass(frozen=True)
+class Drive:
+    """What loads of unknown size are estimated to add to the motion (see ``rigidsim.model.drive``), mpf.
+
+    Attributes:
+        energy: of rotation, J.
+        speed: of the centre of mass, m/s.
+    """
+
+    energy: Any
+    speed: Any
+
+
+@dataclass(frozen=True)
 class Scaling:
     """Binary exponents of the internal units, in SI: one internal unit of time is ``2**time`` seconds.
 
     Attributes:
         time, inertia, length, speed: exponents.
         rates: exponents of the three body rates relative to ``1 / (unit of time)``.
+        drive: what went into them for loads of unknown size, or None.
     """
 
     time: int
@@ -30,6 +44,7 @@ class Scaling:
     rates: tuple[int, int, int]
     length: int = 0
     speed: int = 0
+    drive: Drive | None = None
 
     @property
     def momentum(self) -> int:
@@ -55,7 +70,7 @@ def exponent(context: Any, value: Any) -> int:
     return int(power) - 1 if mantissa == 0.5 else int(power)
 
 
-def largest_rates(scene: Scene, *, driven: bool = False) -> list[Any]:
+def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
     """Upper bounds of the absolute body rates over the whole motion, from energy and momentum, rad/s.
 
     For a free body in principal axes both 2 E I_max - L^2 and L^2 - 2 E I_min are sums of squares with
@@ -63,7 +78,7 @@ def largest_rates(scene: Scene, *, driven: bool = False) -> list[Any]:
     Otherwise |w_i| <= sqrt(2 E_kin,max (I^-1)_ii).
 
     Args:
-        driven: whether loads act of which the scene knows nothing.
+        drive: of loads whose size the scene doesn't know.
     """
     context, body, w = scene.context, scene.body, scene.angular_velocity
     inertia, inverse = body.inertia, scene.inverse_inertia
@@ -71,9 +86,11 @@ def largest_rates(scene: Scene, *, driven: bool = False) -> list[Any]:
     weighted = [dot(row, w) for row in inertia]
     twice_energy = dot(w, weighted)
     swing = 4 * potential_amplitude(scene)
-    if scene.loads or driven:  # energy may come from an orbit: a bound for the body carried along with it
+    if scene.loads or drive is not None:  # an orbit feeds it: a bound for the body carried along with it
         carried = orbital_rate(scene)
         fed = context.sqrt(max(twice_energy, zero) + swing + 4 * tidal_amplitude(scene))
+        if drive is not None:
+            fed += context.sqrt(2 * drive.energy)
         return [fed * context.sqrt(inverse[i][i]) + carried for i in range(3)]
     diagonal = all(inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j)
     axis = symmetry_axis(scene) if diagonal else None
@@ -141,7 +158,7 @@ def orbital_rate(scene: Scene) -> Any:
     for load in scene.loads:
         if isinstance(load, GravityGradient) and load.orbit is not None:
             e = load.orbit.eccentricity
-            fastest = max(fastest, load.orbit.mean_motion * context.sqrt(1 - e * e) / (1 - e) ** 2)
+            fastest = max(fastest, abs(load.orbit.mean_motion) * context.sqrt(1 - e * e) / (1 - e) ** 2)
         elif isinstance(load, CentralGravity):
             nearest = nearest_approach(scene, load)
             offset, _speed = _relative(scene, load)
@@ -172,12 +189,13 @@ def nearest_approach(scene: Scene, load: CentralGravity) -> Any:
     return max(min(pericentre, distance), distance / 1000)
 
 
-def _flight_scales(scene: Scene) -> tuple[Any, Any]:
+def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
     """Largest distance from the origin (m) and speed (m/s) to be expected."""
     context = scene.context
     assert scene.position is not None
     assert scene.velocity is not None
     horizon = scene.end - scene.start
+    fed = context.zero if drive is None else drive.speed
     central = [load for load in scene.loads if isinstance(load, CentralGravity)]
     if len(central) == 1 and scene.gravity is None:
         load = central[0]
@@ -188,17 +206,18 @@ def _flight_scales(scene: Scene) -> tuple[Any, Any]:
         swiftest = context.sqrt(2 * abs(energy + load.gravitational_parameter / nearest))
         if energy < 0:
             farthest = load.gravitational_parameter / -energy  # twice the semi-major axis
-            return norm(context, load.position) + min(farthest, distance + swiftest * horizon), swiftest
-        return norm(context, scene.position) + swiftest * horizon, swiftest
+            reach = min(farthest, distance + swiftest * horizon) + fed * horizon
+            return norm(context, load.position) + reach, swiftest + fed
+        return norm(context, scene.position) + (swiftest + fed) * horizon, swiftest + fed
     pull = norm(context, scene.gravity) if scene.gravity is not None else context.zero
-    swiftest = norm(context, scene.velocity) + pull * horizon
+    swiftest = norm(context, scene.velocity) + pull * horizon + fed
     return norm(context, scene.position) + swiftest * horizon, swiftest
 
 
-def choose_scaling(scene: Scene, *, driven: bool = False) -> Scaling:
+def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
     """The units of a scene; a pure function of it, so that the same config gives the same bits."""
     context, body = scene.context, scene.body
-    bounds = largest_rates(scene, driven=driven)
+    bounds = largest_rates(scene, drive)
     fastest = max(bounds)
     potential = potential_amplitude(scene)
     if potential != 0:
@@ -218,7 +237,7 @@ def choose_scaling(scene: Scene, *, driven: bool = False) -> Scaling:
         rates.append(relative if abs(relative) >= _WORTH_A_UNIT else 0)
     length = speed = 0
     if scene.position is not None and scene.velocity is not None:
-        farthest, swiftest = _flight_scales(scene)
+        farthest, swiftest = _flight_scales(scene, drive)
         length, speed = exponent(context, farthest), exponent(context, swiftest)
     return Scaling(
         time=time,
@@ -226,4 +245,5 @@ def choose_scaling(scene: Scene, *, driven: bool = False) -> Scaling:
         rates=(rates[0], rates[1], rates[2]),
         length=length,
         speed=speed,
+        drive=drive,
     )

@@ -9,9 +9,10 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.applied import state_names
+from rigidsim.model.applied import AppliedModel, state_names
 from rigidsim.model.canonical import MOMENTA, canonical_states, hamilton_equations
 from rigidsim.model.catalogue import load_models
+from rigidsim.model.drive import estimate_drive
 from rigidsim.model.dynamics import (
     Number,
     flight_equations,
@@ -25,6 +26,7 @@ from rigidsim.model.formulations import BUILDERS, AttitudeStates
 from rigidsim.model.loads import LoadModel
 from rigidsim.model.mechanics import Mechanics, in_common_unit
 from rigidsim.model.observables import WORK, work_is_needed
+from rigidsim.model.pace import PACE, arguments, pace_derivative
 from rigidsim.model.recording import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.requirements import Requirements, choose_requirements
 from rigidsim.model.rotations import Expression
@@ -62,6 +64,7 @@ class System:
         singular_factor: expression that vanishes where the formulation breaks down, or None.
         crossings: events to be found along the way.
         wide: whether the equations are too long to be compiled unrolled.
+        mechanics: the quantities that outputs and invariants are written in.
         rate_bound: upper bound of the absolute angular velocity, rad/s (mpf).
     """
 
@@ -81,6 +84,7 @@ class System:
     rate_bound: Any
     crossings: list[Crossing]
     wide: bool
+    mechanics: Mechanics
 
     @property
     def variables(self) -> list[Expression]:
@@ -100,7 +104,8 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
     """
     loads = [*load_models(scene), *extra_loads]
     requirements = choose_requirements(scene, loads)
-    scaling = choose_scaling(scene, driven=bool(extra_loads))
+    unknown = [load for load in loads if isinstance(load, AppliedModel)] + list(extra_loads)
+    scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     numbers = scaled_numbers(scene, scaling)
     context = scene.context
 
@@ -178,6 +183,15 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         initial.append(context.zero)
         exponents.append(scaling.energy)
         requirements.reasons.append((WORK, "work of the loads without a potential, to check the energy"))
+    watched = arguments(mechanics)
+    if watched:
+        carried = dict(zip(names, derivatives, strict=True))
+        names.append(PACE)
+        derivatives.append(pace_derivative([u for _, u in watched], carried))
+        initial.append(context.zero)
+        exponents.append(0)
+        titles = ", ".join(dict.fromkeys(title for title, _ in watched))
+        requirements.reasons.append((PACE, f"{titles}: no step may pass over what is narrow in it"))
     _refuse_singular_start(scene, attitude)
     recorded, outputs = recorded_variables(mechanics, requirements)
     invariants = find_invariants(mechanics, norms)
@@ -199,9 +213,10 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         angle_states=angle_states,
         singular_factor=attitude.singular_factor if attitude else None,
         sequence=scene.config.integrator.euler_sequence,
-        rate_bound=max(largest_rates(scene, driven=bool(extra_loads))),
+        rate_bound=max(largest_rates(scene, scaling.drive)),
         crossings=_crossings(mechanics),
         wide=any(load.wide for load in loads),
+        mechanics=mechanics,
     )
 
 

@@ -22,7 +22,7 @@ from rigidsim.scene.context import (
     transpose,
 )
 from rigidsim.scene.exact import ExactNumber, parse_number
-from rigidsim.scene.messages import nearest
+from rigidsim.scene.messages import nearest, shown
 from rigidsim.scene.presets import PRESETS
 from rigidsim.scene.shapes import DIMENSION_KEYS, SHAPES
 
@@ -117,7 +117,7 @@ def _from_tensor(table: schema.Body, source: str, context: Any) -> RigidBody:
         preset = PRESETS.get(str(table.preset))
         if preset is None:
             near = nearest(str(table.preset), PRESETS)
-            raise _fail("preset", f'given "{table.preset}"{near}; allowed: {", ".join(PRESETS)}')
+            raise _fail("preset", f"given {shown(table.preset)}{near}; allowed: {', '.join(PRESETS)}")
         if table.mass is not None:
             raise _fail("mass", "it follows from preset; remove it")
         largest = parse_number(preset.largest_moment, "kg m^2").at(context)
@@ -265,7 +265,7 @@ def _reference_point(table: schema.Body, source: str, center: Vector, context: A
             allowed = ", ".join(["center_of_mass", *landmarks])
             raise _fail(
                 "reference",
-                f'given "{table.reference}"; allowed here: {allowed}, or a point [x, y, z]',
+                f"given {shown(table.reference)}; allowed here: {allowed}, or a point [x, y, z]",
             )
         assert shape is not None
         dimensions = {}
@@ -293,16 +293,16 @@ def _finish(
     slack = largest * context.mpf(_ROUNDING_OF_INPUT)
     tiny = largest * context.mpf(2) ** (16 - context.prec)
     moments = [context.zero if abs(m) < tiny else m for m in moments]
-    shown = ", ".join(context.nstr(m, 12) for m in moments)
+    listed = ", ".join(context.nstr(m, 12) for m in moments)
     if min(moments) < 0:
-        raise _fail(source, f"principal moments {shown}: a moment of inertia can't be negative")
+        raise _fail(source, f"principal moments {listed}: a moment of inertia can't be negative")
     if sorted(moments)[1] == 0:
-        raise _fail(source, f"principal moments {shown}: at most one can be zero (a rod's)")
+        raise _fail(source, f"principal moments {listed}: at most one can be zero (a rod's)")
     small, middle, large = sorted(moments)
     if small + middle < large - slack:
         raise _fail(
             source,
-            f"principal moments {shown}: the largest is more than the sum of the other two "
+            f"principal moments {listed}: the largest is more than the sum of the other two "
             f"by {context.nstr(large - small - middle, 6)}, which no mass distribution allows "
             "(I1 + I2 >= I3)",
         )

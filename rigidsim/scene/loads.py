@@ -10,7 +10,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import load_tables
 from rigidsim.scene.context import Vector
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions import Expression, ExpressionError, names_used
+from rigidsim.scene.expressions import Expression, ExpressionError, Number, names_used
 from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
 from rigidsim.scene.parser import parse_expression
 
@@ -25,6 +25,9 @@ class UniformGravity:
 @dataclass(frozen=True)
 class KeplerOrbit:
     """Where an attracting body is, as elements at time zero (radians, m, rad/s) with secular rates.
+
+    A circle has no periapsis: what is given of it and of its motion is part of the anomaly and of the mean
+    motion here, and so is the node where the orbit lies in the plane from which inclinations count.
 
     Attributes:
         mean_motion: rad/s, from Kepler's third law or from the period that was given.
@@ -60,7 +63,7 @@ class KeplerOrbit:
 
     @property
     def fixed_plane(self) -> bool:
-        """Whether neither node nor periapsis moves."""
+        """Whether neither node nor periapsis moves (a circle's periapsis never does)."""
         return bool(self.node_rate == 0 and self.periapsis_rate == 0)
 
 
@@ -116,6 +119,15 @@ class Applied:
 
 
 Load = UniformGravity | GravityGradient | CentralGravity | ViscousTorque | Applied
+
+
+def acts(load: Load) -> bool:
+    """False for a load that is zero whatever happens."""
+    if isinstance(load, ViscousTorque):
+        return any(c != 0 for c in load.coefficients)
+    if isinstance(load, Applied):
+        return not all(isinstance(c.root, Number) and c.root.value.sign == 0 for c in load.components)
+    return True
 
 
 def _fail(number: int, key: str, text: str) -> ConfigError:
@@ -215,14 +227,21 @@ def _orbit(table: load_tables.Orbit, strength: Any, number: int, context: Any) -
                 number, "orbit.period", f"given {float(table.period):g} s; a positive time is allowed"
             )
         motion = 2 * context.pi / table.period.at(context)
+    node, node_rate = table.ascending_node.at(context), table.node_rate.at(context)
+    periapsis, periapsis_rate = table.periapsis.at(context), table.periapsis_rate.at(context)
+    anomaly, zero = table.mean_anomaly.at(context), context.zero
+    if table.inclination.sign == 0:  # node and periapsis turn about the same axis
+        periapsis, periapsis_rate, node, node_rate = periapsis + node, periapsis_rate + node_rate, zero, zero
+    if eccentricity == 0:
+        anomaly, motion, periapsis, periapsis_rate = anomaly + periapsis, motion + periapsis_rate, zero, zero
     return KeplerOrbit(
         semi_major_axis=axis,
         eccentricity=eccentricity,
         inclination=table.inclination.at(context),
-        ascending_node=table.ascending_node.at(context),
-        periapsis=table.periapsis.at(context),
-        mean_anomaly=table.mean_anomaly.at(context),
-        node_rate=table.node_rate.at(context),
-        periapsis_rate=table.periapsis_rate.at(context),
+        ascending_node=node,
+        periapsis=periapsis,
+        mean_anomaly=anomaly,
+        node_rate=node_rate,
+        periapsis_rate=periapsis_rate,
         mean_motion=motion,
     )

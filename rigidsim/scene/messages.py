@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping
 from decimal import Decimal
+from itertools import islice
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -32,6 +33,9 @@ _TABLES = (
     "sweep",
 )
 _ARRAYS_OF_TABLES = ("loads", "events")
+_MOST_PROBLEMS = 200  # worth telling; a file of a million wrong keys has said enough by then
+_LONGEST_NAME = 60
+LONGEST_INTEGER = 10_000  # bits; Python refuses to write out integers not much longer
 UNION_TAGS = (
     "as a name",
     "as a point",
@@ -57,6 +61,8 @@ def shown(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int) and value.bit_length() > 200:
+        if value.bit_length() > LONGEST_INTEGER:
+            return f"a whole number of {value.bit_length()} bits"
         value = Decimal(value).normalize()
     text = str(value).lower().replace("infinity", "inf")
     return text if len(text) <= 60 else text[:57] + "..."
@@ -64,7 +70,9 @@ def shown(value: Any) -> str:
 
 def nearest(given: str, allowed: Iterable[str]) -> str:
     """``; did you mean "x"?`` when something close is allowed, else an empty text."""
-    close = difflib.get_close_matches(str(given), list(allowed), n=1, cutoff=0.6)
+    if len(given) > _LONGEST_NAME:  # comparing takes time, and nothing allowed is near
+        return ""
+    close = difflib.get_close_matches(given, list(allowed), n=1, cutoff=0.6)
     return f'; did you mean "{close[0]}"?' if close else ""
 
 
@@ -81,8 +89,13 @@ def place(location: Iterable[str | int]) -> str:
                 head, rest = f"{head} number {rest[0] + 1}", rest[1:]
     else:
         head, rest = "", parts
-    path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in rest).lstrip(".")
+    path = "".join(f"[{p}]" if isinstance(p, int) else f".{_key(p)}" for p in rest).removeprefix(".")
     return f"{head} {path}".strip()
+
+
+def _key(key: str) -> str:
+    """A key as it is; one that is empty, long or can't be seen stands in quotes, shortened."""
+    return key if 0 < len(key) <= 60 and key.isprintable() and key.strip() else shown(key)
 
 
 def later_features(table: Mapping[str, Any]) -> list[Problem]:
@@ -144,7 +157,7 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         allowed = context.get("expected", context.get("expected_tags", ""))
         allowed = allowed.replace("'", "").replace(" or ", ", ")
         names = [part.strip() for part in allowed.split(",")]
-        return f"given {shown(given)}{nearest(str(given), names)}; allowed: {', '.join(names)}"
+        return f"given {shown(given)}{nearest(shown(given), names)}; allowed: {', '.join(names)}"
     if kind == "too_short":  # arrays of fixed length report theirs themselves
         return "given an empty array; at least one entry is needed"
     if kind == "kind_of_value":
@@ -166,7 +179,7 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
 def config_error(model: type[BaseModel], error: ValidationError) -> ConfigError:
     """All that the validator found, one problem per key, in the words of ``Problem``."""
     problems: dict[str, Problem] = {}
-    for item in error.errors(include_url=False):
+    for item in islice(error.errors(include_url=False), _MOST_PROBLEMS):
         # the alternatives of a union each report; their names are no part of the user's key
         location = tuple(part for part in item["loc"] if part not in UNION_TAGS)
         given = item["input"]

@@ -19,6 +19,12 @@ from rigidsim.scene import messages
 from rigidsim.scene.schema import Config
 
 _LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
+_MOST_OVERRIDES = 1000
+# The TOML reader's time and memory grow with the square of a dotted key's length. (Runs of keys, quoted or
+# bare, joined by points; the look-behind lets the search pass over each run once.)
+_DEEPEST_KEY = 100
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_DEEP_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST_KEY}}}")
 
 
 @dataclass(frozen=True)
@@ -54,11 +60,35 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     Raises:
         ConfigError: not TOML; the message has the line and column.
     """
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start()) + 1
+        what = f"can't be read: a key of more than {_DEEPEST_KEY} parts (at line {line})"
+        raise ConfigError(Problem("TOML", what), source)
     try:
         return tomllib.loads(text, parse_float=_decimal)
-    except (ValueError, RecursionError) as error:
+    except RecursionError:
+        raise ConfigError(Problem("TOML", "can't be read: nested too deeply"), source) from None
+    except ValueError as error:
         text = re.sub(r"\(('[^()]*'),?\)", _dotted, str(error))
         raise ConfigError(Problem("TOML", f"can't be read: {text}"), source) from None
+
+
+def _long_integers(table: dict[str, Any]) -> list[Problem]:
+    """Whole numbers too long to be shown; TOML has no limit for hexadecimal ones."""
+    problems = []
+    waiting: list[tuple[tuple[str | int, ...], Any]] = [((), table)]
+    while waiting:
+        path, node = waiting.pop()
+        if isinstance(node, dict):
+            waiting += [((*path, key), child) for key, child in node.items()]
+        elif isinstance(node, list):
+            waiting += [((*path, index), child) for index, child in enumerate(node)]
+        elif isinstance(node, int) and node.bit_length() > messages.LONGEST_INTEGER:
+            most = messages.LONGEST_INTEGER
+            what = f"given {messages.shown(node)}; whole numbers of at most {most} bits are allowed"
+            problems.append(Problem(messages.place(path), what))
+    return problems
 
 
 def _dotted(key: re.Match[str]) -> str:
@@ -72,6 +102,8 @@ def _apply(table: dict[str, Any], assignment: str) -> None:
     where = f"--set {assignment[:60]}"
     if not equals or not key.strip() or "\n" in assignment:
         raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
+    if _DEEP_KEY.search(assignment):
+        raise ConfigError(Problem(where, f"a key of more than {_DEEPEST_KEY} parts"))
     try:
         value = tomllib.loads(f"value = {value_text}", parse_float=_decimal)["value"]
     except (ValueError, RecursionError):
@@ -115,12 +147,18 @@ def parse(text: str, *, source: str = "config", overrides: Sequence[str] = ()) -
     Raises:
         ConfigError: with every problem found.
     """
+    if len(overrides) > _MOST_OVERRIDES:
+        what = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
+        raise ConfigError(Problem("--set", what), source)
     table = parse_toml(text, source)
     try:
         for assignment in overrides:
             _apply(table, assignment)
     except ConfigError as error:
         raise error.at(source) from None
+    problems = _long_integers(table)
+    if problems:
+        raise ConfigError(problems, source)
     problems = messages.later_features(table)
     try:
         config = Config.model_validate(table)
@@ -158,6 +196,15 @@ def load(path: str | Path, *, overrides: Sequence[str] = ()) -> Experiment:
         raise ConfigError(
             Problem("file", f"not UTF-8 text (byte {error.start}); save it as UTF-8"), str(path)
         ) from None
+    return parse_saved(text, source=str(path), overrides=overrides)
+
+
+def parse_saved(text: str, *, source: str, overrides: Sequence[str] = ()) -> Experiment:
+    """Read a text that may carry overrides in ``#:set`` lines, which are applied first; see ``parse``.
+
+    Raises:
+        ConfigError: with every problem found.
+    """
     kept = [line[6:].strip() for line in text.splitlines() if line.startswith("#:set ")]
     body = "\n".join(line for line in text.split("\n") if not line.startswith("#:set "))
-    return parse(body, source=str(path), overrides=[*kept, *overrides])
+    return parse(body, source=source, overrides=[*kept, *overrides])

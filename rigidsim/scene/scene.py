@@ -144,7 +144,9 @@ def build_scene(experiment: Experiment) -> Scene:
             position=position,
             velocity=velocity,
             gravity=gravity,
-            loads=tuple(load for load in resolved if not isinstance(load, loads.UniformGravity)),
+            loads=tuple(
+                load for load in resolved if loads.acts(load) and not isinstance(load, loads.UniformGravity)
+            ),
             events=resolve_events(config, free_flight=position is not None),
             start=start,
             end=end,

@@ -100,7 +100,7 @@ class Solid(Table):
     @classmethod
     def _known_shape(cls, value: str | None) -> str | None:
         if value is not None and value not in SHAPES:
-            raise refuse(f'given "{value}"{nearest(value, SHAPES)}; allowed: {", ".join(SHAPES)}')
+            raise refuse(f"given {shown(value)}{nearest(value, SHAPES)}; allowed: {', '.join(SHAPES)}")
         return value
 
 
@@ -174,7 +174,7 @@ class Integrator(Table):
     @classmethod
     def _known_sequence(cls, value: str) -> str:
         if value not in EULER_SEQUENCES:
-            raise refuse(f'given "{value}"; allowed: {", ".join(EULER_SEQUENCES)} (intrinsic)')
+            raise refuse(f"given {shown(value)}; allowed: {', '.join(EULER_SEQUENCES)} (intrinsic)")
         return value
 
     @field_validator("precision", mode="before")
@@ -217,7 +217,7 @@ class Output(Table):
         for name in value or []:
             if name not in RECORDABLE:
                 near = nearest(name, RECORDABLE)
-                raise refuse(f'given "{name}"{near}; allowed: {", ".join(RECORDABLE)}')
+                raise refuse(f"given {shown(name)}{near}; allowed: {', '.join(RECORDABLE)}")
         if value is not None and not value:
             raise refuse("given an empty array; name at least one variable, or leave the key out")
         if value is not None and len(set(value)) < len(value):
@@ -238,7 +238,7 @@ class EventTable(Table):
     def _variable_name(cls, value: str) -> str:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", value):
             raise refuse(
-                f'given "{value[:40]}"; allowed: letters, digits and underscores, beginning with a letter'
+                f"given {shown(value)}; allowed: letters, digits and underscores, beginning with a letter"
             )
         return value
 
@@ -290,7 +290,7 @@ class Config(Table):
     def _folder_name(cls, value: str) -> str:
         if not re.fullmatch(r"[A-Za-z0-9._-]{1,100}", value) or not value.strip("."):
             raise refuse(
-                f'given "{value[:40]}"; allowed: 1 to 100 letters, digits, dots, underscores and '
+                f"given {shown(value)}; allowed: 1 to 100 letters, digits, dots, underscores and "
                 "hyphens, not dots alone, since it names the run folder"
             )
         return value

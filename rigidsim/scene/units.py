@@ -57,6 +57,11 @@ standard_gravity = 9.80665 * meter / second ** 2 = g0
 
 _UNIT_TEXT = re.compile(r"[\w°µμÅπ*/^ ().·-]{1,60}")
 _LARGEST_EXPONENT = 12
+# a number raised to a power, as in m^2^9 or 9^9, and rows of superscripts: towers that would take for ever
+_TOWER = re.compile(
+    r"(?<!\w)\d[\d.]*(?:[eE][+-]?\d+)?[\s)]*(?:\^|\*\*)|[\u00b2\u00b3\u00b9\u2070-\u2079]{2,}"
+)
+_NUMBER = re.compile(r"(?<![\w.])\.?\d")
 
 
 class UnitError(ValueError):
@@ -78,10 +83,15 @@ def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
     import pint
 
     exponents = [int(digits) for digits in re.findall(r"\d+", text)]
-    if not _UNIT_TEXT.fullmatch(text) or any(e > _LARGEST_EXPONENT for e in exponents):
+    before = [text[: number.start()].rstrip(" (+-") for number in _NUMBER.finditer(text)]
+    factors = any(not start.endswith(("^", "**")) for start in before)  # a unit has numbers as exponents only
+    unusual = not _UNIT_TEXT.fullmatch(text) or _TOWER.search(text) or factors
+    if unusual or any(e > _LARGEST_EXPONENT for e in exponents):
         raise UnitError(f'"{text}" is not a unit')
     try:
         unit = _registry().parse_units(text.replace("·", "*"))
+        if any(abs(power) > _LARGEST_EXPONENT for power in unit._units.values()):  # such as m^1e9
+            raise UnitError(f'"{text}" is not a unit')
         quantity = _registry().Quantity(Fraction(1), unit).to_root_units()
     except pint.UndefinedUnitError as error:
         raise UnitError(f'unknown unit "{error.args[0]}"; {known_units()}') from None

@@ -1,4 +1,4 @@
-"""The loop that takes a system from its start to its last sample."""
+"""The loop that takes a system from where it stands to its last sample."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.solve.harvest import ROWS_AT_ONCE, Checkpoint, Harvest, Keeper
 from rigidsim.solve.precision import Precision
+from rigidsim.solve.rhythm import Place, Rhythm
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import Mark, Stepper
-from rigidsim.solve.winding import INTERVAL, Winding
 
 # Between two looks at the clock and at Ctrl-C; well below the half second that a user waits.
 _CHUNK_SECONDS = 0.1
 _BLOCK_STEPS = 4096
 _WORTH_A_BLOCK = 64  # steps; fewer are cheaper one by one
+_WORTH_A_GRID = 8
+_GRID_STRIDES = 4.0  # per sample, up to which grids (20 us each) cost less than skipping to each (85 us)
+_BLOCK_SPACING = 64.0  # steps per sample up to which blocks cost less than that: 0.8 us a step
+_GRID_ROWS = 2 * ROWS_AT_ONCE  # in a stride, which can't be shortened: bounds the memory
 _SPARSE = 12.0  # steps to a sample from which skipping costs less than single steps
-_BLOCK_SPACING = 64.0  # steps per sample up to which blocks cost less: 0.8 us a step against 85 us a sample
 _FADING = 0.98  # of the longest step, per chunk
 _LOOK_AHEAD = 16  # samples
 _MARGIN = 0.9  # of the predicted steps to the next sample that are skipped at once
 _HOPELESS_STEPS = 1e15
 _LONG_GAP = 200.0  # steps over which the mean step is a good guide
 _MEAN_MARGIN = 0.85
-_ROWS_AT_ONCE = 8192
-_PATIENCE = 2.0  # seconds until samples of a slow run are handed over
 
 
 @dataclass
@@ -52,7 +53,7 @@ class Progress:
     redone_steps: int = 0
     status: Status = Status.RUNNING
     integration_seconds: float = 0.0
-    last_good: Mark | None = None
+    last_good: Place | None = None
 
     @property
     def fraction(self) -> float:
@@ -60,50 +61,67 @@ class Progress:
         return self.next_sample / self.samples
 
 
-Sink = Callable[[int, np.ndarray, np.ndarray, np.ndarray], None]
-"""Takes (index of the first sample, times (n,), states (n, states), turns (n, angles))."""
-
 Check = Callable[[Progress], Status | None]
 """Looks at guards and interruptions between chunks; a status ends the run."""
 
 
 @dataclass
 class Advance:
-    """Drives a stepper through the samples.
+    """Drives an integration through the samples.
 
     Attributes:
-        sink: receives finished samples in order.
+        keeper: receives finished samples in order.
         check: asked between chunks, at least every tenth of a second or after each single step.
+        start: where to go on; None begins.
     """
 
-    stepper: Stepper
+    rhythm: Rhythm
     clock: SampleClock
-    winding: Winding
     precision: Precision
-    sink: Sink
+    keeper: Keeper
     check: Check
+    start: Checkpoint | None = None
     progress: Progress = field(init=False)
+    _before_last: Place | None = field(default=None, init=False)
     _pace: float = field(default=0.0, init=False)  # steps per second, measured
     _longest: float = field(default=0.0, init=False)  # step of late, internal units
     _mean: float = field(default=0.0, init=False)  # step over the latest long skip; 0 where unknown
 
     def __post_init__(self) -> None:
-        self.progress = Progress(self.clock.count)
-        self._buffer: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        self._buffered = 0
-        self._flushed = time.perf_counter()
+        first = 0
+        if self.start is not None:
+            self.rhythm.back_to(self.start.place)
+            first = self.start.next_sample
+        self.stepper = self.rhythm.stepper
+        self.progress = Progress(self.clock.count, first)
+        self.harvest = Harvest(self.clock, self.keeper, first)
         self._last = float(self.clock.at(self.clock.count - 1))
+        self._account()
+
+    def checkpoint(self) -> Checkpoint:
+        """Where to go on, at a moment when everything collected was handed over.
+
+        After the last sample this is the start of the step that holds it: a later end has samples in there.
+        """
+        return Checkpoint(self._before_last or self.rhythm.place(), self.harvest.handed)
 
     def run(self) -> Progress:
         """Go on until the last sample is recorded or something ends the run."""
-        progress = self.progress
-        progress.last_good = self.stepper.mark()
-        while progress.next_sample + self._buffered < self.clock.count:
+        progress, harvest = self.progress, self.harvest
+        progress.last_good = self.rhythm.place()
+        if self.harvest.complete:
+            self._finish(progress.last_good)
+        else:
+            self._look_ahead()
+        while not harvest.complete:
+            if self.keeper.due():
+                self._hand_over()
+                self.keeper.save(self.checkpoint())
             stop = self.check(progress)
             if stop is not None:
-                self._flush()
-                # what is flushed may complete the run, or break a guard of its own
-                if progress.next_sample < self.clock.count:
+                self._hand_over()
+                # what is handed over may complete the run, or break a guard of its own
+                if not harvest.complete:
                     progress.status = stop
                     return progress
                 break
@@ -112,65 +130,76 @@ class Advance:
             fine = self._go_on()
             elapsed = time.perf_counter() - started
             progress.integration_seconds += elapsed
-            progress.steps = self.stepper.steps
-            progress.time = float(np.ldexp(float(self.stepper.time), self.clock.exponent))
-            taken = max(self.stepper.steps - before, 1)
-            self._pace = taken / max(elapsed, 1e-9)
+            self._account()
+            self._pace = max(self.stepper.steps - before, 1) / max(elapsed, 1e-9)
             if self.stepper.log.stop is not None:
-                self._drop_after(self.stepper.log.stop)
-                self._flush()
-                progress.status = Status.EVENT
-                return progress
+                harvest.drop_after(self.stepper.log.stop)
+                return self._ended(Status.EVENT)
             if not fine:
-                self._flush()
-                progress.status = Status.NON_FINITE
-                return progress
-            if self._buffered >= _ROWS_AT_ONCE or time.perf_counter() - self._flushed > _PATIENCE:
-                self._flush()
+                return self._ended(Status.NON_FINITE)
+            self._hand_over(patiently=True)
             if self._hopeless():
-                self._flush()
-                progress.status = Status.COLLAPSED
-                progress.last_good = self.stepper.mark()
-                return progress
-        self._flush()
-        progress.status = Status.FINISHED
-        return progress
+                progress.last_good = self.rhythm.place()
+                return self._ended(Status.COLLAPSED)
+        return self._ended(Status.FINISHED)
+
+    def _look_ahead(self) -> None:
+        """Learn how long a step is and how long it takes, by one that is taken back."""
+        place = self.rhythm.place()
+        started = time.perf_counter()
+        self.stepper.step()
+        self._pace = 1 / max(time.perf_counter() - started, 1e-9)
+        self.rhythm.back_to(place)
+
+    def _ended(self, status: Status) -> Progress:
+        self._hand_over()
+        self.progress.status = status
+        return self.progress
+
+    def _account(self) -> None:
+        self.progress.steps = self.stepper.steps
+        self.progress.time = float(np.ldexp(float(self.stepper.time), self.clock.exponent))
+
+    def _hand_over(self, *, patiently: bool = False) -> None:
+        self.harvest.hand_over(patiently=patiently)
+        self.progress.next_sample = self.harvest.handed
 
     def _hopeless(self) -> bool:
         step = self.stepper.largest
         return step <= 0.0 or (self._last - float(self.stepper.time)) / step > _HOPELESS_STEPS
 
     def _go_on(self) -> bool:
-        """One chunk: choose how, and never pass a wrap of angles or the patience of a user."""
-        upcoming = self.clock.at(self.progress.next_sample + self._buffered)
+        """One chunk of steps: choose how, within the patience of a user."""
+        upcoming = self.harvest.upcoming
         # steps of a tumbling body vary a lot: predict with the longest of late, which fades slowly
         self._longest = step = max(self.stepper.largest, _FADING * self._longest)
         gap = float(upcoming) - float(self.stepper.time)
         patience = max(1, int(self._pace * _CHUNK_SECONDS))
-        wrap_in = INTERVAL - self.stepper.steps % INTERVAL if self.winding.positions else patience
         expected = gap / step if step > 0 else 0.0
-        if step > 0 and self.precision.cheap and not self.winding.positions and self._dense(step):
-            left = int((self._last - float(self.stepper.time)) / step)
-            if left >= _WORTH_A_BLOCK:
-                return self._block(min(_BLOCK_STEPS, max(patience, _WORTH_A_BLOCK), left))
+        if step > 0 and self.precision.cheap:
+            left = int(min((self._last - float(self.stepper.time)) / step, 2.0**62))
+            spacing = self._spacing(step)
+            griddable = self.rhythm.whole_times and spacing * _GRID_ROWS >= self.rhythm.stride
+            if griddable and spacing <= _GRID_STRIDES * self.rhythm.stride:
+                if self.stepper.at_whole_time and left >= _WORTH_A_GRID:
+                    count, stride = min(patience, left), self.rhythm.stride
+                    return self._grid(count - count % stride if count > stride else count)
+                patience = min(patience, self.rhythm.left)  # to where grids can start
+            elif spacing <= _BLOCK_SPACING and min(left, self.rhythm.left) >= _WORTH_A_BLOCK:
+                most = max(1, int(ROWS_AT_ONCE * spacing), _WORTH_A_BLOCK)
+                return self._block(min(_BLOCK_STEPS, most, self.rhythm.left, left))
         if expected > _SPARSE:
-            count = _MARGIN * expected - 2
+            steps = _MARGIN * expected - 2
             if self._mean > 0 and gap / self._mean > _LONG_GAP:
-                count = max(count, _MEAN_MARGIN * gap / self._mean)
-            return self._wrapped(self._skip(max(1, int(min(count, patience, wrap_in))), upcoming))
-        return self._step_by_step(min(patience, wrap_in), upcoming)
+                steps = max(steps, _MEAN_MARGIN * gap / self._mean)
+            return self._skip(max(1, int(min(steps, patience))), upcoming)
+        return self._step_by_step(patience, upcoming)
 
-    def _dense(self, step: float) -> bool:
-        """Whether the next samples lie so close that blocks cost less than skipping to each."""
-        first = self.progress.next_sample + self._buffered
-        ahead = min(first + _LOOK_AHEAD, self.clock.count - 1)
+    def _spacing(self, step: float) -> float:
+        """Steps per sample, over the next samples."""
+        ahead = min(self.harvest.count + _LOOK_AHEAD, self.clock.count - 1)
         span = float(self.clock.at(ahead)) - float(self.stepper.time)
-        return span / step <= _BLOCK_SPACING * max(ahead - first, 1)
-
-    def _wrapped(self, fine: bool) -> bool:
-        if fine and self.winding.positions and self.stepper.steps % INTERVAL == 0:
-            self.winding.wrap(self.stepper.state)
-        return fine
+        return span / step / max(ahead - self.harvest.count, 1)
 
     def _note_steps(self) -> None:
         self.progress.smallest_step = min(self.progress.smallest_step, self.stepper.smallest)
@@ -178,111 +207,111 @@ class Advance:
 
     def _skip(self, count: int, upcoming: Any) -> bool:
         """Many steps towards a sample; if they went past it, back and again, nearer."""
-        mark, before = self.stepper.mark(), self.stepper.steps
-        begin = float(self.stepper.time)
-        fine = self.stepper.skip(count)
-        if not fine:
-            return self._find_last_good(mark, before)
+        place, begin = self.rhythm.place(), float(self.stepper.time)
+        if not self.rhythm.skip(count):
+            return self._find_last_good(place)
         if self.stepper.time > upcoming:
-            self.progress.redone_steps += self.stepper.steps - before
+            self.progress.redone_steps += self.stepper.steps - place.mark.steps
             self._longest = 1.5 * max(self._longest, self.stepper.largest)
             self._mean = 0.0
-            self.stepper.back_to(mark, before)
+            self.rhythm.back_to(place)
             return True
         self._note_steps()
         if count >= _LONG_GAP / 2:
             self._mean = (float(self.stepper.time) - begin) / count
         return True
 
+    def _grid(self, count: int) -> bool:
+        """Whole strides from a whole time on, and the samples within them."""
+        while count > 0 and not self.harvest.complete:
+            place = self.rhythm.place()
+            part = min(count, self.rhythm.left)
+            longest, times = self._longest, self.clock.internal(0, 0)
+            while True:  # until the samples asked for reach as far as the steps
+                horizon = float(self.stepper.time) + 2 * part * longest
+                times = self.harvest.until(self.precision.scalar(horizon))
+                fine, states = self.stepper.grid(times, part)
+                if not fine:
+                    return self._find_last_good(place)
+                following = self.harvest.count + len(times)
+                if following >= self.clock.count or self.clock.at(following) > self.stepper.time:
+                    break
+                longest *= 2
+                self.rhythm.back_to(place)
+            self._note_steps()
+            times = times[: len(states)]
+            self.harvest.take(times, states, place.turns)
+            if self.harvest.complete:
+                self._finish(place)
+                break
+            self.rhythm.correct()
+            if not self.stepper.at_whole_time:
+                break
+            count -= part
+        return True
+
     def _block(self, count: int) -> bool:
-        mark, before = self.stepper.mark(), self.stepper.steps
+        """Steps with continuous output, not past the next corrections."""
+        place = self.rhythm.place()
         fine, output = self.stepper.block(count)
         if not fine:
-            return self._find_last_good(mark, before)
+            return self._find_last_good(place)
         self._note_steps()
-        first = self.progress.next_sample + self._buffered
-        times = self._times_until(first, self.stepper.time)
+        times = self.harvest.until(self.stepper.time)
         if len(times):
-            self._keep(times, output(times))
-        if first + len(times) == self.clock.count:
-            # end at the first boundary past the last sample, so that the count of steps is no accident
-            needed = int(np.searchsorted(np.asarray(output.times), times[-1]))
-            self.stepper.back_to(mark, before)
-            self.stepper.skip(max(needed, 1))
+            self.harvest.take(times, output(times), place.turns)
+        if self.harvest.complete:
+            self._finish(place)
+        else:
+            self.rhythm.correct()
         return True
 
     def _step_by_step(self, count: int, upcoming: Any) -> bool:
         """Single steps up to the first that reaches a sample, and on while each reaches one."""
-        mark, before = self.stepper.mark(), self.stepper.steps
+        place = self.rhythm.place()
         for _ in range(count):
             if not self.stepper.step():
-                return self._find_last_good(mark, before)
+                return self._find_last_good(place)
             self._note_steps()
-            if upcoming <= self.stepper.time:
-                first = self.progress.next_sample + self._buffered
-                times = self._times_until(first, self.stepper.time)
-                self._keep(times, np.array([self.stepper.dense(t) for t in times]))
-                self._wrapped(True)
-                if first + len(times) >= self.clock.count:
+            reached = upcoming <= self.stepper.time
+            if reached:
+                self._take_step()
+                if self.harvest.complete:
+                    self._finish(place)
                     break
-                upcoming = self.clock.at(first + len(times))
+            self.rhythm.correct()
+            if reached:
+                upcoming = self.harvest.upcoming
+                place = self.rhythm.place()
                 if float(upcoming) - float(self.stepper.time) > _SPARSE * self.stepper.largest:
                     break
-                mark, before = self.stepper.mark(), self.stepper.steps
-            else:
-                self._wrapped(True)
         return True
 
-    def _find_last_good(self, mark: Mark, before: int) -> bool:
-        """After a failure somewhere in many steps: walk to the last state that is finite."""
-        self.stepper.back_to(mark, before)
+    def _finish(self, place: Place) -> None:
+        """From a boundary not past the last sample: end at the first boundary past it."""
+        last = self.clock.at(self.clock.count - 1)
+        self.rhythm.back_to(place)
         while True:
-            mark, before = self.stepper.mark(), self.stepper.steps
+            self._before_last = self.rhythm.place()
+            self.stepper.step()
+            if self.stepper.time >= last:
+                return
+            self.rhythm.correct()
+
+    def _take_step(self) -> None:
+        """The samples within the step just taken."""
+        times = self.harvest.until(self.stepper.time)
+        self.harvest.take(times, np.array([self.stepper.dense(t) for t in times]), self.rhythm.winding.turns)
+
+    def _find_last_good(self, place: Place) -> bool:
+        """After a failure somewhere in many steps: walk to the last state that is finite."""
+        self.rhythm.back_to(place)
+        while True:
+            place = self.rhythm.place()
             if not self.stepper.step():
-                self.stepper.back_to(mark, before)
-                self.progress.last_good = mark
+                self.rhythm.back_to(place)
+                self.progress.last_good = place
                 return False
-            first = self.progress.next_sample + self._buffered
-            if first < self.clock.count and self.clock.at(first) <= self.stepper.time:
-                times = self._times_until(first, self.stepper.time)
-                self._keep(times, np.array([self.stepper.dense(t) for t in times]))
-
-    def _times_until(self, first: int, limit: Any) -> np.ndarray:
-        """Times of the samples from ``first`` on that lie at or before ``limit``."""
-        pieces = []
-        position = first
-        while position < self.clock.count:
-            times = self.clock.internal(position, min(position + _ROWS_AT_ONCE, self.clock.count))
-            inside = int(np.count_nonzero(times <= limit))
-            pieces.append(times[:inside])
-            position += inside
-            if inside < len(times):
-                break
-        return np.concatenate(pieces) if pieces else self.precision.zeros((0,))
-
-    def _keep(self, times: np.ndarray, states: np.ndarray) -> None:
-        turns = np.tile(self.winding.turns, (len(times), 1))
-        self._buffer.append((times, states, turns))
-        self._buffered += len(times)
-
-    def _drop_after(self, time: Any) -> None:
-        """Forget buffered samples past a time (an event that ends the run)."""
-        kept = []
-        for times, states, turns in self._buffer:
-            inside = times <= time
-            if inside.any():
-                kept.append((times[inside], states[inside], turns[inside]))
-        self._buffer = kept
-        self._buffered = sum(len(times) for times, _, _ in kept)
-
-    def _flush(self) -> None:
-        """Hand the buffered samples over, in blocks of bounded size."""
-        self._flushed = time.perf_counter()
-        if not self._buffer:
-            return
-        times, states, turns = (np.concatenate(c) for c in zip(*self._buffer, strict=True))
-        self._buffer, self._buffered = [], 0
-        for first in range(0, len(times), _ROWS_AT_ONCE):
-            rows = slice(first, first + _ROWS_AT_ONCE)
-            self.sink(self.progress.next_sample, times[rows], states[rows], turns[rows])
-            self.progress.next_sample += len(times[rows])
+            if not self.harvest.complete and self.harvest.upcoming <= self.stepper.time:
+                self._take_step()
+            self.rhythm.correct()

@@ -62,7 +62,13 @@ class EventLog:
             self.stop = time
 
     def back_to(self, count: int) -> None:
-        """Forget all but the first ``count``."""
+        """Forget all but the first ``count``.
+
+        Raises:
+            ValueError: they are fewer.
+        """
+        if count > len(self.found):
+            raise ValueError(f"{len(self.found)} events are known, not {count}")
         del self.found[count:]
         self.stop = next((f.time for f in self.found if self.stops[f.index]), None)
 

@@ -63,7 +63,7 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
         system: built for ``precision``, which should be double: stability has no precision.
         start, end: of the run, internal units.
     """
-    followed = [i for i, name in enumerate(system.states) if name not in ("x", "y", "z", "vx", "vy", "vz")]
+    followed = [i for i, name in enumerate(system.states) if name not in ("x", "y", "z", "vx", "vy", "vz", "pace")]
     reference = Stepper(system, precision, None, precision.scalar(start))
     marks = [reference.mark()]
     while reference.steps < PILOT_STEPS and float(reference.time) < end and reference.skip(_CHUNK):
@@ -77,7 +77,7 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
         offset = np.zeros(len(system.states))
         offset[followed] = generator.standard_normal(len(followed))
         offset *= _OFFSET / np.linalg.norm(offset)
-        other.back_to(marks[launch], 0)
+        other.back_to(marks[launch])
         other.state[:] = marks[launch].state + offset
         grown: list[float] = []
         for look in range(launch + 1, min(launch + 1 + _WINDOW, len(marks))):

@@ -1,8 +1,9 @@
 """heyoka's integrator, stepping freely: natural steps only, dense output, nothing ever clamped.
 
-Three ways to go on, which give the same bits and differ in cost alone (engine measurements in
-experiments/README.md): ``skip`` takes many steps at once and keeps no dense output, ``block`` takes many and
-keeps it (about a millisecond per call), ``step`` takes one and keeps it.
+Four ways to go on, which give the same bits and differ in cost alone (engine measurements in
+experiments/README.md): ``skip`` takes many steps at once and keeps no dense output; ``grid`` takes many and
+gives the states at times known beforehand, from a whole time on; ``block`` takes many and keeps their dense
+output (about a millisecond per call); ``step`` takes one and keeps it.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ class Mark:
     time: tuple[Any, Any]
     state: np.ndarray
     events: int = 0
+    steps: int = 0
 
 
 class Stepper:
@@ -38,6 +40,7 @@ class Stepper:
     Attributes:
         steps: natural steps taken and kept.
         log: the events found along the way.
+        has_events: whether the engine looks for any.
         smallest, largest: step sizes of the latest call, internal units.
     """
 
@@ -51,8 +54,9 @@ class Stepper:
     ) -> None:
         self._precision = precision
         self.log = log or EventLog([], np.zeros(0, dtype=np.int64))
+        self.has_events = log is not None and bool(system.crossings)
         options = dict(precision.options)
-        if log is not None and system.crossings:
+        if log is not None and self.has_events:
             options["nt_events"] = engine_events(system, precision, log)
         if tolerance is not None:
             options["tol"] = tolerance
@@ -86,14 +90,36 @@ class Stepper:
 
     def mark(self) -> Mark:
         """Remember this boundary."""
-        return Mark(self._integrator.dtime, np.array(self._integrator.state), len(self.log.found))
+        return Mark(self._integrator.dtime, np.array(self._integrator.state), len(self.log.found), self.steps)
 
-    def back_to(self, mark: Mark, steps: int) -> None:
-        """Return to a boundary; ``steps`` is the count that it had."""
+    def back_to(self, mark: Mark) -> None:
+        """Return to a boundary."""
         self._integrator.dtime = mark.time
         self._integrator.state[:] = mark.state
         self.log.back_to(mark.events)
-        self.steps = steps
+        self.steps = mark.steps
+
+    @property
+    def at_whole_time(self) -> bool:
+        """Whether time is a single number, as ``grid`` needs it."""
+        return bool(self._integrator.dtime[1] == 0)
+
+    def to_whole_time(self) -> None:
+        """Go to the high part of time: a step of at most half its last bit, in either direction."""
+        self._integrator.propagate_until(self._integrator.time)
+
+    def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
+        """``count`` steps from a whole time: whether all went well, and the states (n, states) at those
+        ``times`` that they reached. The times ascend, and none lies before the current one.
+        """
+        ends = np.array([self._integrator.time, self._far], dtype=times.dtype)
+        first = int(len(times) > 0 and times[0] == ends[0])
+        outcome, smallest, largest, taken, _, states = self._integrator.propagate_grid(
+            np.concatenate([ends[:1], times[first:], ends[1:]]),
+            max_steps=count,
+            max_delta_t=self._longest,
+        )
+        return self._account(outcome, smallest, largest, taken), states[1 - first :]
 
     def step(self) -> bool:
         """One step with dense output; False when the state is no longer finite."""
@@ -110,7 +136,9 @@ class Stepper:
 
     def skip(self, count: int) -> bool:
         """At most ``count`` steps without dense output; False when the state is no longer finite."""
-        outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(self._far, max_steps=count)
+        outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
+            self._far, max_steps=count, max_delta_t=self._longest
+        )
         return self._account(outcome, smallest, largest, taken)
 
     def to(self, time: float) -> bool:

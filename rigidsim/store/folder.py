@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,6 +47,11 @@ class RunFolder:
         return self.path / "figure.png"
 
     @property
+    def checkpoint(self) -> Path:
+        """Where a finished run can be prolonged from."""
+        return self.path / "checkpoint.h5"
+
+    @property
     def segments(self) -> Path:
         """What an unfinished run has saved."""
         return self.path / "segments"
@@ -54,7 +63,8 @@ class RunFolder:
             RunFolderError: it holds a run and ``force`` is false, or something that is no run, or it can't
                 be written.
         """
-        ours = [self.config, self.dataset, self.timeline, self.figure, self.summary, self.segments]
+        ours = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
+        ours.append(self.segments)
         try:
             if self.path.exists() and not self.path.is_dir():
                 raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
@@ -64,6 +74,9 @@ class RunFolder:
                 raise RunFolderError(
                     f"{self.path}: holds {foreign[0]}, which no run writes; choose another --out or name"
                 )
+            for path in present:
+                if path.is_symlink():
+                    raise RunFolderError(f"{path}: is a symbolic link, which no run writes; remove it")
             held = [p for p in present if p in (self.dataset, self.summary, self.segments)]
             if held and not force:
                 what = "a finished run" if self.dataset.exists() else "an unfinished run"
@@ -78,6 +91,40 @@ class RunFolder:
             raise RunFolderError(
                 f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
             ) from None
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes out; the lock goes with the process, however it ends.
+
+        Raises:
+            RunFolderError: another process works there, or the folder can't be written.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(self.path, os.O_RDONLY)  # the folder itself: no file is left behind
+        except OSError as error:
+            raise RunFolderError(
+                f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
+            ) from None
+        try:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise RunFolderError(
+                    f"{self.path}: another process is at work there; wait for it, or choose another --out or "
+                    "name"
+                ) from None
+            yield
+        finally:
+            os.close(descriptor)
+
+    def remove_torn(self) -> None:
+        """Delete what a killed process was writing when it died."""
+        for folder in (self.path, self.segments):
+            for path in folder.glob(".*.partial"):
+                path.unlink(missing_ok=True)
 
     def write_summary(self, summary: dict[str, Any]) -> None:
         """Write ``summary.json`` atomically."""

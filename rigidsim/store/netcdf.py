@@ -17,6 +17,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
+from rigidsim.errors import RunFolderError
 from rigidsim.store.variables import LABELS, Extra, Variable
 
 CHUNK_ROWS = 8192
@@ -106,10 +107,64 @@ def fill(file: Any, variables: Sequence[Variable], block: Block, first: int, row
             file.variables[name][first : first + rows] = values.reshape(rows, *variable.shape)
 
 
-def image(variables: Sequence[Variable], block: Block, rows: int, attributes: Mapping[str, Any]) -> bytes:
-    """A whole uncompressed file built in memory."""
+def image(
+    variables: Sequence[Variable],
+    block: Block,
+    rows: int,
+    attributes: Mapping[str, Any],
+    groups: Mapping[str, Mapping[str, np.ndarray]],
+) -> bytes:
+    """A whole uncompressed file built in memory; ``groups`` hold plain arrays beside the variables."""
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
         declare(file, variables, rows, attributes, compressed=False)
-        fill(file, variables, block, 0, rows)
+        if rows:
+            fill(file, variables, block, 0, rows)
+        for name, arrays in groups.items():
+            _add_group(file.create_group(name), arrays)
     return buffer.getvalue()
+
+
+def _add_group(group: Any, arrays: Mapping[str, np.ndarray]) -> None:
+    for name, values in arrays.items():
+        if not values.size:  # an array that isn't there reads as empty
+            continue
+        dims = tuple(f"{name}_{axis}" for axis in range(values.ndim))
+        for dim, size in zip(dims, values.shape, strict=True):
+            group.dimensions[dim] = size
+        created = group.create_variable(name, dims, np.dtype("<i8" if values.dtype.kind == "i" else "<f8"))
+        created[...] = values
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[Any]:
+    """An HDF5 file open for reading.
+
+    Raises:
+        RunFolderError: it is none, or damaged.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except (OSError, KeyError, RuntimeError) as error:
+        raise RunFolderError(f"{path}: can't be read ({error})") from None
+
+
+def read_group(path: Path, name: str) -> dict[str, np.ndarray]:
+    """The plain arrays of a group; none where there is no such group.
+
+    Raises:
+        RunFolderError: it holds something else than numbers.
+    """
+    with reading(path) as file:
+        if not isinstance(file.get(name), h5py.Group):
+            return {}
+        arrays = {key: np.asarray(data[()]) for key, data in file[name].items() if _is_data(key, data)}
+    if any(values.dtype.kind not in "if" for values in arrays.values()):
+        raise RunFolderError(f"{path}: its {name} holds something else than numbers")
+    return arrays
+
+
+def _is_data(name: str, item: Any) -> bool:
+    dimension = name[-2:-1] == "_" and name[-1:].isdigit()  # netCDF's scales, see _add_group
+    return isinstance(item, h5py.Dataset) and not dimension

@@ -1,7 +1,8 @@
 """Immutable segments: how samples reach the disk while a run is under way.
 
-Each segment is a complete small dataset, written once and never touched again. A sample is saved when its
-segment has its final name; a crash can only cost what came after.
+Each segment is a complete small dataset with a checkpoint, sealed, written once and never touched again. A
+sample is saved when its segment has its final name; a crash can only cost what came after. Each names the run
+that it belongs to and the seal of the one before, so that none can be missing, foreign or old in silence.
 """
 
 from __future__ import annotations
@@ -10,74 +11,118 @@ import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import h5netcdf
+import h5py
 import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store import netcdf
+from rigidsim.store.seal import check_seal, seal, seal_of, sealed
 from rigidsim.store.variables import Extra, Variable
 
 SEGMENT_BYTES = 32_000_000
 SEGMENT_SECONDS = 30.0
 _CHUNKS_AT_ONCE = 16
+Arrays = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The segments of a run that belong together.
+
+    Attributes:
+        paths: in order.
+        rows: of all of them.
+        run: the run's identity; empty without segments.
+        seal: of the last one.
+        damage: what is wrong with the first that doesn't belong, or None.
+        spoiled: that one and all after it.
+    """
+
+    paths: list[Path] = field(default_factory=list)
+    rows: int = 0
+    run: str = ""
+    seal: str = ""
+    damage: str | None = None
+    spoiled: list[Path] = field(default_factory=list)
 
 
 class SegmentWriter:
-    """Collects blocks and writes a segment when they are many or old.
+    """Collects blocks and writes them as segments.
 
     Args:
         folder: ``segments/`` of a run folder; created.
         variables: of the dataset, time first.
-        attributes: root attributes that make a segment readable on its own.
+        attributes: root attributes that make a segment readable on its own; ``run_id`` among them.
+        chain: segments written before, to go on from.
     """
 
-    def __init__(self, folder: Path, variables: Sequence[Variable], attributes: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        variables: Sequence[Variable],
+        attributes: Mapping[str, Any],
+        chain: Chain | None = None,
+    ) -> None:
+        chain = chain or Chain()
         self._folder = folder
         self._variables = variables
         self._attributes = dict(attributes)
         self._blocks: list[netcdf.Block] = []
         self._rows = 0
-        self._oldest = 0.0
+        self._saved = time.monotonic()
         self._row_bytes = 8 * sum(v.parts * int(np.prod(v.shape)) for v in variables)
-        self.saved_rows = 0
-        self.count = 0
+        self._seal = chain.seal
+        self.saved_rows = chain.rows
+        self.count = len(chain.paths)
         folder.mkdir(parents=True, exist_ok=True)
 
     def add(self, block: netcdf.Block) -> None:
-        """Take a block of samples; writes a segment when due."""
+        """Take a block of samples."""
         rows = len(block["time"][0])
-        if not rows:
-            return
-        if not self._blocks:
-            self._oldest = time.monotonic()
-        self._blocks.append(block)
-        self._rows += rows
-        self.flush_if_due()
+        if rows:
+            self._blocks.append(block)
+            self._rows += rows
 
-    def flush_if_due(self) -> None:
-        """Write what is collected when it is large, or old enough that losing it would hurt."""
+    @property
+    def due(self) -> bool:
+        """Whether what is collected is large, or the last segment so old that losing the time would hurt."""
         large = self._rows * self._row_bytes >= SEGMENT_BYTES
-        if self._blocks and (large or time.monotonic() - self._oldest >= SEGMENT_SECONDS):
-            self.flush()
+        return large or time.monotonic() - self._saved >= SEGMENT_SECONDS
 
-    def flush(self) -> None:
-        """Write what is collected; on return it is saved.
+    def flush(self, checkpoint: Arrays, events: Arrays) -> None:
+        """Write what is collected, which may be nothing but the checkpoint; on return it is saved.
+
+        Args:
+            checkpoint: goes on after the last collected sample.
+            events: those since the last segment.
 
         Raises:
             RunFolderError: the disk is full or fails; what is collected stays in memory.
         """
-        if not self._blocks:
-            return
-        attributes = {**self._attributes, "segment": self.count, "first_sample": self.saved_rows}
-        content = netcdf.image(self._variables, self._collected(), self._rows, attributes)
+        content = self._image(self._collected(), self._rows, checkpoint, events, self._place())
+        path = self._folder / f"{self.count:08d}.h5"
         with self._writing():
-            netcdf.write_bytes(self._folder / f"{self.count:08d}.h5", content)
+            netcdf.write_bytes(path, content)
+        self._seal = seal_of(content)
         self.count += 1
         self.saved_rows += self._rows
         self._blocks, self._rows = [], 0
+        self._saved = time.monotonic()
+
+    def _place(self) -> dict[str, Any]:
+        return {"segment": self.count, "first_sample": self.saved_rows, "previous_seal": self._seal}
+
+    def _image(
+        self, block: netcdf.Block, rows: int, checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
+    ) -> bytes:
+        attributes = {**self._attributes, **place}
+        groups = {"checkpoint": checkpoint, "events": events}
+        return sealed(netcdf.image(self._variables, block, rows, attributes, groups))
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -86,10 +131,13 @@ class SegmentWriter:
         except OSError as error:
             raise RunFolderError(
                 f"{self._folder.parent}: can't be written: {error.strerror or error}; "
-                f"{self.saved_rows} samples are saved in {self._folder.name}/"
+                f"{self.saved_rows} samples are saved in {self._folder.name}/; "
+                "once there is room, rigidsim resume goes on from there"
             ) from error
 
     def _collected(self) -> netcdf.Block:
+        if not self._blocks:
+            return {}
         return {
             v.name: [
                 np.concatenate([block[v.name][part] for block in self._blocks]) for part in range(v.parts)
@@ -97,10 +145,20 @@ class SegmentWriter:
             for v in self._variables
         }
 
-    def complete(self, target: Path, attributes: Mapping[str, Any], extras: Sequence[Extra] = ()) -> int:
-        """Stream all segments, and what is still in memory, into one compressed dataset.
+    def complete(
+        self,
+        target: Path,
+        attributes: Mapping[str, Any],
+        extras: Sequence[Extra] = (),
+        *,
+        checkpoint: tuple[Path, Arrays, Arrays] | None = None,
+    ) -> int:
+        """Stream all segments, and what is still in memory, into one compressed, sealed dataset.
 
         The dataset appears atomically; then the segments go. Returns its rows.
+
+        Args:
+            checkpoint: where to leave a last checkpoint, and all events: a later end can go on from it.
 
         Raises:
             RunFolderError: a segment is missing, or the disk is full or fails; the segments stay.
@@ -118,6 +176,12 @@ class SegmentWriter:
                 if self._blocks:
                     netcdf.fill(file, self._variables, self._collected(), first, self._rows)
                 netcdf.add_extras(file, extras)
+            seal(temporary)
+        if checkpoint is not None:
+            path, last, events = checkpoint
+            place = {"segment": 1, "first_sample": rows, "previous_seal": check_seal(target)}
+            with self._writing():
+                netcdf.write_bytes(path, self._image({}, 0, last, events, place))
         remove(self._folder)
         return rows
 
@@ -133,6 +197,66 @@ def segment_paths(folder: Path) -> list[Path]:
         if path.stem != f"{number:08d}":
             raise RunFolderError(f"{folder}: segment {number:08d}.h5 is missing")
     return paths
+
+
+def read_chain(folder: Path) -> Chain:
+    """The segments that belong together, checked byte by byte, up to the first that doesn't."""
+    paths = sorted(folder.glob("[0-9]*.h5"))
+    run = last = ""
+    rows = 0
+    for number, path in enumerate(paths):
+        try:
+            found = check_seal(path)
+            labels = root_attributes(path)
+            run = run or str(labels.get("run_id", ""))
+            damage = _misfit(path, labels, number, rows, run, last)
+            if damage is None:
+                rows += labels["rows"]
+        except RunFolderError as error:
+            damage = str(error)
+        if damage is not None:
+            return Chain(paths[:number], rows, run, last, damage, paths[number:])
+        last = found
+    return Chain(paths, rows, run, last)
+
+
+def _misfit(path: Path, labels: Mapping[str, Any], number: int, rows: int, run: str, last: str) -> str | None:
+    """Why a whole segment doesn't follow those before it; None where it does."""
+    if path.stem != f"{number:08d}":
+        return f"{path.parent}: segment {number:08d}.h5 is missing"
+    if not run or str(labels.get("run_id", "")) != run:
+        return f"{path}: belongs to another run"
+    if number == 0 and "previous_seal" not in labels:  # a finished dataset that is being prolonged
+        return None
+    expected = {"segment": number, "first_sample": rows, "previous_seal": last}
+    if any(labels.get(key) != value for key, value in expected.items()):
+        return f"{path}: doesn't follow the segment before it; one of them was exchanged"
+    return None
+
+
+def root_attributes(path: Path) -> dict[str, Any]:
+    """Root attributes of a dataset or segment as Python values, and its ``rows``.
+
+    Raises:
+        RunFolderError: it is no dataset.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            found = {
+                str(key): value.item()
+                if isinstance(value, np.generic | np.ndarray) and value.size == 1
+                else value
+                for key, value in file.attrs.items()
+                if not key.startswith("_")
+            }
+            return {**found, "rows": int(file["time"].shape[0])}
+    except (OSError, KeyError, AttributeError, IndexError) as error:
+        raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
+
+
+def _plain(value: Any) -> Any:
+    """HDF5 keeps a number as an array of one."""
+    return value.item() if isinstance(value, np.generic | np.ndarray) and value.size == 1 else value
 
 
 def _copy(path: Path, file: Any, variables: Sequence[Variable], first: int) -> int:

@@ -16,7 +16,8 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates beside time, with their labels."""
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+"""1: without seals. 2: files end with the SHA-256 of their content; checkpoints."""
 
 
 @dataclass(frozen=True)

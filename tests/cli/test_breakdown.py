@@ -141,7 +141,7 @@ def test_a_failing_step_is_found_among_many(
     the run takes blocks or skips, it ends at the last step before, with every sample up to there.
     """
     broken = 80.0  # seconds
-    outcome = {name: getattr(Stepper, name) for name in ("step", "skip", "block")}
+    outcome = {name: getattr(Stepper, name) for name in ("step", "skip", "block", "grid")}
 
     def past(stepper: Stepper) -> bool:
         return float(stepper.time) > broken / unit
@@ -158,11 +158,15 @@ def test_a_failing_step_is_found_among_many(
         fine, output = outcome["block"](self, count)
         return fine and not past(self), output
 
+    def grid(self: Stepper, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
+        fine, states = outcome["grid"](self, times, count)
+        return fine and not past(self), states
+
     name = config(time=time)
     assert rigidsim_command("run", name, "--out", "whole").exit_code == 0
     with rigidsim.open_run("whole/free").dataset as whole:
         unit = 2.0 ** json.loads(whole.attrs["unit_exponents"])["time"]
-        for method in (step, skip, block):
+        for method in (step, skip, block, grid):
             monkeypatch.setattr(Stepper, method.__name__, method)
         result = rigidsim_command("run", name)
         assert result.exit_code == 3

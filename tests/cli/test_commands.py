@@ -42,7 +42,7 @@ def no_traceback(result: Any) -> None:
 def test_run_writes_a_folder_and_prints_a_table(config: Config, rigidsim_command: Command) -> None:
     result = rigidsim_command("run", config())
     assert result.exit_code == 0, result.output
-    assert files("runs/free") == ["config.toml", "dataset.h5", "summary.json"]
+    assert files("runs/free") == ["checkpoint.h5", "config.toml", "dataset.h5", "summary.json"]
     summary = read("runs/free")
     lines = result.stdout.splitlines()
     assert lines[0].split() == ["free", "finished"]
@@ -59,7 +59,13 @@ def test_run_writes_a_folder_and_prints_a_table(config: Config, rigidsim_command
 def test_run_draws_the_timeline_when_asked(config: Config, rigidsim_command: Command) -> None:
     result = rigidsim_command("run", config(), "--set", "output.timeline=true")
     assert result.exit_code == 0, result.output
-    assert files("runs/free") == ["config.toml", "dataset.h5", "summary.json", "timeline.rrd"]
+    assert files("runs/free") == [
+        "checkpoint.h5",
+        "config.toml",
+        "dataset.h5",
+        "summary.json",
+        "timeline.rrd",
+    ]
     assert "timeline" in read("runs/free")["cost"]["seconds"]
 
 

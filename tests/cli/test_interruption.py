@@ -112,7 +112,7 @@ def test_a_killed_run_opens_as_running(config: Config, start: Start) -> None:
 
 def test_a_killed_run_keeps_its_segments(config: Config, start: Start) -> None:
     prelude = (
-        "import rigidsim.solve.advance as a, rigidsim.store.segments as s\n"
+        "import rigidsim.solve.harvest as a, rigidsim.store.segments as s\n"
         "a._PATIENCE = s.SEGMENT_SECONDS = 0.1"
     )
     process = start(

@@ -724,7 +724,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "samples of thousands of digits": (  # Python itself refuses to print such an integer
         {"time": f"end = 10\nsamples = 0x{'f' * 5000}"},
         "[time] samples",
-        ["given 3.98", "e+6020; 2 to 1e12"],
+        ["given a whole number of 20000 bits", "at most 10000 bits are allowed"],
     ),
     "every zero": (
         {"time": "end = 10\nevery = 0"},

@@ -25,7 +25,9 @@ from hypothesis import strategies as st
 import rigidsim
 from rigidsim.prepare import Prepared, prepare
 from rigidsim.solve.advance import Advance
+from rigidsim.solve.harvest import Checkpoint
 from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.solve.rhythm import Rhythm
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.winding import Winding
 
@@ -305,15 +307,19 @@ def _states(prepared: Prepared) -> np.ndarray:
     pieces = []
     winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
-    advance = Advance(
-        stepper,
-        prepared.clock,
-        winding,
-        prepared.precision,
-        lambda first, times, states, turns: pieces.append(states),
-        lambda progress: None,
-    )
-    advance.run()
+
+    class Collected:
+        def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
+            pieces.append(states)
+
+        def due(self) -> bool:
+            return False
+
+        def save(self, checkpoint: Checkpoint) -> None:
+            raise AssertionError
+
+    rhythm = Rhythm(stepper, winding)
+    Advance(rhythm, prepared.clock, prepared.precision, Collected(), lambda progress: None).run()
     return np.concatenate(pieces)
 
 

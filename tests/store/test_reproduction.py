@@ -12,7 +12,7 @@ import xarray
 
 import rigidsim
 from rigidsim.prepare import prepare
-from rigidsim.solve import advance, evaluate
+from rigidsim.solve import advance, evaluate, harvest, rhythm
 
 RUNS = [
     ('"single"', "quaternion"),
@@ -62,11 +62,19 @@ def test_twice_the_same_config(
 
 
 DRIVES = {
-    "one step at a time": {"_CHUNK_SECONDS": 0.0, "_BLOCK_STEPS": 1, "_WORTH_A_BLOCK": 10**9},
-    "few rows": {"_ROWS_AT_ONCE": 7, "_BLOCK_STEPS": 13, "_WORTH_A_BLOCK": 1},
-    "blocks of three": {"_BLOCK_STEPS": 3, "_WORTH_A_BLOCK": 1, "_SPARSE": 1e9, "_ROWS_AT_ONCE": 3},
-    "skips wherever it can": {"_SPARSE": 1.0, "_MARGIN": 0.5, "_LOOK_AHEAD": 1},
-    "skips too far": {"_SPARSE": 2.0, "_MARGIN": 1.7, "_MEAN_MARGIN": 1.4, "_LONG_GAP": 10.0},
+    "one step at a time": {"_CHUNK_SECONDS": 0.0, "_GRID_ROWS": 0, "_WORTH_A_BLOCK": 10**9},
+    "grids of one step": {"_CHUNK_SECONDS": 0.0},
+    "few rows": {"ROWS_AT_ONCE": 7, "_BLOCK_STEPS": 13, "_WORTH_A_BLOCK": 1, "_GRID_ROWS": 0},
+    "blocks of three": {"_BLOCK_STEPS": 3, "_WORTH_A_BLOCK": 1, "_SPARSE": 1e9, "_GRID_ROWS": 0},
+    "skips wherever it can": {"_SPARSE": 1.0, "_MARGIN": 0.5, "_LOOK_AHEAD": 1, "_GRID_ROWS": 0},
+    "skips too far": {
+        "_SPARSE": 2.0,
+        "_MARGIN": 1.7,
+        "_MEAN_MARGIN": 1.4,
+        "_LONG_GAP": 10.0,
+        "_GRID_ROWS": 0,
+    },
+    "skips mixed with grids": {"_SPARSE": 1.0, "_GRID_STRIDES": 0.01},
     "impatient": {"_CHUNK_SECONDS": 1e-7, "_PATIENCE": 0.0},
 }
 
@@ -88,12 +96,12 @@ def test_the_bits_do_not_depend_on_how_it_is_driven(
 ) -> None:
     record = 'record = ["angular_velocity", "quaternion", "euler_angles", "energy"]'
     text = free_body(GRIDS[grid], formulation=formulation, output=record)
+    monkeypatch.setattr(rhythm, "STRIDE", 8)  # many of them in a short run
     plain = run(text, tmp_path / "plain")
     for number, constants in enumerate(DRIVES.values()):
         with monkeypatch.context() as patch:
             for name, value in constants.items():
-                assert hasattr(advance, name)
-                patch.setattr(advance, name, value)
+                patch.setattr(advance if hasattr(advance, name) else harvest, name, value)
             assert_same_bits(plain, run(text, tmp_path / str(number)))
 
 
@@ -103,7 +111,7 @@ def test_the_bits_of_wide_numbers_do_not_depend_on_it_either(
 ) -> None:
     text = free_body("end = 20\nsamples = 21", precision=precision, formulation="euler_angles")
     plain = run(text, tmp_path / "plain")
-    for name, value in {"_ROWS_AT_ONCE": 3, "_CHUNK_SECONDS": 1e-7, "_SPARSE": 4.0}.items():
+    for name, value in {"ROWS_AT_ONCE": 3, "_CHUNK_SECONDS": 1e-7, "_SPARSE": 4.0}.items():
         monkeypatch.setattr(advance, name, value)
     assert_same_bits(plain, run(text, tmp_path / "driven"))
 

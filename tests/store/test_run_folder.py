@@ -29,6 +29,7 @@ def partial(folder: Path, free_body: Callable[..., str]) -> rigidsim.Run:
 
 def test_what_a_finished_run_consists_of(finished: rigidsim.Run, free_body: Callable[..., str]) -> None:
     assert sorted(p.name for p in finished.folder.path.iterdir()) == [
+        "checkpoint.h5",
         "config.toml",
         "dataset.h5",
         "summary.json",

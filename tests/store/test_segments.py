@@ -14,9 +14,9 @@ import xarray
 
 import rigidsim
 from rigidsim.errors import RunFolderError
-from rigidsim.solve import advance
-from rigidsim.store import segments
-from rigidsim.store.segments import SegmentWriter, segment_paths
+from rigidsim.solve import advance, harvest
+from rigidsim.store import netcdf, segments
+from rigidsim.store.segments import SegmentWriter, read_chain, segment_paths
 from rigidsim.store.variables import Variable, time_variable
 
 VARIABLES = [
@@ -24,6 +24,9 @@ VARIABLES = [
     Variable("rates", ("body_axis",), {"units": "rad s-1", "long_name": "some rates"}, 2),
     Variable("energy_drift", (), {"units": "1", "long_name": "a drift"}),
 ]
+
+
+CHECKPOINT = {"counts": np.array([1, 2, 3]), "state_parts": np.array([[0.1, 0.2]])}
 
 
 def block(first: int, rows: int) -> dict[str, list[np.ndarray]]:
@@ -38,7 +41,7 @@ def block(first: int, rows: int) -> dict[str, list[np.ndarray]]:
 
 
 def writer(folder: Path) -> SegmentWriter:
-    return SegmentWriter(folder, VARIABLES, {"title": "t", "status": "running"})
+    return SegmentWriter(folder, VARIABLES, {"title": "t", "status": "running", "run_id": "r"})
 
 
 def names(folder: Path) -> list[str]:
@@ -49,7 +52,7 @@ def test_each_segment_is_a_dataset_of_its_own(tmp_path: Path) -> None:
     w = writer(tmp_path / "s")
     for first, rows in ((0, 5), (5, 1), (6, 7)):
         w.add(block(first, rows))
-        w.flush()
+        w.flush(CHECKPOINT, {})
     assert names(tmp_path / "s") == ["00000000.h5", "00000001.h5", "00000002.h5"]
     for number, (first, rows) in enumerate(((0, 5), (5, 1), (6, 7))):
         with xarray.open_dataset(tmp_path / "s" / f"{number:08d}.h5") as segment:
@@ -68,20 +71,29 @@ def test_each_segment_is_a_dataset_of_its_own(tmp_path: Path) -> None:
 def test_a_written_segment_is_never_touched_again(tmp_path: Path) -> None:
     w = writer(tmp_path / "s")
     w.add(block(0, 4))
-    w.flush()
+    w.flush(CHECKPOINT, {})
     first = tmp_path / "s" / "00000000.h5"
     before = (first.read_bytes(), first.stat().st_mtime_ns, first.stat().st_ino)
     w.add(block(4, 4))
-    w.flush()
+    w.flush(CHECKPOINT, {})
     assert (first.read_bytes(), first.stat().st_mtime_ns, first.stat().st_ino) == before
 
 
-def test_nothing_to_write_writes_nothing(tmp_path: Path) -> None:
+def test_a_segment_without_samples_still_has_a_checkpoint(tmp_path: Path) -> None:
+    """A slow run between two samples has something to lose, too."""
     w = writer(tmp_path / "s")
-    w.flush()
     w.add(block(0, 0))
-    w.flush()
-    assert names(tmp_path / "s") == []
+    w.flush(CHECKPOINT, {})
+    w.add(block(0, 3))
+    w.flush(CHECKPOINT, {})
+    chain = read_chain(tmp_path / "s")
+    assert (len(chain.paths), chain.rows, chain.damage) == (2, 3, None)
+    saved = netcdf.read_group(chain.paths[0], "checkpoint")
+    assert {name: values.tolist() for name, values in saved.items()} == {
+        "counts": [1, 2, 3],
+        "state_parts": [[0.1, 0.2]],
+    }
+    assert w.complete(tmp_path / "d.h5", {}) == 3
 
 
 def test_a_segment_is_due_by_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,10 +101,12 @@ def test_a_segment_is_due_by_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(segments, "SEGMENT_BYTES", 10 * row)
     w = writer(tmp_path / "s")
     w.add(block(0, 9))
-    assert names(tmp_path / "s") == []
+    assert not w.due
     w.add(block(9, 1))
-    assert names(tmp_path / "s") == ["00000000.h5"]
+    assert w.due
+    w.flush(CHECKPOINT, {})
     assert w.saved_rows == 10
+    assert not w.due
 
 
 def test_a_segment_is_due_by_age(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,11 +115,11 @@ def test_a_segment_is_due_by_age(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     w = writer(tmp_path / "s")
     w.add(block(0, 1))
     now[0] += segments.SEGMENT_SECONDS - 0.1
-    w.flush_if_due()
-    assert names(tmp_path / "s") == []
+    assert not w.due
     now[0] += 0.2
-    w.flush_if_due()
-    assert names(tmp_path / "s") == ["00000000.h5"]
+    assert w.due
+    w.flush(CHECKPOINT, {})
+    assert not w.due
 
 
 def full_disk(*_: Any, **__: Any) -> None:
@@ -121,16 +135,16 @@ def test_a_full_disk_leaves_no_half_segment_and_loses_nothing(
 ) -> None:
     w = writer(tmp_path / "s")
     w.add(block(0, 4))
-    w.flush()
+    w.flush(CHECKPOINT, {})
     w.add(block(4, 3))
     with monkeypatch.context() as patch:
         patch.setattr(*FAILURES[failure], full_disk)
         with pytest.raises(RunFolderError, match=r"No space left on device") as caught:
-            w.flush()
+            w.flush(CHECKPOINT, {})
     assert "4 samples are saved" in str(caught.value)
     assert names(tmp_path / "s") == ["00000000.h5"]
     assert w.saved_rows == 4
-    w.flush()  # there is room again
+    w.flush(CHECKPOINT, {})  # there is room again
     assert names(tmp_path / "s") == ["00000000.h5", "00000001.h5"]
     with xarray.open_dataset(tmp_path / "s" / "00000001.h5") as segment:
         np.testing.assert_array_equal(segment.rates, block(4, 3)["rates"][0])
@@ -142,7 +156,7 @@ def test_a_full_disk_at_the_end_keeps_the_segments(
 ) -> None:
     w = writer(tmp_path / "s")
     w.add(block(0, 4))
-    w.flush()
+    w.flush(CHECKPOINT, {})
     w.add(block(4, 3))
     with monkeypatch.context() as patch:
         patch.setattr(*FAILURES[failure], full_disk)
@@ -167,7 +181,8 @@ def test_a_full_disk_ends_a_run_with_a_message(
         replace(source, target)
 
     monkeypatch.setattr(segments, "SEGMENT_BYTES", 1)
-    monkeypatch.setattr(advance, "_ROWS_AT_ONCE", 16)
+    monkeypatch.setattr(advance, "_CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr(harvest, "_PATIENCE", 0.0)
     monkeypatch.setattr(os, "replace", full_after_one_segment)
     with pytest.raises(RunFolderError, match=r"No space left on device"):
         rigidsim.run(rigidsim.parse(free_body()), out=tmp_path)
@@ -175,7 +190,7 @@ def test_a_full_disk_ends_a_run_with_a_message(
     partial = rigidsim.open_run(tmp_path / "free")
     assert partial.status == "running"
     with partial.dataset as dataset:
-        assert dataset.sizes["time"] == 16
+        assert 0 < dataset.sizes["time"] < 49
 
 
 @pytest.mark.parametrize("cuts", [[1] * 7 + [3, 12000, 5, 9000], [8192, 8192, 4631], [21015]])
@@ -185,7 +200,7 @@ def test_any_cuts_give_the_same_dataset(cuts: list[int], tmp_path: Path) -> None
     first = 0
     for rows in cuts:
         w.add(block(first, rows))
-        w.flush()
+        w.flush(CHECKPOINT, {})
         first += rows
     w.add(block(first, 11))
     assert w.complete(tmp_path / "d.h5", {"status": "finished"}) == first + 11
@@ -202,24 +217,26 @@ def test_any_cuts_give_the_same_dataset(cuts: list[int], tmp_path: Path) -> None
 def test_a_run_in_many_segments_is_the_run_in_one(
     precision: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
 ) -> None:
-    text = free_body("end = 3\nsamples = 97", precision=precision)
+    text = free_body("end = 12\nsamples = 97", precision=precision)
     counts: list[int] = []
     original = SegmentWriter.complete
 
-    def counted(self: SegmentWriter, *args: Any) -> int:
+    def counted(self: SegmentWriter, *args: Any, **options: Any) -> int:
         counts.append(len(segment_paths(self._folder)))
-        return original(self, *args)
+        return original(self, *args, **options)
 
     monkeypatch.setattr(SegmentWriter, "complete", counted)
     one = rigidsim.run(rigidsim.parse(text), out=tmp_path / "one")
     monkeypatch.setattr(segments, "SEGMENT_BYTES", 1)
-    monkeypatch.setattr(advance, "_ROWS_AT_ONCE", 13)
+    monkeypatch.setattr(harvest, "ROWS_AT_ONCE", 5)
+    monkeypatch.setattr(advance, "_CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr(harvest, "_PATIENCE", 0.0)
     many = rigidsim.run(rigidsim.parse(text), out=tmp_path / "many")
     assert counts[0] == 0
     assert counts[1] >= 7
     for run in (one, many):
         assert not run.folder.segments.exists()
-        assert names(run.folder.path) == ["config.toml", "dataset.h5", "summary.json"]
+        assert names(run.folder.path) == ["checkpoint.h5", "config.toml", "dataset.h5", "summary.json"]
     with one.dataset as a, many.dataset as b:
         assert list(a.variables) == list(b.variables)
         for name in a.variables:
@@ -232,7 +249,7 @@ def test_a_missing_segment_is_named(missing: int, tmp_path: Path) -> None:
     w = writer(folder)
     for first in range(3):
         w.add(block(first, 1))
-        w.flush()
+        w.flush(CHECKPOINT, {})
     assert [p.name for p in segment_paths(folder)] == names(folder)
     (folder / f"{missing:08d}.h5").unlink()
     with pytest.raises(RunFolderError, match=rf"segment {missing:08d}\.h5 is missing"):
@@ -249,7 +266,7 @@ def test_a_missing_last_segment_is_no_gap_of_zeros(tmp_path: Path) -> None:
     w = writer(tmp_path / "s")
     for first in range(3):
         w.add(block(first, 1))
-        w.flush()
+        w.flush(CHECKPOINT, {})
     (tmp_path / "s" / "00000002.h5").unlink()
     with pytest.raises(RunFolderError, match=r"segment 00000002\.h5 is missing"):
         w.complete(tmp_path / "d.h5", {})
@@ -260,7 +277,7 @@ def test_a_partial_run_reads_as_one_dataset(tmp_path: Path) -> None:
     w = writer(tmp_path / "r" / "segments")
     for first in range(0, 12, 4):
         w.add(block(first, 4))
-        w.flush()
+        w.flush(CHECKPOINT, {})
     run = rigidsim.open_run(tmp_path / "r")
     assert run.status == "running"
     with run.dataset as dataset:

@@ -1,0 +1,206 @@
+"""Going on with a run that was interrupted, killed or stopped, or past its end: with the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidsim import labels
+from rigidsim.archive import Run, open_run
+from rigidsim.errors import RunFolderError
+from rigidsim.guards import Observer
+from rigidsim.prepare import Prepared, prepare
+from rigidsim.runner import Session
+from rigidsim.scene.reading import Experiment, parse_saved
+from rigidsim.solve.stepper import Stepper
+from rigidsim.store import netcdf, provenance
+from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.seal import check_seal
+from rigidsim.store.segments import Chain, read_chain, root_attributes
+
+if TYPE_CHECKING:
+    from rigidsim.model.loads import LoadModel
+
+
+def resume(
+    path: str | Path,
+    *,
+    until: str | None = None,
+    overrides: Sequence[str] = (),
+    observer: Observer | None = None,
+    loads: Sequence[LoadModel] = (),
+) -> Run:
+    """Go on with a run from its last checkpoint.
+
+    Args:
+        path: run folder.
+        until: a later end, as in ``[time] end``; a finished run goes on, too.
+        overrides: ``limits.KEY=VALUE``: guards of this session in place of the config's.
+        observer: is told how it goes.
+        loads: those that the run was begun with.
+
+    Returns:
+        The run. Its dataset is bit for bit that of a run in one go, on the same versions and CPU features;
+        on others the summary says so.
+
+    Raises:
+        RunFolderError: no run, a finished one, one in use, or one whose config or segments were changed.
+        ConfigError: a bad ``until`` or override.
+    """
+    folder = find_run(path)
+    for entry in [folder.path / "segments", *folder.path.iterdir()]:
+        if entry.is_symlink():
+            raise RunFolderError(f"{entry}: is a symbolic link, which no run writes; remove it")
+    session = Session(observer or Observer())
+    with folder.locked():
+        folder.remove_torn()
+        experiment = _config(folder, overrides)
+        if until is not None:
+            experiment = _prolonged(experiment, until)
+        if folder.dataset.exists():
+            if until is None:
+                done = open_run(folder.path)
+                raise RunFolderError(
+                    f"{folder.path}: nothing is left to do: {done.summary.get('message', done.status)}; "
+                    "--until goes on to a later end"
+                )
+            _reopen(folder)
+        chain = read_chain(folder.segments)
+        if chain.damage is not None:
+            session.remarks.append(_set_aside(chain))
+        if not chain.paths:
+            session.remarks.append("nothing had been saved, so the run began anew")
+            return session.execute(prepare(experiment, loads=loads), folder)
+        prepared = prepare(experiment, loads=loads)
+        session.mixed = _compared(prepared, chain)
+        run = session.execute(prepared, folder, chain)
+        if until is not None:
+            netcdf.write_bytes(folder.config, experiment.text.encode())
+        return run
+
+
+def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
+    foreign = [o for o in overrides if not o.strip().startswith("limits.")]
+    if foreign:
+        raise RunFolderError(
+            f"--set {foreign[0]}: would change the experiment; only limits.KEY=VALUE is allowed here"
+        )
+    try:
+        text = folder.config.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RunFolderError(f"{folder.config}: can't be read ({error})") from None
+    experiment = parse_saved(text, source=str(folder.config))
+    if overrides:
+        guarded = parse_saved(text, source=str(folder.config), overrides=overrides)
+        limits = guarded.config.limits
+        experiment = replace(experiment, config=experiment.config.model_copy(update={"limits": limits}))
+    return experiment
+
+
+def _prolonged(experiment: Experiment, until: str) -> Experiment:
+    """The same experiment to a later end, with samples as far apart as before."""
+    from rigidsim.scene.scene import build_scene
+
+    before = build_scene(experiment).samples
+    if before.times is not None:
+        raise RunFolderError("--until: this run has a list of sample times, which no later end prolongs")
+    text = experiment.text
+    later = parse_saved(text, source=experiment.source, overrides=[f"time.end={until}"])
+    if later.config.time.every is None:
+        end = build_scene(later).samples.last
+        ratio = (end - before.start) * before.intervals / before.span
+        count = int(ratio + 0.5)
+        if abs(ratio - count) > ratio * 2.0**-100:
+            raise RunFolderError(
+                f"--until {until}: lies between two samples of the grid; give a whole number of intervals "
+                "of (end - start) / (samples - 1)"
+            )
+        overrides = [f"time.end={until}", f"time.samples={count + 1}"]
+        later = parse_saved(text, source=experiment.source, overrides=overrides)
+    after = build_scene(later).samples
+    if after.count <= before.count:
+        raise RunFolderError(f"--until {until}: no later than the run's end, or before its next sample")
+    return later
+
+
+def _reopen(folder: RunFolder) -> None:
+    """Make the dataset of a finished run its first segment, and its checkpoint the second."""
+    found = root_attributes(folder.dataset)
+    if found.get("status") != "finished" or not folder.checkpoint.exists():
+        raise RunFolderError(
+            f"{folder.path}: can't be prolonged: {found.get('status_message', 'it has no checkpoint')}"
+        )
+    check_seal(folder.dataset)
+    check_seal(folder.checkpoint)
+    folder.segments.mkdir(exist_ok=True)
+    netcdf.write_bytes(folder.segments / "00000001.h5", folder.checkpoint.read_bytes())
+    folder.dataset.replace(folder.segments / "00000000.h5")
+    for path in (folder.timeline, folder.summary, folder.checkpoint):
+        path.unlink(missing_ok=True)
+
+
+def _set_aside(chain: Chain) -> str:
+    """Rename what doesn't belong, so that it is neither read nor lost."""
+    for path in chain.spoiled:
+        path.replace(path.with_name(path.name + ".damaged"))
+    return (
+        f"{chain.damage}; the run went on from the {len(chain.paths)} segments before it "
+        f"({chain.rows} samples); {len(chain.spoiled)} files were set aside as *.damaged"
+    )
+
+
+_SAME_SYSTEM = (
+    "formulation", "euler_sequence", "states", "precision_bits", "tolerance", "taylor_order",
+    "compact_mode", "unit_exponents", "method", "hold_invariants",
+)  # fmt: skip
+"""Attributes that must agree for a checkpoint to be gone on from."""
+
+
+def _compared(prepared: Prepared, chain: Chain) -> str:
+    """What differs from the run's beginning in versions or machine; empty where nothing does.
+
+    Raises:
+        RunFolderError: it is another experiment.
+    """
+    saved = root_attributes(chain.paths[-1])
+    text = prepared.experiment.text
+    if saved.get("config") != text and not text.startswith(str(saved.get("config")).rstrip("\n")):
+        raise RunFolderError(
+            f"{prepared.experiment.source}: was changed since the run began; put it back (the segments hold "
+            "it as their attribute config), or begin a new run"
+        )
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
+    now = labels.root_attributes(prepared, stepper, chain.run)
+    for key in _SAME_SYSTEM:
+        if key in saved and saved[key] != now.get(key):
+            raise RunFolderError(
+                f"{chain.paths[-1]}: can't be gone on from: its {key} is {saved[key]}, now {now.get(key)}"
+            )
+    if saved.get("python_loads", "") != now["python_loads"]:
+        raise RunFolderError(
+            f"{chain.paths[-1]}: the run was begun with loads from Python ({saved['python_loads']}); resume "
+            "it from Python with the same"
+        )
+    _same_times(prepared, chain)
+    keys = [key for key in now if key.startswith(provenance.BITS)]
+    differing = [f"{key} {saved.get(key)} -> {now[key]}" for key in keys if saved.get(key) != now[key]]
+    return "; ".join([x for x in [str(saved.get("mixed_provenance", "")), *differing] if x])
+
+
+def _same_times(prepared: Prepared, chain: Chain) -> None:
+    """A grid to a later end must begin with the very times that are saved."""
+    first = 0
+    for path in chain.paths:
+        with netcdf.reading(path) as file:
+            times = np.asarray(file["time"][()])
+        grid = prepared.precision.parts(prepared.clock.internal(first, first + len(times)))[0]
+        if not np.array_equal(np.ldexp(grid, prepared.clock.exponent), times):
+            raise RunFolderError(
+                "--until: the longer grid's first sample times differ from those saved by a rounding; "
+                "choose an end that is a multiple of the old one, or begin with [time] every"
+            )
+        first += len(times)

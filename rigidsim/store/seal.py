@@ -1,0 +1,74 @@
+"""Seals: the last bytes of a file hold the SHA-256 of all others, so that damage is known before it is read.
+
+HDF5 readers ignore what follows the end of their data. A file without a seal was torn, or written by
+something else, or by a version that didn't seal yet.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from rigidsim.errors import RunFolderError
+
+_MARK = b"\nrigidsim sha256 "
+_LENGTH = len(_MARK) + 64 + 1
+
+
+def sealed(content: bytes) -> bytes:
+    """The content with its seal."""
+    return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+
+
+def seal_of(content: bytes) -> str:
+    """The digest in the seal of sealed content."""
+    return content[-65:-1].decode()
+
+
+def seal(path: Path) -> None:
+    """Append the seal of a file."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    with path.open("ab") as file:
+        file.write(_MARK + digest.encode() + b"\n")
+
+
+def read_seal(path: Path) -> str | None:
+    """The digest that a file claims for its content; None without a seal.
+
+    Raises:
+        OSError: it can't be read.
+    """
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(max(0, size - _LENGTH))
+        tail = file.read()
+    if len(tail) != _LENGTH or not tail.startswith(_MARK) or not tail.endswith(b"\n"):
+        return None
+    return tail[len(_MARK) : -1].decode("ascii", "replace")
+
+
+def check_seal(path: Path) -> str:
+    """The digest of a sealed file, which agrees with its content.
+
+    Raises:
+        RunFolderError: no seal (torn or foreign), or another content than was sealed (damaged, edited).
+    """
+    try:
+        claimed = read_seal(path)
+        if claimed is None:
+            raise RunFolderError(f"{path}: is torn or foreign: its end holds no seal of rigidsim")
+        found = hashlib.sha256()
+        left = path.stat().st_size - _LENGTH
+        with path.open("rb") as file:
+            while left > 0:
+                piece = file.read(min(left, 1 << 20))
+                if not piece:
+                    break
+                found.update(piece)
+                left -= len(piece)
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
+    if found.hexdigest() != claimed:
+        raise RunFolderError(f"{path}: is damaged or was edited: its content isn't what its seal says")
+    return claimed

@@ -1,0 +1,228 @@
+"""Is a run what its config gives, bit for bit? Integrated again and compared, number by number."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rigidsim.archive import Run, open_run
+from rigidsim.errors import RunFolderError
+from rigidsim.guards import Observer
+from rigidsim.runner import run
+from rigidsim.scene.reading import Experiment, parse_saved
+from rigidsim.store import netcdf, provenance
+from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.seal import check_seal, read_seal
+from rigidsim.store.segments import root_attributes
+
+_ROWS_AT_ONCE = 65536
+_SETTINGS = (
+    "formulation", "states", "precision", "tolerance", "taylor_order", "compact_mode", "high_accuracy",
+    "batch_size", "unit_exponents", "status", "steps",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The first place where two datasets differ.
+
+    Attributes:
+        sample: along the variable's first dimension.
+        saved, again: the values there; size: their distance.
+    """
+
+    variable: str
+    sample: int
+    saved: float
+    again: float
+
+    @property
+    def size(self) -> float:
+        """Absolute difference."""
+        return abs(self.saved - self.again)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a verification found.
+
+    Attributes:
+        identical: every number of every variable agrees in every bit, and the file is whole.
+        problems: what is wrong with the files themselves, in words.
+        difference: the first one, or None.
+        differing: names of all variables that differ.
+        environment: versions and machine features that changed since, which can explain it.
+        samples: compared.
+    """
+
+    path: str
+    identical: bool
+    problems: list[str] = field(default_factory=list)
+    difference: Difference | None = None
+    differing: list[str] = field(default_factory=list)
+    environment: list[str] = field(default_factory=list)
+    samples: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        found = None
+        if self.difference is not None:
+            d = self.difference
+            found = {"variable": d.variable, "sample": d.sample, "saved": d.saved, "again": d.again,
+                     "size": d.size}  # fmt: skip
+        return {
+            "path": self.path,
+            "identical": self.identical,
+            "problems": self.problems,
+            "first_difference": found,
+            "differing_variables": self.differing,
+            "environment": self.environment,
+            "samples": self.samples,
+        }
+
+
+def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
+    """Integrate a run's embedded config again and compare everything recorded.
+
+    Args:
+        path: run folder with a dataset, or a dataset alone.
+        observer: is told how the integration goes.
+
+    Raises:
+        RunFolderError: no dataset there, or one that no config can reproduce.
+        ConfigError: the embedded config isn't one.
+    """
+    dataset, folder = _dataset(Path(path))
+    problems = _file_problems(dataset, folder)
+    with netcdf.reading(dataset) as file:
+        if "config" not in file.attrs:
+            raise RunFolderError(f"{dataset}: embeds no config; it is no dataset of rigidsim")
+    saved = root_attributes(dataset)
+    if saved.get("python_loads"):
+        raise RunFolderError(
+            f"{dataset}: the run had loads from Python ({saved['python_loads']}), which its config lacks"
+        )
+    experiment = embedded(dataset)
+    with tempfile.TemporaryDirectory(prefix="rigidsim-verify-") as scratch:
+        quiet = experiment.config.output.model_copy(update={"timeline": False})
+        unguarded = type(experiment.config.limits)()
+        config = experiment.config.model_copy(update={"output": quiet, "limits": unguarded})
+        again = run(Experiment(experiment.text, config, experiment.source), out=scratch, observer=observer)
+        if not again.folder.dataset.exists():
+            raise RunFolderError(f"{dataset}: the run again {again.summary['message']}; nothing was compared")
+        differing, first, samples = _compare(dataset, again.folder.dataset)
+        now = root_attributes(again.folder.dataset)
+    for key in _SETTINGS:
+        if key in saved and saved[key] != now.get(key):
+            problems.append(f"{key} is {saved[key]} in the dataset, {now.get(key)} when run again")
+    changed = [
+        f"{key} {saved.get(key)} -> {now[key]}"
+        for key in now
+        if key.startswith(provenance.BITS) and saved.get(key) != now[key]
+    ]
+    if saved.get("mixed_provenance"):
+        changed.append(f"the run itself was put together on different machines: {saved['mixed_provenance']}")
+    return Verdict(str(dataset), not problems and not differing, problems, first, differing, changed, samples)
+
+
+def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
+    """The experiment that a dataset was made by; ``overrides`` as in ``rigidsim.load``.
+
+    Raises:
+        RunFolderError: it is no dataset of rigidsim.
+        ConfigError: the config in it isn't one.
+    """
+    text = root_attributes(dataset).get("config")
+    if not isinstance(text, str):
+        raise RunFolderError(f"{dataset}: embeds no config; it is no dataset of rigidsim")
+    return parse_saved(text, source=f"{dataset} (embedded config)", overrides=overrides)
+
+
+def _dataset(path: Path) -> tuple[Path, RunFolder | None]:
+    if path.is_file() and path.name != "dataset.h5":
+        return path, None
+    folder = find_run(path)
+    if not folder.dataset.exists():
+        raise RunFolderError(f"{path}: holds no finished dataset; rigidsim resume completes it")
+    alone = path.is_file() and not folder.config.exists()
+    return folder.dataset, None if alone else folder
+
+
+def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
+    """What the files themselves tell, before anything is integrated."""
+    problems = []
+    try:
+        if read_seal(dataset) is not None or root_attributes(dataset).get("schema_version", 1) > 1:
+            check_seal(dataset)
+    except RunFolderError as error:
+        problems.append(str(error))
+    if folder is None:
+        return problems
+    opened: Run = open_run(folder.path)
+    claimed = opened.summary.get("dataset_sha256")
+    if claimed is not None and claimed != provenance.file_sha256(dataset):
+        problems.append(f"{folder.summary}: was written for another dataset than this one")
+    try:
+        text = folder.config.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        return [*problems, f"{folder.config}: can't be read ({error})"]
+    if text != root_attributes(dataset).get("config"):
+        line = _first_difference_in_text(text, str(root_attributes(dataset).get("config")))
+        problems.append(f"{folder.config}: isn't the config that the dataset was made by ({line})")
+    return problems
+
+
+def _first_difference_in_text(one: str, other: str) -> str:
+    first, second = one.splitlines(), other.splitlines()
+    for number, (a, b) in enumerate(zip(first, second, strict=False), start=1):
+        if a != b:
+            return f'line {number} is "{a.strip()[:60]}", it was "{b.strip()[:60]}"'
+    return f"{len(first)} lines, it had {len(second)}"
+
+
+def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, int]:
+    """Names of the variables that differ, the earliest difference, and the number of samples."""
+    differing: list[str] = []
+    earliest: Difference | None = None
+    with netcdf.reading(saved) as one, netcdf.reading(again) as other:
+        names = sorted({*_numbers(one), *_numbers(other)})
+        samples = int(one["time"].shape[0])
+        for name in names:
+            if name not in one or name not in other or one[name].shape != other[name].shape:
+                differing.append(name)
+                continue
+            found = _first_difference(name, one[name], other[name])
+            if found is not None:
+                differing.append(name)
+                if earliest is None or found.sample < earliest.sample:
+                    earliest = found
+    return differing, earliest, samples
+
+
+def _numbers(file: h5py.File) -> Iterator[str]:
+    for name, item in file.items():
+        if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not _bare(item):
+            yield name
+
+
+def _bare(item: h5py.Dataset) -> bool:
+    """A dimension without values, as netCDF-4 stores it."""
+    return b"This is a netCDF dimension but not a netCDF variable" in bytes(item.attrs.get("NAME", b""))
+
+
+def _first_difference(name: str, one: h5py.Dataset, other: h5py.Dataset) -> Difference | None:
+    for first in range(0, one.shape[0] if one.ndim else 1, _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE) if one.ndim else ()
+        a, b = np.asarray(one[rows], dtype="<f8"), np.asarray(other[rows], dtype="<f8")
+        unequal = (a.view(np.int64) != b.view(np.int64)).reshape(max(len(a), 1) if a.ndim else 1, -1)
+        if unequal.any():
+            row, column = (int(i) for i in np.argwhere(unequal)[0])
+            x, y = a.reshape(len(unequal), -1)[row, column], b.reshape(len(unequal), -1)[row, column]
+            return Difference(name, first + row, float(x), float(y))
+    return None
