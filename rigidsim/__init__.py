@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from rigidsim.archive import Run, open_run
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
     from rigidsim.planner import plan
+    from rigidsim.resuming import resume
     from rigidsim.runner import run
     from rigidsim.scene.reading import Experiment, load, parse
+    from rigidsim.verification import verify
 
 __version__ = "0.1.0"
 
@@ -28,6 +30,8 @@ _PLACES = {
     "Run": "rigidsim.archive",
     "open_run": "rigidsim.archive",
     "run": "rigidsim.runner",
+    "resume": "rigidsim.resuming",
+    "verify": "rigidsim.verification",
     "plan": "rigidsim.planner",
 }
 
@@ -41,7 +45,9 @@ __all__ = [
     "open_run",
     "parse",
     "plan",
+    "resume",
     "run",
+    "verify",
 ]
 
 

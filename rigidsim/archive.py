@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rigidsim.errors import RunFolderError
 from rigidsim.store import segments
 from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.joined import join_segments
+from rigidsim.store.opening import open_dataset
 from rigidsim.store.seal import check_seal, read_seal
 from rigidsim.store.variables import SCHEMA_VERSION
 
@@ -45,22 +47,22 @@ class Run:
         Raises:
             RunFolderError: nothing was saved, or a file is damaged.
         """
-        import xarray
+        return self.opened()
 
+    def opened(self, *, indexed: bool = True) -> xarray.Dataset:
+        """As ``dataset``; not ``indexed``, no sample times are held in memory, and none can be selected by.
+
+        Raises:
+            RunFolderError: nothing was saved, or a file is damaged.
+        """
         if self.folder.dataset.exists():
-            return _opened(_whole(self.folder.dataset))
+            return open_dataset(_whole(self.folder.dataset), indexed=indexed)
         chain = segments.read_chain(self.folder.segments)
         if chain.damage is not None:
             raise RunFolderError(f"{chain.damage}; rigidsim resume sets it aside and goes on before it")
         if not chain.paths:
             raise RunFolderError(f"{self.folder.path}: nothing was saved")
-        opened = [_opened(path) for path in chain.paths]
-        pieces = [piece for piece in opened if piece.sizes["time"]] or opened[:1]
-        joined = xarray.concat(
-            pieces, dim="time", data_vars="minimal", coords="minimal", compat="override", join="override"
-        )
-        joined.attrs = dict(pieces[0].attrs, status=self.status)
-        return joined
+        return join_segments(chain.paths, status=self.status, indexed=indexed)
 
 
 def _whole(path: Path) -> Path:
@@ -80,15 +82,6 @@ def _whole(path: Path) -> Path:
     if version > 1 and read_seal(path) is None:
         raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
     return path
-
-
-def _opened(path: Path) -> xarray.Dataset:
-    import xarray
-
-    try:
-        return xarray.open_dataset(path, engine="h5netcdf")
-    except OSError as error:
-        raise RunFolderError(f"{path}: can't be read ({error})") from None
 
 
 def open_run(path: str | Path) -> Run:

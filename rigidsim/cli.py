@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -39,6 +40,7 @@ def _user_errors(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def guarded(*args: Any, **kwargs: Any) -> None:
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C
         try:
             command(*args, **kwargs)
         except RigidsimError as error:
@@ -50,6 +52,8 @@ def _user_errors(command: Callable[..., None]) -> Callable[..., None]:
         except BrokenPipeError:
             sys.stderr.close()
             raise typer.Exit(0) from None
+        finally:
+            signal.signal(signal.SIGTERM, before)
 
     return guarded
 

@@ -26,7 +26,7 @@ def event_variables(prepared: Prepared, log: EventLog, evaluator: Evaluator, las
         width = len(prepared.system.states)
         states = np.array([f.state for f in found], dtype=scalar).reshape(count, width)
         turns = np.array([f.turns for f in found], dtype=np.int64)
-        turns = turns.reshape(count, len(prepared.system.angle_states))
+        turns = turns.reshape(count, log.turns.size)
         values = evaluator.evaluate_apart(states, turns) if count else {}
         exponent = prepared.clock.exponent
         values["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]

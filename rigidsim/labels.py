@@ -12,6 +12,7 @@ from rigidsim.prepare import Prepared
 from rigidsim.solve.advance import Progress
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.lyapunov import LyapunovSpectrum
+from rigidsim.solve.rhythm import Rhythm
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.store import provenance
@@ -35,11 +36,16 @@ def root_attributes(prepared: Prepared, stepper: Stepper, run_id: str) -> dict[s
         "config_sha256": prepared.experiment.sha256,
         "formulation": system.requirements.formulation,
         "euler_sequence": system.sequence,
+        "euler_partner_sequence": "" if system.partner is None else system.partner.sequence,
         "states": " ".join(system.states),
         "precision": prepared.precision.name,
         "precision_bits": prepared.precision.bits,
         "tolerance": prepared.effective_tolerance,
-        "integrator": "heyoka Taylor, natural steps, dense output",
+        "integrator": "heyoka Taylor, natural steps, dense output"
+        if prepared.closed is None
+        else prepared.closed.title,
+        "method": scene.config.integrator.method,
+        "hold_invariants": int(prepared.holds_invariants),
         "taylor_order": int(stepper.integrator.order),
         "compact_mode": int(prepared.precision.compact or system.wide),
         "high_accuracy": 0,
@@ -75,7 +81,7 @@ def closing_words(prepared: Prepared, progress: Progress, evaluator: Evaluator) 
     if progress.last_good is None:
         return text
     state = np.array([progress.last_good.mark.state], dtype=prepared.precision.scalar)
-    factors = evaluator.singular_factors(state)
+    factors = evaluator.singular_factors(state, progress.last_good.turns[None, :])
     if factors is not None and abs(float(factors[0])) < summaries.NEAR_SINGULAR:
         middle = float(state[0][prepared.system.states.index("theta")])
         text += (
@@ -86,6 +92,18 @@ def closing_words(prepared: Prepared, progress: Progress, evaluator: Evaluator) 
         largest = int(np.argmax(np.abs(state[0].astype(np.float64))))
         text += f"; the largest state there was {prepared.system.states[largest]}"
     return text
+
+
+def chart_changes(prepared: Prepared, rhythm: Rhythm) -> dict[str, Any] | None:
+    """How often a run in Euler angles went from one chart to the other; None for other formulations."""
+    system = prepared.system
+    if rhythm.charts is None or system.partner is None:
+        return None
+    return {
+        "count": int(rhythm.charts.changes[0]),
+        "sequence": system.sequence,
+        "partner": system.partner.sequence,
+    }
 
 
 def lyapunov_variables(spectrum: LyapunovSpectrum | None) -> list[Extra]:

@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rigidsim.accuracy import chosen
 from rigidsim.prepare import Prepared, motion_growth, prepare
 from rigidsim.scene.reading import Experiment
+from rigidsim.solve.closed import closed_form_of
 from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.rhythm import Rhythm
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.winding import INTERVAL, Winding
+from rigidsim.solve.winding import Winding
 from rigidsim.summary import round_off_law
 
 if TYPE_CHECKING:
@@ -38,13 +41,15 @@ def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str
     Raises:
         ConfigError: the config can't be run.
     """
+    experiment, choice = chosen(experiment, loads=loads)
     prepared = prepare(experiment, loads=loads)
+    closed = closed_form_of(prepared.scene, driven=bool(loads))
     started = time.perf_counter()
     winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
     evaluator = Evaluator(prepared.system, prepared.precision, winding)
     compile_seconds = time.perf_counter() - started
-    pilot = _pilot(prepared, stepper, winding, evaluator)
+    pilot = _pilot(prepared, Rhythm(stepper, winding), evaluator)
     duration = float(prepared.scene.samples.last - prepared.scene.start)
     steps = max(1.0, duration / pilot["step"])
     samples = prepared.clock.count
@@ -59,6 +64,7 @@ def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str
         "name": prepared.scene.name,
         "formulation": system.requirements.formulation,
         "euler_sequence": system.sequence if system.angle_states else None,
+        "euler_partner_sequence": None if system.partner is None else system.partner.sequence,
         "states": system.states,
         "state_count": len(system.states),
         "reasons": [{"states": s, "why": w} for s, w in system.requirements.reasons],
@@ -72,6 +78,12 @@ def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str
         "invariants": [{"name": i.name, "why": i.why, "numerical": i.numerical} for i in system.invariants],
         "precision": prepared.precision.name,
         "tolerance": prepared.effective_tolerance,
+        "method": prepared.scene.config.integrator.method,
+        "closed_form": None if isinstance(closed, str) else closed.title,
+        "closed_form_why_not": closed if isinstance(closed, str) else None,
+        "hold_invariants": prepared.holds_invariants,
+        "accuracy": None if choice is None else {"chosen": choice.setting.title, "why": choice.why,
+                                                 "forecast": choice.forecast},
         "taylor_order": int(stepper.integrator.order),
         "pilot": pilot,
         "predicted": {
@@ -98,17 +110,15 @@ def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str
     }
 
 
-def _pilot(prepared: Prepared, stepper: Stepper, winding: Winding, evaluator: Evaluator) -> dict[str, float]:
+def _pilot(prepared: Prepared, rhythm: Rhythm, evaluator: Evaluator) -> dict[str, float]:
     """Mean step (s) and costs, from as many steps as half a second and the run's length allow."""
+    stepper = rhythm.stepper
     begin = float(stepper.time)
     last = float(prepared.clock.at(prepared.clock.count - 1))
     spent, count = 0.0, 1
     while spent < PILOT_SECONDS and stepper.steps < _PILOT_STEPS and float(stepper.time) < last:
         started = time.perf_counter()
-        if winding.positions:  # as in a run: angles that grew would lengthen the steps
-            count = min(count, INTERVAL)
-        fine = stepper.skip(count)
-        winding.wrap(stepper.state)
+        fine = rhythm.skip(count)
         spent += time.perf_counter() - started
         if not fine or stepper.largest <= 0:
             break

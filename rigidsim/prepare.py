@@ -15,7 +15,9 @@ from rigidsim.model.system import System, build_system
 from rigidsim.scene.reading import Experiment
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.start import check_start
+from rigidsim.solve.closed import ClosedForm, closed_form_of
 from rigidsim.solve.growth import Growth, measure_growth
+from rigidsim.solve.hold import held_system
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.store.variables import Variable, time_variable
@@ -28,6 +30,7 @@ class Prepared:
     Attributes:
         tolerance: scalar of the precision, or None for its epsilon.
         python_loads: loads given from Python, of which the config knows nothing.
+        closed: the solution in closed form, where the samples are to come from it.
     """
 
     experiment: Experiment
@@ -37,6 +40,12 @@ class Prepared:
     clock: SampleClock
     tolerance: Any | None
     python_loads: tuple[LoadModel, ...] = ()
+    closed: ClosedForm | None = None
+
+    @property
+    def holds_invariants(self) -> bool:
+        """Whether invariants are put back as the run goes on."""
+        return self.scene.config.integrator.hold_invariants
 
     @property
     def effective_tolerance(self) -> float:
@@ -91,15 +100,33 @@ def prepare(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> Prepa
     Raises:
         ConfigError: with what was given, what is allowed and where.
     """
-    scene = build_scene(experiment)
+    return prepare_scene(experiment, build_scene(experiment), loads=loads)
+
+
+def prepare_scene(
+    experiment: Experiment, scene: Scene, *, loads: Sequence[LoadModel] = (), tolerance: float | None = None
+) -> Prepared:
+    """As ``prepare``, for a scene that differs from the experiment's own.
+
+    Args:
+        tolerance: in place of the config's.
+
+    Raises:
+        ConfigError: with what was given, what is allowed and where.
+    """
     try:
         precision = precision_of(scene.config.integrator.precision)
         asked = scene.config.integrator.tolerance
-        tolerance = None if isinstance(asked, str) else precision.number(asked.at(scene.context))
+        step_control = None if isinstance(asked, str) else precision.number(asked.at(scene.context))
+        if tolerance is not None:
+            step_control = precision.number(scene.context.mpf(tolerance))
         check_start(scene)
         system = build_system(scene, precision.number, loads)
         if loads:
             _refuse_non_finite_start(system, precision)
+        closed = _closed_form(scene, system, driven=bool(loads))
+        if scene.config.integrator.hold_invariants:
+            system = held_system(system, precision, loads)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
     except ConfigError as error:
         raise error.at(experiment.source) from None
@@ -110,7 +137,32 @@ def prepare(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> Prepa
             f"({error}); choose a higher precision or check the units",
         )
         raise ConfigError(problem, experiment.source) from None
-    return Prepared(experiment, scene, precision, system, clock, tolerance, tuple(loads))
+    return Prepared(experiment, scene, precision, system, clock, step_control, tuple(loads), closed)
+
+
+def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | None:
+    """The solution in closed form where ``method`` asks for it.
+
+    Raises:
+        ConfigError: the scene has none, or something is asked for that only steps can give.
+    """
+    integrator = scene.config.integrator
+    if integrator.method != "closed_form":
+        return None
+    why = None
+    if integrator.hold_invariants:
+        why = "holds its invariants by itself; set hold_invariants = false"
+    elif system.requirements.formulation not in ("rates", "quaternion"):
+        why = f'gives rates and quaternions, not {integrator.formulation}; set formulation = "auto"'
+    elif scene.events:
+        why = 'takes no steps in which events could be found; remove [[events]], or choose method = "taylor"'
+    if why is not None:
+        raise ConfigError(Problem("[integrator] method", f'given "closed_form", which {why}'))
+    form = closed_form_of(scene, driven=driven)
+    if isinstance(form, str):
+        what = f'given "closed_form", but {form}; allowed here: "taylor"'
+        raise ConfigError(Problem("[integrator] method", what))
+    return form
 
 
 def _refuse_non_finite_start(system: System, precision: Precision) -> None:

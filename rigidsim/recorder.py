@@ -80,7 +80,7 @@ class Recorder:
         recorded["time"] = [np.ldexp(part, exponent) for part in self._prepared.precision.parts(times)]
         for invariant in self._prepared.system.invariants:
             self.watch.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
-        factors = self._evaluator.singular_factors(states)
+        factors = self._evaluator.singular_factors(states, turns)
         if factors is not None:
             self.watch.see_singular(factors, recorded["time"][0])
         self._writer.add(recorded)

@@ -22,7 +22,7 @@ def console() -> Console:
 def _table(*columns: str) -> Table:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for name in columns:
-        right = name in ("largest drift", "final", "bound", "initial")
+        right = name in ("largest drift", "final", "bound", "initial", "put back")
         table.add_column(name, justify="right" if right else "left", overflow="fold")
     return table
 
@@ -90,11 +90,16 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
         return
     cost, accuracy = summary["cost"], summary["accuracy"]
     seconds = sum(v for k, v in cost["seconds"].items() if k != "engine")
+    how = f"tolerance {summary['tolerance']:.3g}"
+    if summary.get("method") == "closed_form":
+        how = "in closed form"
+    if summary.get("hold_invariants"):
+        how += ", invariants held"
     _line(
         out,
         "model",
         f"{summary['formulation']}, {len(summary['states'])} states ({' '.join(summary['states'])}), "
-        f"{summary['precision']} precision, tolerance {summary['tolerance']:.3g}",
+        f"{summary['precision']} precision, {how}",
     )
     _line(
         out,
@@ -103,7 +108,9 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
         f"{duration(seconds)} wall ({duration(cost['seconds']['engine'])} integrating), "
         f"{duration(cost['cpu_seconds'])} CPU",
     )
-    table = _table("invariant", "initial", "largest drift", "final", "bound")
+    held = bool(summary.get("hold_invariants"))
+    columns = ["invariant", "initial", "largest drift", "final", "bound"]
+    table = _table(*columns, *(["put back"] if held else []))
     for name, row in summary["invariants"].items():
         largest = row["largest_drift"]
         style = "red" if largest is not None and not largest <= row["bound"] else ""
@@ -113,11 +120,20 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
             Text(_drift(largest), style=style),
             _drift(row["final_drift"]),
             _drift(row["bound"]),
+            *([_drift(row.get("put_back"))] if held else []),
         )
     out.print(table)
     _line(out, "drifts", "relative to: " + _scales(summary["invariants"]))
+    if held:
+        _line(out, "held", "put back: what the drift would have been; held drifts are no independent check")
+    if accuracy.get("chosen"):
+        _line(out, "chosen", f"{accuracy['chosen']}: {accuracy['chosen_why']}")
     estimate = accuracy["estimated_attitude_error"]
-    if estimate is not None:
+    if accuracy.get("certified") is not None:
+        asked, found = accuracy["requested"], accuracy["certified"]
+        text = f"certified to {found:.1e} rad, {asked:.1e} asked for ({accuracy['how']}, "
+        _line(out, "attitude", f"{text}{accuracy['times_compared']} times)")
+    elif estimate is not None:
         factor = accuracy.get("amplification", 1)
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
         size = f"uncertain by about {estimate:.1e} rad" if estimate < math.pi else "unknown"
@@ -155,10 +171,17 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     out.print(table)
     out.print(f"recorded   {', '.join(plan['recorded'])}", soft_wrap=True)
     predicted, pilot = plan["predicted"], plan["pilot"]
+    held = ", invariants held" if plan["hold_invariants"] else ""
     out.print(
         f"precision  {plan['precision']}, tolerance {plan['tolerance']:.3g}, Taylor order "
-        f"{plan['taylor_order']}"
+        f"{plan['taylor_order']}{held}"
     )
+    if plan["method"] == "closed_form":
+        out.print(f"method     {plan['closed_form']}: no steps are taken")
+    elif plan["closed_form"] is not None:
+        out.print(f'closed     {plan["closed_form"]}: method = "closed_form" would take no steps')
+    if plan["accuracy"] is not None:
+        out.print(f"chosen     {plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
     out.print(
         f"predicted  {predicted['steps']:.3g} steps of about {duration(pilot['step'])} "
         f"(pilot of {pilot['steps']:.0f}), {duration(predicted['total_seconds'])}, "

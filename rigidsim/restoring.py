@@ -35,7 +35,7 @@ def restore(chain: Chain, prepared: Prepared, rhythm: Rhythm, evaluator: Evaluat
     states = len(prepared.system.states)
     try:
         arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
-        checkpoint, memory = unpack_checkpoint(arrays, prepared.precision, rhythm.memories, states)
+        checkpoint, memory = unpack_checkpoint(arrays, prepared.precision, rhythm.place().memories, states)
         for path in chain.paths:
             if "previous_seal" in root_attributes(path):
                 saved = netcdf.read_group(path, "events")

@@ -11,6 +11,7 @@ import numpy as np
 
 from rigidsim import labels
 from rigidsim.archive import Run, open_run
+from rigidsim.certify import certified
 from rigidsim.errors import RunFolderError
 from rigidsim.guards import Observer
 from rigidsim.prepare import Prepared, prepare
@@ -21,9 +22,13 @@ from rigidsim.store import netcdf, provenance
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain, root_attributes
+from rigidsim.store.variables import SCHEMA_VERSION
+from rigidsim.verification import text_difference
 
 if TYPE_CHECKING:
     from rigidsim.model.loads import LoadModel
+
+_ROWS_AT_ONCE = 65536
 
 
 def resume(
@@ -52,35 +57,47 @@ def resume(
         ConfigError: a bad ``until`` or override.
     """
     folder = find_run(path)
-    for entry in [folder.path / "segments", *folder.path.iterdir()]:
-        if entry.is_symlink():
-            raise RunFolderError(f"{entry}: is a symbolic link, which no run writes; remove it")
     session = Session(observer or Observer())
     with folder.locked():
+        _refuse_links(folder)
         folder.remove_torn()
         experiment = _config(folder, overrides)
         if until is not None:
             experiment = _prolonged(experiment, until)
-        if folder.dataset.exists():
-            if until is None:
-                done = open_run(folder.path)
-                raise RunFolderError(
-                    f"{folder.path}: nothing is left to do: {done.summary.get('message', done.status)}; "
-                    "--until goes on to a later end"
-                )
-            _reopen(folder)
-        chain = read_chain(folder.segments)
-        if chain.damage is not None:
-            session.remarks.append(_set_aside(chain))
-        if not chain.paths:
-            session.remarks.append("nothing had been saved, so the run began anew")
-            return session.execute(prepare(experiment, loads=loads), folder)
+        # a run that was killed while its dataset was completed has both, and is completed again
+        finished = folder.dataset.exists() and not folder.segments.exists()
+        if finished and until is None:
+            done = open_run(folder.path)
+            raise RunFolderError(
+                f"{folder.path}: nothing is left to do: {done.summary.get('message', done.status)}; "
+                "--until goes on to a later end"
+            )
+        chain = _of_finished(folder) if finished else read_chain(folder.segments)
         prepared = prepare(experiment, loads=loads)
-        session.mixed = _compared(prepared, chain)
-        run = session.execute(prepared, folder, chain)
+        if chain.paths:
+            session.mixed = _compared(prepared, chain)
+        if finished:
+            folder.reopen()
+            chain = read_chain(folder.segments)
+        if chain.damage is not None:
+            session.remarks.append(_set_aside(chain, folder))
         if until is not None:
             netcdf.write_bytes(folder.config, experiment.text.encode())
-        return run
+        if not chain.paths:
+            session.remarks.append("nothing had been saved, so the run began anew")
+            run = session.execute(prepared, folder)
+        else:
+            run = session.execute(prepared, folder, chain)
+        return certified(run, prepared.experiment, None, session.observer, loads)[0]
+
+
+def _refuse_links(folder: RunFolder) -> None:
+    for place in (folder.path, folder.segments):
+        if place.is_symlink():
+            raise RunFolderError(f"{place}: is a symbolic link, which no run writes; give its target")
+        for entry in place.iterdir() if place.is_dir() else ():
+            if entry.is_symlink():
+                raise RunFolderError(f"{entry}: is a symbolic link, which no run writes; remove it")
 
 
 def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
@@ -127,29 +144,38 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
     return later
 
 
-def _reopen(folder: RunFolder) -> None:
-    """Make the dataset of a finished run its first segment, and its checkpoint the second."""
+def _of_finished(folder: RunFolder) -> Chain:
+    """A finished run's dataset and its checkpoint, as what a later end goes on from.
+
+    Raises:
+        RunFolderError: it ended otherwise than at its last sample, or a file is damaged.
+    """
     found = root_attributes(folder.dataset)
     if found.get("status") != "finished" or not folder.checkpoint.exists():
         raise RunFolderError(
             f"{folder.path}: can't be prolonged: {found.get('status_message', 'it has no checkpoint')}"
         )
-    check_seal(folder.dataset)
+    last = check_seal(folder.dataset)
     check_seal(folder.checkpoint)
-    folder.segments.mkdir(exist_ok=True)
-    netcdf.write_bytes(folder.segments / "00000001.h5", folder.checkpoint.read_bytes())
-    folder.dataset.replace(folder.segments / "00000000.h5")
-    for path in (folder.timeline, folder.summary, folder.checkpoint):
-        path.unlink(missing_ok=True)
+    after = root_attributes(folder.checkpoint)
+    if after.get("run_id") != found.get("run_id") or after.get("previous_seal") != last:
+        raise RunFolderError(f"{folder.checkpoint}: doesn't belong to {folder.dataset.name} beside it")
+    return Chain([folder.dataset, folder.checkpoint], found["rows"], str(found.get("run_id", "")), last)
 
 
-def _set_aside(chain: Chain) -> str:
-    """Rename what doesn't belong, so that it is neither read nor lost."""
+def _set_aside(chain: Chain, folder: RunFolder) -> str:
+    """Move what doesn't belong, so that it is neither read nor lost."""
+    folder.set_aside.mkdir(exist_ok=True)
     for path in chain.spoiled:
-        path.replace(path.with_name(path.name + ".damaged"))
+        target, number = folder.set_aside / path.name, 0
+        while target.exists():
+            number += 1
+            target = folder.set_aside / f"{path.stem}-{number}{path.suffix}"
+        path.replace(target)
+    files = "file was" if len(chain.spoiled) == 1 else "files were"
     return (
         f"{chain.damage}; the run went on from the {len(chain.paths)} segments before it "
-        f"({chain.rows} samples); {len(chain.spoiled)} files were set aside as *.damaged"
+        f"({chain.rows} samples); {len(chain.spoiled)} {files} moved to {folder.set_aside.name}/"
     )
 
 
@@ -167,11 +193,16 @@ def _compared(prepared: Prepared, chain: Chain) -> str:
         RunFolderError: it is another experiment.
     """
     saved = root_attributes(chain.paths[-1])
-    text = prepared.experiment.text
-    if saved.get("config") != text and not text.startswith(str(saved.get("config")).rstrip("\n")):
+    begun, text = str(saved.get("config", "")), prepared.experiment.text
+    if not _prolongs(text, begun):
         raise RunFolderError(
-            f"{prepared.experiment.source}: was changed since the run began; put it back (the segments hold "
-            "it as their attribute config), or begin a new run"
+            f"{prepared.experiment.source}: was changed since the run began ({text_difference(text, begun)}); "
+            "put it back (the segments hold it as their attribute config), or begin a new run"
+        )
+    if saved.get("schema_version") != SCHEMA_VERSION:
+        raise RunFolderError(
+            f"{chain.paths[-1]}: has schema version {saved.get('schema_version')}; only runs of version "
+            f"{SCHEMA_VERSION} can be gone on with; begin a new run"
         )
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
     now = labels.root_attributes(prepared, stepper, chain.run)
@@ -191,16 +222,30 @@ def _compared(prepared: Prepared, chain: Chain) -> str:
     return "; ".join([x for x in [str(saved.get("mixed_provenance", "")), *differing] if x])
 
 
+_PROLONGING = ("#:set time.end=", "#:set time.samples=")
+
+
+def _prolongs(text: str, begun: str) -> bool:
+    """Whether a config is the one that a run was begun with, up to a later end."""
+    begun = begun.rstrip("\n")
+    added = text[len(begun) :]
+    if not text.startswith(begun) or (added and not added.startswith("\n")):
+        return False
+    return all(line.startswith(_PROLONGING) for line in added.splitlines() if line)
+
+
 def _same_times(prepared: Prepared, chain: Chain) -> None:
     """A grid to a later end must begin with the very times that are saved."""
     first = 0
     for path in chain.paths:
         with netcdf.reading(path) as file:
-            times = np.asarray(file["time"][()])
-        grid = prepared.precision.parts(prepared.clock.internal(first, first + len(times)))[0]
-        if not np.array_equal(np.ldexp(grid, prepared.clock.exponent), times):
-            raise RunFolderError(
-                "--until: the longer grid's first sample times differ from those saved by a rounding; "
-                "choose an end that is a multiple of the old one, or begin with [time] every"
-            )
-        first += len(times)
+            saved = file["time"]
+            for start in range(0, saved.shape[0], _ROWS_AT_ONCE):
+                times = np.asarray(saved[start : start + _ROWS_AT_ONCE])
+                grid = prepared.precision.parts(prepared.clock.internal(first, first + len(times)))[0]
+                if not np.array_equal(np.ldexp(grid, prepared.clock.exponent), times):
+                    raise RunFolderError(
+                        "--until: the longer grid's first sample times differ from those saved by a "
+                        "rounding; choose an end that is a multiple of the old one, or begin with [time] every"
+                    )
+                first += len(times)

@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import rigidsim.summary as summaries
 from rigidsim import labels
+from rigidsim.accuracy import chosen, is_open
 from rigidsim.archive import Run
+from rigidsim.assembly import assemble
+from rigidsim.certify import certified
 from rigidsim.crossings import event_counts, event_variables
 from rigidsim.guards import Guards, Interruption, Observer
 from rigidsim.prepare import Prepared, double_twin, motion_growth, prepare
@@ -20,16 +23,13 @@ from rigidsim.recorder import Effort, Recorder
 from rigidsim.restoring import Resumed, restore
 from rigidsim.scene.reading import Experiment, load
 from rigidsim.solve.advance import Advance
-from rigidsim.solve.evaluate import Evaluator
-from rigidsim.solve.events import EventLog
+from rigidsim.solve.closed.direct import Direct
 from rigidsim.solve.lyapunov import LyapunovSpectrum, lyapunov_spectrum
-from rigidsim.solve.rhythm import Rhythm
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.winding import Winding
 from rigidsim.store import netcdf, provenance
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.segments import Chain, SegmentWriter
+from rigidsim.trial import Setting
 
 if TYPE_CHECKING:
     from rigidsim.model.loads import LoadModel
@@ -61,13 +61,21 @@ def run(
     """
     if not isinstance(experiment, Experiment):
         experiment = load(experiment)
-    session = Session(observer or Observer())
-    prepared = prepare(experiment, loads=loads)
-    folder = RunFolder(Path(out) / prepared.scene.name)
-    with folder.locked():
-        folder.create(force=force)
-        netcdf.write_bytes(folder.config, experiment.text.encode())
-        return session.execute(prepared, folder)
+    observer = observer or Observer()
+    beyond: Setting | None = None
+    while True:
+        setting, choice = chosen(experiment, loads=loads, beyond=beyond)
+        session = Session(observer)
+        prepared = prepare(setting, loads=loads)
+        folder = RunFolder(Path(out) / prepared.scene.name)
+        with folder.locked():
+            folder.create(force=force or beyond is not None)
+            netcdf.write_bytes(folder.config, setting.text.encode())
+            folder.segments.mkdir()  # the mark of a run that isn't finished
+            result, kept = certified(session.execute(prepared, folder), setting, choice, observer, loads)
+        if kept or choice is None or not is_open(experiment, choice, loads):
+            return result
+        beyond = choice.setting
 
 
 @dataclass
@@ -94,12 +102,9 @@ class Session:
             RunFolderError: the folder can't be written, or the checkpoint belongs to another system.
         """
         clock = _Phases()
-        winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
-        log = EventLog([c.stop for c in prepared.system.crossings], winding.turns)
-        stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0), log)
-        evaluator = Evaluator(prepared.system, prepared.precision, winding)
+        parts = assemble(prepared)
+        log, stepper, evaluator, rhythm = parts.log, parts.stepper, parts.evaluator, parts.rhythm
         growth = motion_growth(prepared)
-        rhythm = Rhythm(stepper, winding)
         resumed: Resumed | None = None
         if chain is not None:
             resumed = restore(chain, prepared, rhythm, evaluator, log)
@@ -116,7 +121,12 @@ class Session:
         self.observer.phase("integrate")
         guards = Guards(prepared, recorder.watch, interruption, self.observer, steps_before=stepper.steps)
         start = None if resumed is None else resumed.checkpoint
-        advance = Advance(rhythm, prepared.clock, prepared.precision, recorder, guards, start)
+        advance: Advance | Direct
+        if prepared.closed is not None:
+            grid = (prepared.clock, prepared.precision)
+            advance = Direct(prepared.closed, prepared.system, rhythm, *grid, recorder, guards, start)
+        else:
+            advance = Advance(rhythm, prepared.clock, prepared.precision, recorder, guards, start)
         recorder.progress = advance.progress
         if resumed is not None:
             recorder.restore(resumed.arrays, advance.progress)
@@ -147,9 +157,11 @@ class Session:
             provenance=labels.repeated(attributes),
             remarks=self.remarks,
             mixed=self.mixed,
+            put_back={} if parts.holder is None else parts.holder.drifts_put_back(),
         )
         last = float(prepared.clock.at(prepared.clock.count - 1))
         summary["events"] = event_counts(prepared, log, last)
+        summary["chart_changes"] = labels.chart_changes(prepared, rhythm)
         summary["cost"]["sessions"] = self.effort.sessions
         summary["cost"]["seconds"]["engine"] = progress.integration_seconds
         if progress.status.final:
@@ -170,7 +182,7 @@ class _Completion:
     folder: RunFolder
     writer: SegmentWriter
     recorder: Recorder
-    advance: Advance
+    advance: Advance | Direct
     attributes: dict[str, Any]
     effort: Effort
 
@@ -182,7 +194,7 @@ class _Completion:
             self._write(summary, extras, clock, observer)
         except KeyboardInterrupt:
             kept = "the dataset is complete, the timeline is missing"
-            if not self.folder.dataset.exists():
+            if self.folder.segments.exists():
                 self.recorder.save(self.advance.checkpoint())
                 kept = "all samples are saved as segments"
             summary |= {"status": Status.INTERRUPTED.value, "exit_code": Status.INTERRUPTED.exit_code}
@@ -205,15 +217,19 @@ class _Completion:
         if progress.status is Status.FINISHED:
             arrays = self.recorder.packed(self.advance.checkpoint())
             checkpoint = folder.checkpoint, arrays, self.recorder.all_events()
-        self.writer.complete(folder.dataset, final, extras, checkpoint=checkpoint)
-        summary["dataset_sha256"] = provenance.file_sha256(folder.dataset)
+
+        def conclude() -> None:
+            summary["dataset_sha256"] = self.writer.dataset_sha256
+            folder.write_summary(summary)
+
+        self.writer.complete(folder.dataset, final, extras, checkpoint=checkpoint, conclude=conclude)
         clock.next("dataset")
         output = self.prepared.scene.config.output
         if output.timeline and summary["samples"]:
             observer.phase("timeline")
             from rigidsim.look.timeline import write_timeline
 
-            with Run(folder, summary).dataset as dataset:
+            with Run(folder, summary).opened(indexed=False) as dataset:
                 write_timeline(dataset, folder.timeline, rows=output.timeline_rows)
             clock.next("timeline")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -22,6 +22,7 @@ DRIFT_FACTOR = 50.0
 steps add up like a random walk (Brouwer 1937), with a few roundings per step."""
 
 _LOST_DIGITS = 1e-2  # rad; an attitude this uncertain is no result any more
+UNCERTAIN = "the attitude is uncertain"
 NEAR_SINGULAR = 1e-3
 """Factor from which Euler angles lose digits to their singularity."""
 
@@ -67,9 +68,17 @@ def round_off_law(tolerance: float, steps: int, rate: float, duration: float) ->
 
 
 def invariant_table(
-    prepared: Prepared, watch: Watch, steps: int, initial: dict[str, list[float]]
+    prepared: Prepared,
+    watch: Watch,
+    steps: int,
+    initial: dict[str, list[float]],
+    put_back: Mapping[str, float],
 ) -> dict[str, Any]:
-    """One entry per invariant."""
+    """One entry per invariant.
+
+    Args:
+        put_back: what was put back of those held, relative like the drifts.
+    """
     bound = DRIFT_FACTOR * prepared.effective_tolerance * math.sqrt(max(steps, 1))
     table = {}
     for invariant in prepared.system.invariants:
@@ -82,6 +91,7 @@ def invariant_table(
             "largest_drift": watch.largest.get(invariant.name),
             "final_drift": watch.final.get(invariant.name),
             "bound": bound,
+            "put_back": put_back.get(invariant.name),
             "why": invariant.why,
             "numerical": invariant.numerical,
         }
@@ -123,7 +133,7 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
     estimate = attitude_error(prepared, progress, growth)
     if estimate is not None and estimate > _LOST_DIGITS:
         found.append(
-            f"the attitude is uncertain by about {min(estimate, math.pi):.2g} rad at the end, so its "
+            f"{UNCERTAIN} by about {min(estimate, math.pi):.2g} rad at the end, so its "
             f"digits are gone{_since(prepared, progress, growth)}; choose a higher precision or a nearer end"
         )
     turns = float(system.rate_bound) * largest_spacing(prepared) / math.pi
@@ -224,6 +234,7 @@ def summarise(
     provenance: dict[str, Any],
     remarks: Sequence[str] = (),
     mixed: str = "",
+    put_back: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     scene, system = prepared.scene, prepared.system
@@ -252,7 +263,9 @@ def summarise(
             "seconds": seconds,
             "cpu_seconds": cpu_seconds,
         },
-        "invariants": invariant_table(prepared, watch, progress.steps, initial),
+        "method": scene.config.integrator.method,
+        "hold_invariants": prepared.holds_invariants,
+        "invariants": invariant_table(prepared, watch, progress.steps, initial, put_back or {}),
         "accuracy": {
             "requested": None,
             "estimated_attitude_error": estimate,

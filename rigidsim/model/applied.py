@@ -96,7 +96,7 @@ def state_names(m: Mechanics, names: Collection[str]) -> dict[str, Expression]:
     if m.attitude is not None and set(names) & set(ATTITUDE_NAMES):
         found |= zip(ATTITUDE_NAMES[:4], m.attitude.quaternion, strict=True)
         sequence = m.scene.config.integrator.euler_sequence
-        if m.attitude.kind == "euler_angles":
+        if m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
             angles = list(hy.make_vars(*m.attitude.names))
         else:
             angles = euler_from_matrix(sequence, m.matrix)

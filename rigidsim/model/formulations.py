@@ -73,13 +73,18 @@ def quaternion_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
     )
 
 
-def euler_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
-    """Three angles of the scene's sequence; singular where the middle one makes the outer axes parallel."""
-    sequence = scene.config.integrator.euler_sequence
+def euler_states(scene: Scene, rates: list[Expression], sequence: str | None = None) -> AttitudeStates:
+    """Three angles; singular where the middle one makes the outer axes parallel.
+
+    Args:
+        sequence: another than the scene's (its partner, see ``rigidsim.model.charts``).
+    """
+    asked = scene.config.integrator.euler_sequence
+    sequence = sequence or asked
     names = ["phi", "theta", "psi"]
     angles = list(hy.make_vars(*names))
     derivatives, factor = rotations.euler_rates(sequence, angles, rates)
-    initial = scene.euler_angles
+    initial = scene.euler_angles if sequence == asked else None
     if initial is None:
         matrix = attitude.rotation_matrix(scene.quaternion)
         initial = attitude.euler_from_matrix(scene.context, matrix, sequence)

@@ -200,7 +200,7 @@ def _along_vertical(m: Mechanics) -> list[Expression]:
 def _euler(m: Mechanics) -> list[Expression]:
     assert m.attitude is not None
     sequence = m.scene.config.integrator.euler_sequence
-    if m.attitude.kind == "euler_angles":
+    if m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
         return list(hy.make_vars(*m.attitude.names))
     return rotations.euler_from_matrix(sequence, m.matrix)
 

@@ -12,6 +12,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.applied import AppliedModel, state_names
 from rigidsim.model.canonical import MOMENTA, canonical_states, hamilton_equations
 from rigidsim.model.catalogue import load_models
+from rigidsim.model.charts import across, partner_sequence
 from rigidsim.model.drive import estimate_drive
 from rigidsim.model.dynamics import (
     Number,
@@ -22,7 +23,7 @@ from rigidsim.model.dynamics import (
     vertical_from_attitude,
 )
 from rigidsim.model.formula import to_heyoka
-from rigidsim.model.formulations import BUILDERS, AttitudeStates
+from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
 from rigidsim.model.loads import LoadModel
 from rigidsim.model.mechanics import Mechanics, in_common_unit
 from rigidsim.model.observables import WORK, work_is_needed
@@ -66,6 +67,10 @@ class System:
         wide: whether the equations are too long to be compiled unrolled.
         mechanics: the quantities that outputs and invariants are written in.
         rate_bound: upper bound of the absolute angular velocity, rad/s (mpf).
+        sequence: of the Euler angles that are states, or that are recorded.
+        partner: the same in the chart that a run changes to near the singularity: the same states but for
+            the angles. Its recorded Euler angles are those of this system's sequence, on the branch that
+            the parameter after the invariants' gives (see ``rigidsim.model.charts``). None without a chart.
     """
 
     scene: Scene
@@ -85,6 +90,7 @@ class System:
     crossings: list[Crossing]
     wide: bool
     mechanics: Mechanics
+    partner: System | None = None
 
     @property
     def variables(self) -> list[Expression]:
@@ -92,12 +98,15 @@ class System:
         return [variable for variable, _ in self.equations]
 
 
-def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] = ()) -> System:
+def build_system(
+    scene: Scene, number: Number, extra_loads: Sequence[LoadModel] = (), *, sequence: str | None = None
+) -> System:
     """Build the least system that the scene needs.
 
     Args:
         number: from an mpf to the working precision's scalar, rounded once.
         extra_loads: beside those of the config.
+        sequence: of the Euler angles that are states, where it is not the scene's.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.
@@ -132,7 +141,10 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         exponents = [e - scaling.time for e in scaling.rates]
     rates = in_common_unit(rate_states, numbers.rate_units, number)
     if not canonical and requirements.formulation != "rates":
-        attitude = BUILDERS[requirements.formulation](scene, rates)
+        if requirements.formulation == "euler_angles":
+            attitude = euler_states(scene, rates, sequence)
+        else:
+            attitude = BUILDERS[requirements.formulation](scene, rates)
         names += attitude.names
         derivatives += attitude.derivatives
         initial += attitude.initial
@@ -192,10 +204,22 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         exponents.append(0)
         titles = ", ".join(dict.fromkeys(title for title, _ in watched))
         requirements.reasons.append((PACE, f"{titles}: no step may pass over what is narrow in it"))
-    _refuse_singular_start(scene, attitude)
+    if canonical:
+        _refuse_singular_start(scene, attitude)
     recorded, outputs = recorded_variables(mechanics, requirements)
     invariants = find_invariants(mechanics, norms)
     outputs += drift_outputs(invariants, context, number)
+    asked = scene.config.integrator.euler_sequence
+    partner = None
+    if requirements.formulation == "euler_angles":
+        assert attitude is not None
+        if attitude.sequence != asked:
+            branch = hy.par[sum(len(invariant.expressions) for invariant in invariants)]
+            _ask_of_partner(recorded, outputs, attitude, branch)
+        elif sequence is None:
+            partner = build_system(scene, number, extra_loads, sequence=partner_sequence(asked))
+            why = f"near the singularity of {asked}: angles of {partner.sequence}, which is regular there"
+            requirements.reasons.append((" ".join(attitude.names), why))
     first_angle = 0 if canonical else 3
     angle_states = tuple(first_angle + i for i in attitude.angles) if attitude else ()
     _refuse_out_of_range(initial, [*recorded, *invariants], number)
@@ -212,11 +236,12 @@ def build_system(scene: Scene, number: Number, extra_loads: Sequence[LoadModel] 
         outputs=outputs,
         angle_states=angle_states,
         singular_factor=attitude.singular_factor if attitude else None,
-        sequence=scene.config.integrator.euler_sequence,
+        sequence=sequence or asked,
         rate_bound=max(largest_rates(scene, scaling.drive)),
         crossings=_crossings(mechanics),
         wide=any(load.wide for load in loads),
         mechanics=mechanics,
+        partner=partner,
     )
 
 
@@ -233,6 +258,17 @@ def _crossings(m: Mechanics) -> list[Crossing]:
     ]
 
 
+def _ask_of_partner(
+    recorded: list[Recorded], outputs: list[Expression], attitude: AttitudeStates, branch: Expression
+) -> None:
+    """Put the asked sequence's angles in the place of the partner's own among the outputs."""
+    angles = list(hy.make_vars(*attitude.names))
+    for variable in recorded:
+        if variable.name == "euler_angles":
+            place = slice(variable.first, variable.first + variable.count)
+            outputs[place] = across(attitude.sequence, angles, hy, branch)
+
+
 def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
     if attitude is None or attitude.singular_factor is None:
         return
@@ -246,7 +282,8 @@ def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> Non
                 "[integrator] formulation",
                 f"the motion starts {context.nstr(factor, 3)} rad from the singularity of the sequence "
                 f"{attitude.sequence} (middle angle {context.nstr(middle, 8)} rad), where Euler angles have "
-                'no rates; choose formulation = "quaternion" or another euler_sequence',
+                'no momenta; choose formulation = "euler_angles", which changes its sequence there, '
+                '"quaternion", or another euler_sequence',
             )
         )
 

@@ -14,11 +14,6 @@ from rigidsim.errors import ConfigError, Problem
 
 _LATER: dict[tuple[str, ...], str] = {
     ("sweep",): "sweeps are not in this version yet",
-    ("integrator", "accuracy"): "not in this version yet; choose a precision and a tolerance",
-}
-_LATER_VALUES: dict[tuple[str, ...], tuple[Any, str]] = {
-    ("integrator", "method"): ("closed_form", "not in this version yet; allowed: taylor"),
-    ("integrator", "hold_invariants"): (True, "not in this version yet; allowed: false"),
 }
 _TABLES = (
     "body",
@@ -104,10 +99,6 @@ def later_features(table: Mapping[str, Any]) -> list[Problem]:
     for path, why in _LATER.items():
         if _value_at(table, path) is not None:
             problems.append(Problem(place(path), why + "; remove the key"))
-    for path, (value, why) in _LATER_VALUES.items():
-        given = _value_at(table, path)
-        if type(given) is type(value) and given == value:
-            problems.append(Problem(place(path), f"given {shown(given)}: {why}"))
     return problems
 
 

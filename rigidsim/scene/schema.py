@@ -167,8 +167,9 @@ class Integrator(Table):
         "auto"
     )
     euler_sequence: StrictStr = "zxz"
-    method: Literal["taylor"] = "taylor"
+    method: Literal["taylor", "closed_form"] = "taylor"
     hold_invariants: StrictBool = False
+    accuracy: Dimensionless | None = None
 
     @field_validator("euler_sequence")
     @classmethod

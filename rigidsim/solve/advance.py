@@ -240,7 +240,7 @@ class Advance:
                 self.rhythm.back_to(place)
             self._note_steps()
             times = times[: len(states)]
-            self.harvest.take(times, states, place.turns)
+            self.harvest.take(times, states, self.rhythm.rows(times))
             if self.harvest.complete:
                 self._finish(place)
                 break
@@ -259,7 +259,7 @@ class Advance:
         self._note_steps()
         times = self.harvest.until(self.stepper.time)
         if len(times):
-            self.harvest.take(times, output(times), place.turns)
+            self.harvest.take(times, output(times), self.rhythm.rows(times))
         if self.harvest.complete:
             self._finish(place)
         else:
@@ -301,7 +301,8 @@ class Advance:
     def _take_step(self) -> None:
         """The samples within the step just taken."""
         times = self.harvest.until(self.stepper.time)
-        self.harvest.take(times, np.array([self.stepper.dense(t) for t in times]), self.rhythm.winding.turns)
+        states = np.array([self.stepper.dense(t) for t in times])
+        self.harvest.take(times, states, self.rhythm.rows(times))
 
     def _find_last_good(self, place: Place) -> bool:
         """After a failure somewhere in many steps: walk to the last state that is finite."""

@@ -32,7 +32,7 @@ class Keeper(Protocol):
     """Takes samples in order, and is told when what it took can be saved together with a checkpoint."""
 
     def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
-        """Samples from index ``first`` on: times (n,), states (n, states), turns (n, angles)."""
+        """Samples from index ``first`` on: times (n,), states (n, states), rows of turns (n, ...)."""
 
     def due(self) -> bool:
         """Whether it is time to save."""
@@ -80,9 +80,9 @@ class Harvest:
         return np.concatenate(pieces) if pieces else self._clock.internal(0, 0)
 
     def take(self, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
-        """The next samples; the turns are the same for all of them."""
+        """The next samples: times (n,), states (n, states), rows of turns (n, ...)."""
         if len(times):
-            self._buffer.append((times, states, np.tile(turns, (len(times), 1))))
+            self._buffer.append((times, states, turns))
             self.count += len(times)
 
     def drop_after(self, limit: Any) -> None:

@@ -75,7 +75,9 @@ def pack_checkpoint(checkpoint: Checkpoint, memory: Memory, precision: Precision
     arrays = pack(np.array(mark.time, dtype=precision.scalar), precision, "time")
     arrays |= pack(mark.state, precision, "state")
     arrays["counts"] = np.array([mark.steps, mark.events, checkpoint.next_sample], dtype=np.int64)
-    arrays |= {_MEMORIES + name: array for name, array in checkpoint.place.memories.items()}
+    for name, array in checkpoint.place.memories.items():
+        plain = array.dtype in (np.float64, np.int64)
+        arrays |= {_MEMORIES + name: array} if plain else pack(array, precision, _MEMORIES + name)
     arrays["joined_turns"] = memory.turns
     if memory.last_angles is not None:
         arrays["joined_angles"] = memory.last_angles
@@ -102,7 +104,10 @@ def unpack_checkpoint(
         raise ValueError("the checkpoint belongs to another system of equations")
     found = {}
     for name, like in memories.items():
-        values = arrays.get(_MEMORIES + name, np.zeros(like.shape, dtype=like.dtype))
+        if like.dtype in (np.float64, np.int64):
+            values = arrays.get(_MEMORIES + name, np.zeros(like.shape, dtype=like.dtype))
+        else:
+            values = unpack(arrays, precision, _MEMORIES + name)
         if values.shape != like.shape:
             raise ValueError(f"the checkpoint has {name} of shape {values.shape}, not {like.shape}")
         found[name] = values.astype(like.dtype)

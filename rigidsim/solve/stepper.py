@@ -9,7 +9,7 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import heyoka as hy
 import numpy as np
@@ -34,10 +34,23 @@ class Mark:
     steps: int = 0
 
 
+class Watcher(Protocol):
+    """Looks at each natural step, whose dense output it may use."""
+
+    def begin(self, time: Any) -> None:
+        """Steps follow, from this time on."""
+
+    def __call__(self, integrator: Any) -> bool:
+        """After each step; False ends the call that took it."""
+
+
 class Stepper:
     """A compiled integrator and its count of steps.
 
     Attributes:
+        system: its equations; those of its partner are compiled when they are needed.
+        precision: of its arithmetic.
+        watcher: sees each step and may end a call early; None without one.
         steps: natural steps taken and kept.
         log: the events found along the way.
         has_events: whether the engine looks for any.
@@ -52,30 +65,50 @@ class Stepper:
         start: Any,
         log: EventLog | None = None,
     ) -> None:
-        self._precision = precision
+        self.system = system
+        self.watcher: Watcher | None = None
+        self.precision, self._tolerance, self._start = precision, tolerance, start
         self.log = log or EventLog([], np.zeros(0, dtype=np.int64))
         self.has_events = log is not None and bool(system.crossings)
-        options = dict(precision.options)
-        if log is not None and self.has_events:
-            options["nt_events"] = engine_events(system, precision, log)
-        if tolerance is not None:
-            options["tol"] = tolerance
-        self._integrator = hy.taylor_adaptive(
-            system.equations,
-            precision.array(system.initial),
-            time=start,
-            compact_mode=precision.compact or system.wide,
-            **options,
-        )
+        self._integrator = self._compiled(system)
+        self._charts = {0: self._integrator}
         far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
         self._longest = precision.number(system.scene.context.mpf(_LONGEST_STEP))
         self.steps = 0
         self.smallest = self.largest = 0.0
 
+    def _compiled(self, system: System) -> Any:
+        options = dict(self.precision.options)
+        if self.has_events:
+            options["nt_events"] = engine_events(system, self.precision, self.log)
+        if self._tolerance is not None:
+            options["tol"] = self._tolerance
+        return hy.taylor_adaptive(
+            system.equations,
+            self.precision.array(system.initial),
+            time=self._start,
+            compact_mode=self.precision.compact or system.wide,
+            **options,
+        )
+
+    def use(self, chart: int) -> None:
+        """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
+        if chart not in self._charts:
+            assert self.system.partner is not None
+            self._charts[chart] = self._compiled(self.system.partner)
+        time = self._integrator.dtime
+        self._integrator = self._charts[chart]
+        self._integrator.dtime = time
+
+    def _watched(self) -> Watcher | None:
+        if self.watcher is not None:
+            self.watcher.begin(self._integrator.time)
+        return self.watcher
+
     @property
     def integrator(self) -> Any:
-        """The heyoka object (for provenance)."""
+        """The heyoka object in use (for provenance)."""
         return self._integrator
 
     @property
@@ -118,16 +151,20 @@ class Stepper:
             np.concatenate([ends[:1], times[first:], ends[1:]]),
             max_steps=count,
             max_delta_t=self._longest,
+            callback=self._watched(),
         )
         return self._account(outcome, smallest, largest, taken), states[1 - first :]
 
     def step(self) -> bool:
         """One step with dense output; False when the state is no longer finite."""
+        self._watched()
         outcome, size = self._integrator.step(self._longest, write_tc=True)
         self.smallest = self.largest = abs(float(size))
         if outcome == hy.taylor_outcome.err_nf_state:
             return False
         self.steps += 1
+        if self.watcher is not None:
+            self.watcher(self._integrator)
         return True
 
     def dense(self, time: Any) -> np.ndarray:
@@ -135,9 +172,15 @@ class Stepper:
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
     def skip(self, count: int) -> bool:
-        """At most ``count`` steps without dense output; False when the state is no longer finite."""
+        """At most ``count`` steps without dense output, fewer where the watcher ends the call; False when the
+        state is no longer finite.
+        """
         outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
-            self._far, max_steps=count, max_delta_t=self._longest
+            self._far,
+            max_steps=count,
+            max_delta_t=self._longest,
+            callback=self._watched(),
+            write_tc=self.watcher is not None,
         )
         return self._account(outcome, smallest, largest, taken)
 
@@ -151,7 +194,12 @@ class Stepper:
         returns states (n, states).
         """
         outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
-            self._far, max_steps=count, max_delta_t=self._longest, c_output=True
+            self._far,
+            max_steps=count,
+            max_delta_t=self._longest,
+            c_output=True,
+            callback=self._watched(),
+            write_tc=self.watcher is not None,
         )
         return self._account(outcome, smallest, largest, taken), output
 

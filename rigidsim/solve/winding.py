@@ -12,6 +12,12 @@ import numpy as np
 
 from rigidsim.solve.precision import Precision
 
+TURNS, CHART, ANGLES = slice(0, 3), 3, slice(4, 7)
+"""What stands where in ``Winding.turns``: full turns of the angle states, the chart that they are of (0: the
+asked sequence, 1: its partner), and in the partner chart the asked angles (see ``rigidsim.solve.charts``)."""
+
+_LENGTH = 7
+
 INTERVAL = 32
 """Steps between two corrections: a fixed count of natural steps, so that bits don't depend on timing."""
 
@@ -20,12 +26,12 @@ class Winding:
     """Full turns of the angle states so far.
 
     Attributes:
-        turns: shape (angles,), int64.
+        turns: int64, shape (7,), see ``TURNS``; (0,) without angles.
     """
 
     def __init__(self, positions: tuple[int, ...], precision: Precision, context: Any) -> None:
         self.positions = list(positions)
-        self.turns = np.zeros(len(positions), dtype=np.int64)
+        self.turns = np.zeros(_LENGTH if positions else 0, dtype=np.int64)
         self._precision = precision
         # 2 pi in two parts: n times the first is exact for small n, the second carries what it lacks
         pi2 = 2 * context.pi

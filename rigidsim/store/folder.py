@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ from typing import Any
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store import netcdf, segments
+
+_REOPENED = ".segments.reopened"
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,11 @@ class RunFolder:
         """What an unfinished run has saved."""
         return self.path / "segments"
 
+    @property
+    def set_aside(self) -> Path:
+        """Segments that didn't belong, out of the way."""
+        return self.path / "set_aside"
+
     def create(self, *, force: bool) -> None:
         """Make the folder ready for a new run.
 
@@ -63,8 +71,9 @@ class RunFolder:
             RunFolderError: it holds a run and ``force`` is false, or something that is no run, or it can't
                 be written.
         """
-        ours = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
-        ours.append(self.segments)
+        files = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
+        folders = [self.segments, self.set_aside]
+        ours = files + folders
         try:
             if self.path.exists() and not self.path.is_dir():
                 raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
@@ -83,10 +92,13 @@ class RunFolder:
                 raise RunFolderError(
                     f"{self.path}: holds {what}; --force replaces it, --out DIR puts this one elsewhere"
                 )
-            segments.remove(self.segments)
-            for path in ours[:-1]:
+            self.remove_torn()
+            for path in files:  # the segments last: as long as they are there, the run isn't finished
                 path.unlink(missing_ok=True)
+            for path in folders:
+                segments.remove(path)
             self.path.mkdir(parents=True, exist_ok=True)
+            netcdf.sync_folder(self.path.parent)
         except OSError as error:
             raise RunFolderError(
                 f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
@@ -116,15 +128,43 @@ class RunFolder:
                     f"{self.path}: another process is at work there; wait for it, or choose another --out or "
                     "name"
                 ) from None
-            yield
+            try:
+                yield
+            except OSError as error:
+                raise RunFolderError(
+                    f"{self.path}: can't be read or written: {error.filename or 'a file'}: "
+                    f"{error.strerror or error}; what was saved stays, and rigidsim resume goes on from there"
+                ) from error
         finally:
             os.close(descriptor)
 
     def remove_torn(self) -> None:
-        """Delete what a killed process was writing when it died."""
+        """Delete what a killed process was writing, or deleting, when it died."""
         for folder in (self.path, self.segments):
-            for path in folder.glob(".*.partial"):
-                path.unlink(missing_ok=True)
+            for pattern in (".*.partial", ".timeline.rrd.*.part"):
+                for path in folder.glob(pattern):
+                    path.unlink(missing_ok=True)
+        for name in (segments.REMOVED, _REOPENED):
+            if (self.path / name).is_dir() and not (self.path / name).is_symlink():
+                shutil.rmtree(self.path / name)
+
+    def reopen(self) -> None:
+        """Make a finished run unfinished: its dataset becomes the first segment, its checkpoint the second.
+
+        In one step for whoever looks, and for a crash: before it the run is finished, after it it isn't.
+        """
+        prepared = self.path / _REOPENED
+        prepared.mkdir()
+        try:
+            os.link(self.dataset, prepared / "00000000.h5")
+        except OSError:  # a file system without hard links
+            with netcdf.atomic(prepared / "00000000.h5") as temporary:
+                shutil.copyfile(self.dataset, temporary)
+        netcdf.write_bytes(prepared / "00000001.h5", self.checkpoint.read_bytes())
+        prepared.replace(self.segments)
+        netcdf.sync_folder(self.path)
+        for path in (self.summary, self.timeline, self.dataset, self.checkpoint):
+            path.unlink(missing_ok=True)
 
     def write_summary(self, summary: dict[str, Any]) -> None:
         """Write ``summary.json`` atomically."""

@@ -7,6 +7,7 @@ something else, or by a version that didn't seal yet.
 from __future__ import annotations
 
 import hashlib
+import stat
 from pathlib import Path
 
 from rigidsim.errors import RunFolderError
@@ -25,12 +26,32 @@ def seal_of(content: bytes) -> str:
     return content[-65:-1].decode()
 
 
-def seal(path: Path) -> None:
-    """Append the seal of a file."""
+def seal(path: Path) -> tuple[str, str]:
+    """Append the seal of a file; returns the digest of its content, and that of the sealed file."""
     with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        running = hashlib.file_digest(file, "sha256")
+    digest = running.hexdigest()
+    mark = _MARK + digest.encode() + b"\n"
     with path.open("ab") as file:
-        file.write(_MARK + digest.encode() + b"\n")
+        file.write(mark)
+    running.update(mark)
+    return digest, running.hexdigest()
+
+
+def refuse_special(path: Path) -> None:
+    """Only plain files are read: a link shows another file's content, a pipe never ends.
+
+    Raises:
+        RunFolderError: it is something else, or isn't there.
+    """
+    try:
+        mode = path.lstat().st_mode
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
+    if stat.S_ISLNK(mode):
+        raise RunFolderError(f"{path}: is a symbolic link, which no run writes; remove it")
+    if not stat.S_ISREG(mode):
+        raise RunFolderError(f"{path}: is no file, but a folder, pipe or device; remove it")
 
 
 def read_seal(path: Path) -> str | None:
@@ -55,7 +76,7 @@ def check_seal(path: Path) -> str:
         RunFolderError: no seal (torn or foreign), or another content than was sealed (damaged, edited).
     """
     try:
-        claimed = read_seal(path)
+        claimed = read_seal(path) if path.is_file() else None
         if claimed is None:
             raise RunFolderError(f"{path}: is torn or foreign: its end holds no seal of rigidsim")
         found = hashlib.sha256()

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,13 @@ import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store import netcdf
-from rigidsim.store.seal import check_seal, seal, seal_of, sealed
+from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
 from rigidsim.store.variables import Extra, Variable
 
 SEGMENT_BYTES = 32_000_000
 SEGMENT_SECONDS = 30.0
+REMOVED = ".segments.removed"
+"""Where segments go before they are deleted."""
 _CHUNKS_AT_ONCE = 16
 Arrays = Mapping[str, np.ndarray]
 
@@ -54,6 +56,10 @@ class Chain:
 class SegmentWriter:
     """Collects blocks and writes them as segments.
 
+    Attributes:
+        saved_rows, count: rows in segments, and the number of those.
+        dataset_sha256: of the complete dataset's file, once there is one.
+
     Args:
         folder: ``segments/`` of a run folder; created.
         variables: of the dataset, time first.
@@ -79,7 +85,10 @@ class SegmentWriter:
         self._seal = chain.seal
         self.saved_rows = chain.rows
         self.count = len(chain.paths)
-        folder.mkdir(parents=True, exist_ok=True)
+        self.dataset_sha256 = ""
+        with self._writing():
+            folder.mkdir(parents=True, exist_ok=True)
+            netcdf.sync_folder(folder.parent)
 
     def add(self, block: netcdf.Block) -> None:
         """Take a block of samples."""
@@ -152,13 +161,16 @@ class SegmentWriter:
         extras: Sequence[Extra] = (),
         *,
         checkpoint: tuple[Path, Arrays, Arrays] | None = None,
+        conclude: Callable[[], None] = lambda: None,
     ) -> int:
         """Stream all segments, and what is still in memory, into one compressed, sealed dataset.
 
-        The dataset appears atomically; then the segments go. Returns its rows.
+        The dataset appears atomically; the segments go last of all, in one step: as long as they are there,
+        a run that was killed in between is known to be unfinished, and is completed again. Returns its rows.
 
         Args:
             checkpoint: where to leave a last checkpoint, and all events: a later end can go on from it.
+            conclude: writes what else belongs to a complete run; called before the segments go.
 
         Raises:
             RunFolderError: a segment is missing, or the disk is full or fails; the segments stay.
@@ -176,12 +188,13 @@ class SegmentWriter:
                 if self._blocks:
                     netcdf.fill(file, self._variables, self._collected(), first, self._rows)
                 netcdf.add_extras(file, extras)
-            seal(temporary)
-        if checkpoint is not None:
-            path, last, events = checkpoint
-            place = {"segment": 1, "first_sample": rows, "previous_seal": check_seal(target)}
-            with self._writing():
+            content_seal, self.dataset_sha256 = seal(temporary)
+        with self._writing():
+            if checkpoint is not None:
+                path, last, events = checkpoint
+                place = {"segment": 1, "first_sample": rows, "previous_seal": content_seal}
                 netcdf.write_bytes(path, self._image({}, 0, last, events, place))
+            conclude()
         remove(self._folder)
         return rows
 
@@ -206,6 +219,7 @@ def read_chain(folder: Path) -> Chain:
     rows = 0
     for number, path in enumerate(paths):
         try:
+            refuse_special(path)
             found = check_seal(path)
             labels = root_attributes(path)
             run = run or str(labels.get("run_id", ""))
@@ -250,13 +264,8 @@ def root_attributes(path: Path) -> dict[str, Any]:
                 if not key.startswith("_")
             }
             return {**found, "rows": int(file["time"].shape[0])}
-    except (OSError, KeyError, AttributeError, IndexError) as error:
+    except (OSError, KeyError, AttributeError, IndexError, RuntimeError, ValueError) as error:
         raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
-
-
-def _plain(value: Any) -> Any:
-    """HDF5 keeps a number as an array of one."""
-    return value.item() if isinstance(value, np.generic | np.ndarray) and value.size == 1 else value
 
 
 def _copy(path: Path, file: Any, variables: Sequence[Variable], first: int) -> int:
@@ -275,5 +284,10 @@ def _copy(path: Path, file: Any, variables: Sequence[Variable], first: int) -> i
 
 
 def remove(folder: Path) -> None:
-    """Delete the segments of a run whose dataset is complete."""
-    shutil.rmtree(folder, ignore_errors=True)
+    """Delete the segments of a run whose dataset is complete: all at once for whoever looks."""
+    gone = folder.with_name(REMOVED)
+    shutil.rmtree(gone, ignore_errors=True)
+    with suppress(FileNotFoundError):
+        folder.replace(gone)
+        netcdf.sync_folder(folder.parent)
+    shutil.rmtree(gone, ignore_errors=True)

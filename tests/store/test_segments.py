@@ -17,7 +17,7 @@ from rigidsim.errors import RunFolderError
 from rigidsim.solve import advance, harvest
 from rigidsim.store import netcdf, segments
 from rigidsim.store.segments import SegmentWriter, read_chain, segment_paths
-from rigidsim.store.variables import Variable, time_variable
+from rigidsim.store.variables import SCHEMA_VERSION, Variable, time_variable
 
 VARIABLES = [
     time_variable(2),
@@ -41,7 +41,7 @@ def block(first: int, rows: int) -> dict[str, list[np.ndarray]]:
 
 
 def writer(folder: Path) -> SegmentWriter:
-    return SegmentWriter(folder, VARIABLES, {"title": "t", "status": "running", "run_id": "r"})
+    return SegmentWriter(folder, VARIABLES, {"title": "t", "status": "running", "run_id": "r", "schema_version": SCHEMA_VERSION})
 
 
 def names(folder: Path) -> list[str]:

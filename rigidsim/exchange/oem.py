@@ -1,0 +1,57 @@
+"""CCSDS Orbit Ephemeris Message (502.0-B, version 2.0, KVN): position and velocity of the centre of mass."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rigidsim.exchange import ccsds
+from rigidsim.exchange.tables import Table
+
+_KILO = -3  # metres to kilometres, exactly, as a shift of the decimal point
+
+
+def write_oem(table: Table, path: Path, *, naming: ccsds.Naming, title: str, bits: int) -> None:
+    """Write the flight of one run, km and km/s.
+
+    Args:
+        table: along time.
+        path: the file; replaced.
+        naming: epoch, object, frame and centre.
+        title: of the run.
+        bits: of the run's precision.
+
+    Raises:
+        RigidsimError: no position and velocity were recorded, or something that the standard can't express.
+    """
+    state = [
+        *ccsds.columns_of(table, "position", "XYZ", "OEM"),
+        *ccsds.columns_of(table, "velocity", "XYZ", "OEM"),
+    ]
+    tags = ccsds.Tags(naming.epoch)
+    start, stop = ccsds.span(table, tags, bits)
+    lines = [
+        "CCSDS_OEM_VERS = 2.0",
+        *ccsds.comments(
+            [
+                f"rigidsim run {title}, numbers rounded to the 16 digits that the standard allows",
+                f"{naming.epoch} {ccsds.TIME_SYSTEM} is time zero of the scene",
+                f"{naming.frame} stands for the space axes X Y Z of the scene, {naming.center} for its origin",
+            ]
+        ),
+        f"CREATION_DATE = {ccsds.created()}",
+        "ORIGINATOR = RIGIDSIM",
+        "",
+        "META_START",
+        ccsds.keyword("OBJECT_NAME", naming.object_name or title),
+        ccsds.keyword("OBJECT_ID", naming.object_id),
+        ccsds.keyword("CENTER_NAME", naming.center),
+        ccsds.keyword("REF_FRAME", naming.frame),
+        f"TIME_SYSTEM = {ccsds.TIME_SYSTEM}",
+        f"START_TIME = {start}",
+        f"STOP_TIME = {stop}",
+        "META_STOP",
+        "",
+    ]
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.write("\n".join(lines) + "\n")
+        file.writelines(line + "\n" for line in ccsds.data_lines(table, state, tags, bits, _KILO))

@@ -1,0 +1,219 @@
+"""Changes of chart: a run in Euler angles goes on in a partner sequence where its own comes near its end.
+
+The chart is changed at the first natural step boundary where its singular factor is below ``NEAR``: a
+function of the state alone, so that bits don't depend on how a run is driven. The other chart's factor is at
+least sqrt(1 - NEAR^2) there (see ``rigidsim.model.charts``), far from a change back.
+
+What is recorded stays in the asked sequence: in the partner chart the asked angles are followed from natural
+step to natural step (where they swing fast: in parts of steps), and each sample is joined to what was found
+before it. Their middle angle keeps to its branch, as an integration in the asked sequence would, so that the
+outer angles swing by half a turn where the motion passes the singularity. A pass nearer than some 1e-7 rad,
+whose swing no sampling shows, is taken straight through: the outer angles go on and the middle one past its
+end. In the singularity itself, where the outer angles' sum or difference is all that is defined, the first
+keeps the value it had.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import heyoka as hy
+import mpmath
+import numpy as np
+
+from rigidsim.model.charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
+from rigidsim.model.system import System
+from rigidsim.scene.attitude import quaternion_from_euler
+from rigidsim.solve.precision import Precision
+from rigidsim.solve.winding import ANGLES, CHART, TURNS
+
+NEAR = 0.5
+"""Singular factor from which a chart is left."""
+
+UNIT = 2.0**-28
+"""rad; asked angles are remembered in whole multiples of it, up to 3e10 rad, to be joined to by full turns."""
+
+_SWING = math.pi / 2  # of the outer angles within a step, from which it is looked at in parts
+_HALVINGS = 10  # of a step at most; what remains is a straight line but for 1e-4 of its length
+_STRAIGHT = math.pi - 2.0**-7  # swing in such a part from which it went straight through
+_NEAR_POLE = 2.0**-20  # singular factor below which a reference doesn't tell its branch
+_TURN = 2 * math.pi
+
+Angles = tuple[float, float, float]
+
+
+class Lift:
+    """Joins the asked sequence's angles in the partner chart to the ones before."""
+
+    def __init__(self, sequence: str, precision: Precision) -> None:
+        self._sequence, self._partner = sequence, partner_sequence(sequence)
+        self._proper = is_proper(sequence)
+        self._pole = 4 * float(precision.epsilon)
+
+    def branch(self, middle: float) -> float:
+        """+1 or -1: which of the two triples a middle angle belongs to."""
+        return math.copysign(1.0, singular_factor(self._sequence, middle, math))
+
+    def __call__(self, before: Angles, angles: Angles) -> tuple[Angles, int, float]:
+        """The asked angles next to some shortly before.
+
+        Args:
+            before: asked angles, continuous.
+            angles: of the partner sequence.
+
+        Returns:
+            The asked angles; +1 or -1 within rounding of their singularity (else 0): whether the sum or the
+            difference of the outer ones is all that is known; and how far the first one swung, were the
+            middle one to stay on its branch.
+        """
+        first, middle, last = across(self._partner, list(angles), math)
+        side = pole_of_partner(self._partner, list(angles), math)
+        sign = 1 if side >= 0 else -1
+        factor = abs(singular_factor(self._sequence, middle, math))
+        branch = self.branch(before[1])
+        swing = math.remainder(first + (0.0 if branch > 0 else math.pi) - before[0], _TURN)
+        seen = abs(swing)
+        if factor < self._pole:
+            swing = seen = 0.0
+        else:
+            lost = abs(singular_factor(self._sequence, before[1], math)) < _NEAR_POLE
+            if seen > (math.pi / 2 if lost else _STRAIGHT):
+                branch = -branch
+                swing -= math.copysign(math.pi, swing)
+        if branch < 0:
+            middle = -middle if self._proper else math.pi - middle
+        # the sum (difference) is regular near this pole, and half a turn of both changes it by full turns
+        common = math.remainder(first + sign * last - before[0] - sign * before[2], _TURN)
+        joined = (
+            before[0] + swing,
+            before[1] + math.remainder(middle - before[1], _TURN),
+            before[2] + sign * (common - swing),
+        )
+        return joined, sign if factor < self._pole else 0, seen
+
+
+class Charts:
+    """The chart that a run is in, and the way from one to the other.
+
+    Called by the engine after each natural step; what it remembers stands in ``turns`` (see
+    ``rigidsim.solve.winding``) and ``changes``, arrays of whole numbers that checkpoints carry.
+
+    Attributes:
+        changes: shape (1,), changes of chart so far.
+    """
+
+    def __init__(self, asked: System, partner: System, precision: Precision, turns: np.ndarray) -> None:
+        self._sequences = asked.sequence, partner.sequence
+        self._positions = list(asked.angle_states)
+        self._middle = self._positions[1]
+        self._precision = precision
+        self._half = precision.number(mpmath.mpf(0.5))
+        self._lift = Lift(asked.sequence, precision)
+        self._turns = turns
+        self.changes = np.zeros(1, dtype=np.int64)
+        self._passed: list[tuple[Any, np.ndarray]] = []
+        self._conversions = [self._compile(sequence) for sequence in self._sequences]
+
+    def _compile(self, sequence: str) -> Any:
+        angles, branch = list(hy.make_vars("phi", "theta", "psi")), hy.make_vars("branch")
+        precision = self._precision
+        return hy.cfunc(
+            across(sequence, angles, hy, branch),
+            [*angles, branch],
+            compact_mode=precision.compact,
+            **precision.options,
+        )
+
+    @property
+    def chart(self) -> int:
+        """0 in the asked sequence, 1 in its partner."""
+        return int(self._turns[CHART])
+
+    def near(self, state: np.ndarray) -> bool:
+        """Whether the chart in use is to be left here."""
+        return abs(singular_factor(self._sequences[self.chart], float(state[self._middle]), math)) < NEAR
+
+    # --- following the asked angles ---------------------------------------------------------------------
+
+    def begin(self, time: Any) -> None:
+        """Steps follow; the latest ones' boundaries may be forgotten."""
+        self._passed = [(time, self._turns[ANGLES].copy())]
+
+    def __call__(self, integrator: Any) -> bool:
+        """After a natural step: follow it; False where the chart is to be left."""
+        state = integrator.state
+        if self.chart:
+            self._follow(integrator, integrator.time, state, _HALVINGS)
+        return not self.near(state)
+
+    def _follow(self, integrator: Any, time: Any, state: np.ndarray, halvings: int) -> None:
+        """The asked angles from the latest known up to a state within the latest step."""
+        joined, _, swing = self._lift(angles_before(self._turns), self._angles(state))
+        if swing > _SWING and halvings:
+            before = self._passed[-1][0]
+            middle = before + self._half * (time - before)
+            between = np.array(integrator.update_d_output(middle))
+            self._follow(integrator, middle, between, halvings - 1)
+            self._follow(integrator, time, state, halvings - 1)
+            return
+        self._turns[ANGLES] = _in_units(joined)
+        self._passed.append((time, self._turns[ANGLES].copy()))
+
+    def _angles(self, state: np.ndarray) -> Angles:
+        a, b, c = (float(state[p]) for p in self._positions)
+        return a, b, c
+
+    def rows(self, times: np.ndarray) -> np.ndarray:
+        """What each sample within the steps since ``begin`` is joined to: as ``turns``, shape (n, 7)."""
+        rows = np.tile(self._turns, (len(times), 1))
+        if self.chart:
+            boundary = np.zeros(len(times), dtype=np.int64)
+            for time, _ in self._passed[1:]:
+                boundary += np.asarray(times > time, dtype=bool)
+            rows[:, ANGLES] = np.array([angles for _, angles in self._passed])[boundary]
+        return rows
+
+    # --- changing ---------------------------------------------------------------------------------------
+
+    def change(self, state: np.ndarray) -> np.ndarray:
+        """Enter the other chart; returns the same state there, and counts."""
+        angles, turns = self._angles(state), self._turns[TURNS]
+        sign = self._quaternion(angles)
+        if self.chart:
+            before = angles_before(self._turns)
+            branch = self._lift.branch(before[1])
+        else:
+            before = tuple(a + _TURN * int(n) for a, n in zip(angles, turns, strict=True))  # type: ignore[assignment]
+            branch = 1.0
+        scalars = self._precision.zeros((4,))
+        scalars[:3] = state[self._positions]
+        scalars[3] = self._precision.number(mpmath.mpf(branch))
+        result = np.array(state)
+        result[self._positions] = self._conversions[self.chart](scalars)
+        angles = self._angles(result)
+        self._turns[CHART] = 1 - self.chart
+        if self.chart:
+            turns[:] = 0
+            self._turns[ANGLES] = _in_units(before)
+        else:
+            turns[:] = [round((b - a) / _TURN) for a, b in zip(angles, before, strict=True)]
+            self._turns[ANGLES] = 0
+        if float(np.dot(sign, self._quaternion(angles))) < 0:  # a full turn changes the quaternion's sign
+            turns[2] += 1
+        self.changes += 1
+        return result
+
+    def _quaternion(self, angles: Angles) -> np.ndarray:
+        sign = -1.0 if self._turns[TURNS].sum() % 2 else 1.0
+        return sign * np.array(quaternion_from_euler(mpmath.fp, list(angles), self._sequences[self.chart]))
+
+
+def angles_before(row: np.ndarray) -> Angles:
+    """The asked angles that a row of ``turns`` remembers, rad."""
+    a, b, c = (UNIT * int(n) for n in row[ANGLES])
+    return a, b, c
+
+
+def _in_units(angles: Angles) -> np.ndarray:
+    return np.array([round(a / UNIT) for a in angles], dtype=np.int64)

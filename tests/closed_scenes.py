@@ -1,0 +1,174 @@
+"""What the tests of the closed forms share: scenes, random bodies and starts, integrations as a measure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath
+import numpy as np
+from hypothesis import strategies as st
+
+import rigidsim
+from rigidsim.prepare import Prepared, prepare
+from rigidsim.solve.closed import ClosedForm, closed_form_of
+from rigidsim.solve.stepper import Stepper
+
+DOWN = [0, 0, -1]
+UNIT_ROUNDOFF = 2.0**-53
+# A state is some thirty operations on numbers up to 1, none of which is amplified, and numpy's sines are
+# right to 4 ulp.
+DOUBLE = 100 * UNIT_ROUNDOFF
+
+
+def scene(
+    body: str,
+    rates: Any,
+    *,
+    quaternion: Any = (1, 0, 0, 0),
+    gravity: Any = None,
+    precision: Any = "double",
+    end: Any = 10,
+    more: str = "",
+) -> Prepared:
+    """A config of a body (lines of ``[body]``), prepared; three samples."""
+    loads = f'[[loads]]\nkind = "uniform_gravity"\nacceleration = {written(gravity)}' if gravity else ""
+    setting = precision if isinstance(precision, int) else f'"{precision}"'
+    return prepare(
+        rigidsim.parse(
+            f'name = "x"\n[body]\n{body}\n[initial]\nangular_velocity = {written(rates)}\n'
+            f"quaternion = {written(quaternion)}\n{more}\n{loads}\n[time]\nend = {end}\nsamples = 3\n"
+            f"[integrator]\nprecision = {setting}\n"
+        )
+    )
+
+
+def written(numbers: Any) -> str:
+    """As a TOML array, exactly: floats by their shortest digits, strings as they are."""
+    return "[" + ", ".join(f'"{x}"' if isinstance(x, str) else repr(x) for x in numbers) + "]"
+
+
+def principal(moments: Any) -> str:
+    """A body by its principal moments."""
+    return f"principal_moments = {written(moments)}"
+
+
+def top(across: Any, along: Any, height: Any = 1) -> str:
+    """A symmetric body of unit mass on a fixed point ``height`` below its centre of mass."""
+    return f"{principal([across, across, along])}\nmass = 1\ncenter_of_mass = {written([0, 0, height])}"
+
+
+def scene_over(units: float, **given: Any) -> Prepared:
+    """A scene that lasts some internal units of time, in which the fastest rate is between 1/2 and 1."""
+    return scene(**given, end=repr(units * 2.0 ** scene(**given).system.scaling.time))
+
+
+def closed(prepared: Prepared) -> ClosedForm:
+    """Its closed form, which must exist."""
+    form = closed_form_of(prepared.scene)
+    assert not isinstance(form, str), form
+    return form
+
+
+def against_integration(prepared: Prepared) -> float:
+    """Largest difference of any state at the last sample, in internal units (rates and quaternion O(1))."""
+    clock = prepared.clock
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, clock.at(0))
+    assert stepper.to(clock.at(2))
+    times = clock.internal(0, 3)
+    states = closed(prepared).states(prepared.system, prepared.precision, times, clock.at(0))
+    return max(float(abs(a - b)) for a, b in zip(states[2], np.array(stepper.state), strict=True))
+
+
+def attitude_error(exact: list[Any], quaternion: Any) -> float:
+    """Angle between an attitude in mpmath and a double one with the same sign, rad."""
+    return 2 * float(mpmath.sqrt(sum((a - float(b)) ** 2 for a, b in zip(exact, quaternion, strict=True))))
+
+
+def differ(a: list[Any], b: list[Any]) -> float:
+    """Largest difference of two vectors."""
+    return max(float(abs(x - y)) for x, y in zip(a, b, strict=True))
+
+
+@st.composite
+def bodies(draw: st.DrawFn) -> list[float]:
+    """Principal moments of any body: rods, plates, near-symmetric and spherical ones among them."""
+    small = st.one_of(st.floats(1e-3, 1), st.integers(-15, -1).map(lambda n: 10.0**n))
+    a, b = 1.0, draw(small)
+    lowest, highest = abs(a - b), a + b
+    share = draw(st.one_of(st.floats(0, 1), small, small.map(lambda x: 1 - x)))
+    c = min(max(lowest + share * (highest - lowest), 1e-15), highest)
+    return list(draw(st.permutations([a, b, c])))
+
+
+def vectors(count: int) -> st.SearchStrategy[list[float]]:
+    """Components of very different size among them, not all zero."""
+    component = st.one_of(
+        st.floats(-1, 1), st.integers(-15, 0).map(lambda n: 10.0**n), st.just(0.0), st.just(1.0)
+    )
+    return st.lists(component, min_size=count, max_size=count).filter(lambda v: max(abs(x) for x in v) > 1e-3)
+
+
+TILTED = (4, 3, 2, 1)
+LEVEL = (1, 1, 0, 0)
+
+
+def _free(moments: Any, rates: Any, quaternion: Any = TILTED) -> dict[str, Any]:
+    return {"body": principal(moments), "rates": rates, "quaternion": quaternion}
+
+
+def _heavy(body: str, rates: Any, quaternion: Any = TILTED) -> dict[str, Any]:
+    return {"body": body, "rates": rates, "quaternion": quaternion, "gravity": DOWN}
+
+
+def _near(digits: int) -> dict[str, dict[str, Any]]:
+    """Scenes 10^-digits away from something singular."""
+    d, one, upright = 10.0**-digits, 10**digits, (1, 0, 0, 0)
+    more, less = f"{one + 1}/{one}", f"{one - 1}/{one}"
+    return {
+        "outside the separatrix": _free([3, 6, 8], [4, 10, f"{3 * one + 1}/{one}"]),
+        "inside the separatrix": _free([3, 6, 8], [4, 10, f"{3 * one - 1}/{one}"]),
+        "about the middle axis": _free([3, 6, 8], [d, 1, d]),
+        "about the largest axis": _free([3, 6, 8], [d, 2 * d, 1]),
+        "about the smallest axis": _free([3, 6, 8], [-1, d, 2 * d]),
+        "nearly symmetric, oblate": _free([1, more, 2], [0.5, 1, -0.3]),
+        "nearly symmetric, prolate": _free([0.5, 1, more], [d, 1, 0.3]),
+        "nearly a sphere": _free([1, more, f"{one + 3}/{one}"], [0.5, 1, 0.3]),
+        "rod in a spin": _free([d, 1, more], [1 / d, 1, 0.1]),
+        "rod across": _free([d, 1, f"{2 * one + 1}/{2 * one}"], [0.5, 1, 0.3]),
+        "upright, unstable": _heavy(top(1, 0.5), [d, 0, 1], upright),
+        "upright, stable": _heavy(top(1, 0.5), [d, 0, 5], upright),
+        "pendulum short of the top": _heavy(top(1, 0.5, -1), [2, 0, d], upright),
+        "pendulum over the top": _heavy(top(1, 0.5, f"-{less}"), [2, 0, 0], upright),
+        "hanging": _heavy(top(1, 0.5, -1), [d, d, 1], upright),
+        "regular precession": _heavy(top(1, 0.5), [d, 1, 2], LEVEL),
+        "weak gravity": _heavy(top(1, 0.5, d), [0.1, 0.8, 3]),
+        "rod as a top": _heavy(top(1, d), [0.1, 0.8, 1 / d]),
+    }
+
+
+LIMITS: dict[str, dict[str, Any]] = {
+    "on the separatrix": _free([3, 6, 8], [4, 10, 3]),
+    "on the separatrix, rounded": _free([3, 6, 8], [0.4, -1, -0.3]),
+    "plate": _free([1, 2, 3], [0.3, 1, 0.2]),
+    "sphere": _free([2, 2, 2], [0.3, 1, 0.2]),
+    "rod": _free([2, 0, 2], [0.3, 0, 0.2]),
+    "symmetric": _free([2, 1, 2], [0.3, -1, 0.2]),
+    "spin": _free([1, 2, 3], [0, 1, 0]),
+    "at rest": _free([1, 2, 3], [0, 0, 0]),
+    "double root": _heavy(top(1, 0.5), [0, 1, 2], LEVEL),
+    "released from rest": _heavy(top(1, 0.5), [0, 0, 0]),
+    "cusps": _heavy(top(1, 0.5), [0, 0, 3]),
+    "pendulum to the top": _heavy(top(1, 0.5, -1), [2, 0, 0], (1, 0, 0, 0)),
+    "asleep": _heavy(top(1, 0.5), [0, 0, -1], (1, 0, 0, 0)),
+    "rod on a point": _heavy(top(2, 0), [0.3, 1, 0]),
+    "sphere off its centre": {
+        "body": f"{principal([1, 1, 1])}\nmass = 1\ncenter_of_mass = [0.2, 0.3, 0.5]",
+        "rates": [0.3, 0.2, -1],
+        "quaternion": TILTED,
+        "gravity": [0.3, -0.2, -1],
+    },
+}
+EXTREMES = LIMITS | {
+    f"{name}, 1e-{digits}": keys for digits in (3, 8, 12, 15) for name, keys in _near(digits).items()
+}
+"""Scenes by name, as arguments of ``scene``."""
