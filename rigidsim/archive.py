@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store import segments
+from rigidsim.store import provenance, segments
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.joined import join_segments
 from rigidsim.store.opening import open_dataset
-from rigidsim.store.seal import check_seal, read_seal
+from rigidsim.store.seal import check_whole, read_seal
 from rigidsim.store.variables import SCHEMA_VERSION
 
 if TYPE_CHECKING:
@@ -56,24 +56,31 @@ class Run:
             RunFolderError: nothing was saved, or a file is damaged.
         """
         if self.folder.dataset.exists():
-            return open_dataset(_whole(self.folder.dataset), indexed=indexed)
+            # a run that is completed once more after a crash still has the summary of the first time, or none
+            expected = None if self.folder.segments.exists() else self.summary.get("dataset_sha256")
+            return open_dataset(_whole(self.folder.dataset, expected), indexed=indexed)
         chain = segments.read_chain(self.folder.segments)
         if chain.damage is not None:
             raise RunFolderError(f"{chain.damage}; rigidsim resume sets it aside and goes on before it")
         if not chain.paths:
-            raise RunFolderError(f"{self.folder.path}: nothing was saved")
+            lost = "dataset_sha256" in self.summary
+            what = "its dataset.h5 is missing; run it again with --force" if lost else "nothing was saved"
+            raise RunFolderError(f"{self.folder.path}: {what}")
         return join_segments(chain.paths, status=self.status, indexed=indexed)
 
 
-def _whole(path: Path) -> Path:
+def _whole(path: Path, expected: str | None) -> Path:
     """A dataset's path, after its seal was checked; datasets of the first schema version had none.
 
+    Args:
+        expected: SHA-256 of the file, where the summary beside it tells.
+
     Raises:
-        RunFolderError: damaged, edited, or of a version that is newer than this rigidsim.
+        RunFolderError: damaged, edited, exchanged, or of a version that is newer than this rigidsim.
     """
-    if read_seal(path) is not None:
-        check_seal(path)
-    version = segments.root_attributes(path).get("schema_version")
+    digest = check_whole(path)[1] if read_seal(path) is not None else provenance.file_sha256(path)
+    labels = segments.root_attributes(path)
+    version = labels.get("schema_version")
     if not isinstance(version, int) or version > SCHEMA_VERSION:
         raise RunFolderError(
             f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
@@ -81,6 +88,10 @@ def _whole(path: Path) -> Path:
         )
     if version > 1 and read_seal(path) is None:
         raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
+    if "segment" in labels:
+        raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
+    if expected not in (None, digest):
+        raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
     return path
 
 

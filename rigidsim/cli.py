@@ -275,6 +275,84 @@ def plot(
 
 @app.command()
 @_user_errors
+def tradeoff(
+    config: ConfigPath,
+    overrides: SetOption = None,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")] = Path(
+        "runs"
+    ),
+    budget: Annotated[
+        float, typer.Option("--budget", metavar="SECONDS", help="Time that it may take, roughly.")
+    ] = 90.0,
+    repeats: Annotated[
+        int, typer.Option("--repeats", metavar="N", help="Fresh processes in which speeds are taken.")
+    ] = 3,
+    full: Annotated[
+        bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier measurement.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure speed against accuracy of a scene: what to use for which accuracy. Dataset and figure in
+    NAME_tradeoff.
+
+    Example: rigidsim tradeoff configs/asymmetric_top.toml
+    """
+    from rigidsim import report
+    from rigidsim.scene.reading import load
+    from rigidsim.tradeoff import tradeoff as measure
+
+    experiment = load(config, overrides=overrides or [])
+
+    def told(text: str) -> None:
+        print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
+
+    result = measure(
+        experiment, out=out, budget=budget, repeats=repeats, full=full, force=force, told=told
+    ).as_dict()
+    if as_json:
+        print(json.dumps(result))
+    else:
+        report.print_tradeoff(result)
+
+
+@app.command()
+@_user_errors
+def export(
+    run_path: RunPath,
+    file_format: Annotated[
+        str, typer.Option("--format", metavar="FORMAT", help="csv, parquet, zarr, aem or oem.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="PATH", help="Default NAME.FORMAT in this folder.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
+    epoch: Annotated[
+        str | None, typer.Option("--epoch", metavar="TIME", help="Of time zero, for aem and oem (TT).")
+    ] = None,
+    object_name: Annotated[
+        str | None, typer.Option("--object-name", metavar="NAME", help="For aem and oem.")
+    ] = None,
+    frame: Annotated[
+        str | None, typer.Option("--frame", metavar="NAME", help="Of the space axes, for aem and oem.")
+    ] = None,
+) -> None:
+    """Write a run for other tools: tables with every digit, or CCSDS attitude and orbit messages.
+
+    Example: rigidsim export runs/intermediate_axis --format csv
+    """
+    from rigidsim.archive import open_run
+    from rigidsim.exchange.ccsds import Naming
+    from rigidsim.export import export as write
+
+    given = {"epoch": epoch, "object_name": object_name, "frame": frame}
+    naming = Naming(**{key: value for key, value in given.items() if value is not None})
+    for path in write(open_run(run_path), file_format, out, force=force, naming=naming):
+        print(path)
+
+
+@app.command()
+@_user_errors
 def schema() -> None:
     """Print the config's JSON schema, for editors.
 

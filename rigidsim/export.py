@@ -18,8 +18,7 @@ from rigidsim.exchange.oem import write_oem
 from rigidsim.exchange.parquet import write_parquet
 from rigidsim.exchange.tables import Table, tables_of
 from rigidsim.exchange.zarr import write_zarr
-from rigidsim.store import netcdf, segments
-from rigidsim.store.opening import open_dataset
+from rigidsim.store import netcdf
 
 if TYPE_CHECKING:
     import xarray
@@ -65,7 +64,8 @@ def export(
     name = run.folder.path.resolve().name
     target = Path(f"{name}.{file_format}") if out is None else Path(out)
     with ExitStack() as stack:
-        pieces = [stack.enter_context(piece) for piece in _pieces(run)]
+        # sample times are not loaded as an index
+        pieces = [stack.enter_context(run.opened(indexed=False))]
         tables = tables_of(pieces)
         bits = _bits(pieces[0])
         kept = tables if file_format in ("csv", "parquet") else tables[:1]
@@ -85,16 +85,6 @@ def export(
                     write = write_aem if file_format == "aem" else write_oem
                     write(table, temporary, naming=naming or Naming(), title=name, bits=bits)
     return targets
-
-
-def _pieces(run: Run) -> list[xarray.Dataset]:
-    """The dataset, or what an unfinished run has saved, without loading the sample times as an index."""
-    if run.folder.dataset.exists():
-        return [open_dataset(run.folder.dataset, indexed=False)]
-    paths = segments.segment_paths(run.folder.segments)
-    if not paths:
-        raise RunFolderError(f"{run.folder.path}: nothing was saved; there is nothing to export")
-    return [open_dataset(path, indexed=False) for path in paths]
 
 
 def _bits(dataset: xarray.Dataset) -> int:
@@ -133,11 +123,7 @@ def _replacing(path: Path) -> Iterator[Path]:
     try:
         if temporary.is_dir():
             shutil.rmtree(temporary)
-        with (
-            netcdf.atomic(path)
-            if not path.suffix == ".zarr" and not path.is_dir()
-            else _folder(path) as place
-        ):
+        with netcdf.atomic(path) if path.suffix != ".zarr" and not path.is_dir() else _folder(path) as place:
             yield place
     except OSError as error:
         raise RigidsimError(f"{path}: can't be written: {error.strerror or error}") from None

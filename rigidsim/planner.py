@@ -82,8 +82,9 @@ def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str
         "closed_form": None if isinstance(closed, str) else closed.title,
         "closed_form_why_not": closed if isinstance(closed, str) else None,
         "hold_invariants": prepared.holds_invariants,
-        "accuracy": None if choice is None else {"chosen": choice.setting.title, "why": choice.why,
-                                                 "forecast": choice.forecast},
+        "accuracy": None
+        if choice is None
+        else {"chosen": choice.setting.title, "why": choice.why, "forecast": choice.forecast},
         "taylor_order": int(stepper.integrator.order),
         "pilot": pilot,
         "predicted": {
@@ -97,10 +98,9 @@ def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str
             if prepared.scene.config.output.timeline
             else 0.0,
             "attitude_error_rad": None
-            if growth is None
-            else round_off_law(prepared.effective_tolerance, int(steps), rate, duration)
-            * growth.at(duration),
-            "amplification": None if growth is None else growth.at(duration),
+            if system.requirements.formulation == "rates"
+            else round_off_law(prepared.law_tolerance, int(steps), rate, duration) * growth.at(duration),
+            "amplification": growth.at(duration),
         },
         "body": {
             "source": prepared.scene.body.source,

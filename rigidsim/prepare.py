@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import heyoka as hy
+import mpmath
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.loads import LoadModel
@@ -52,6 +53,13 @@ class Prepared:
         """What the step control works with."""
         epsilon = float(self.precision.epsilon)
         return epsilon if self.tolerance is None else float(self.tolerance)
+
+    @property
+    def law_tolerance(self) -> float:
+        """What the laws of errors start from: a tolerance below the precision's epsilon makes no error
+        smaller.
+        """
+        return max(self.effective_tolerance, float(self.precision.epsilon))
 
     def variables(self) -> list[Variable]:
         """The dataset's variables, time first, then what is recorded, then each invariant's drift."""
@@ -120,6 +128,7 @@ def prepare_scene(
         step_control = None if isinstance(asked, str) else precision.number(asked.at(scene.context))
         if tolerance is not None:
             step_control = precision.number(scene.context.mpf(tolerance))
+        _check_tolerance(step_control, precision)
         check_start(scene)
         system = build_system(scene, precision.number, loads)
         if loads:
@@ -128,16 +137,44 @@ def prepare_scene(
         if scene.config.integrator.hold_invariants:
             system = held_system(system, precision, loads)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
+        prepared = Prepared(experiment, scene, precision, system, clock, step_control, tuple(loads), closed)
+        if system.requirements.formulation == "canonical":
+            double_twin(prepared)  # its stability is a question of the rates, which it doesn't carry itself
     except ConfigError as error:
         raise error.at(experiment.source) from None
     except OverflowError as error:
-        problem = Problem(
-            "config",
-            f"the scene's numbers span more than {scene.config.integrator.precision} precision can hold "
-            f"({error}); choose a higher precision or check the units",
+        single = scene.config.integrator.precision == "single"
+        what = (
+            f"the scene's numbers span more than single precision can hold ({error}); choose a higher "
+            "precision or check the units"
+            if single
+            else f"the scene's numbers are too large, too small or too far apart ({error}): they and their "
+            "products, such as the energy, may be between about 1e-300 and 1e300; check the units"
         )
+        problem = Problem("config", what)
         raise ConfigError(problem, experiment.source) from None
-    return Prepared(experiment, scene, precision, system, clock, step_control, tuple(loads), closed)
+    return prepared
+
+
+def _check_tolerance(tolerance: Any | None, precision: Precision) -> None:
+    """Refuse what would cost ever higher orders and gain nothing.
+
+    Raises:
+        ConfigError: a tolerance further below the precision's epsilon than that is below 1.
+    """
+    least = precision.epsilon**2
+    if tolerance is not None and precision.exact(tolerance) < least:
+        given, shortest, epsilon = (
+            mpmath.nstr(x, 3) for x in (precision.exact(tolerance), least, precision.epsilon)
+        )
+        raise ConfigError(
+            Problem(
+                "[integrator] tolerance",
+                f"given {given}, but {precision.name} precision rounds each number by about {epsilon}, so that "
+                f'tolerances below that gain nothing; {shortest} or more is allowed: choose "auto", or a '
+                "higher precision for more digits",
+            )
+        )
 
 
 def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | None:
@@ -180,7 +217,9 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     start = precision.number(system.scene.context.ldexp(system.scene.start, -system.scaling.time))
     values = rhs(precision.array(system.initial), time=start)
     lost = [n for n, v in zip(system.states, values, strict=True) if not math.isfinite(float(v))]
-    if lost:
+    if lost and system.partner is not None:  # a chart's own singularity is no fault of a load
+        _refuse_non_finite_start(system.partner, precision)
+    elif lost:
         raise ConfigError(
             Problem(
                 "loads",
@@ -205,13 +244,14 @@ def double_twin(prepared: Prepared) -> System:
     return build_system(plain, precision_of("double").number, prepared.python_loads)
 
 
-def motion_growth(prepared: Prepared) -> Growth | None:
-    """How strongly the motion itself amplifies errors (some 30 ms); None where no attitude is carried.
+def motion_growth(prepared: Prepared) -> Growth:
+    """How strongly the motion itself amplifies errors (some 30 ms).
 
-    Measured in quaternions, whatever the run's formulation: a chart's own singularity is another matter.
+    Measured in quaternions, or in rates where no attitude is carried: a chart's own singularity is another
+    matter. A closed form makes no errors on the way that could grow.
     """
-    if prepared.system.requirements.formulation == "rates":
-        return None
+    if prepared.closed is not None:
+        return Growth(factor=1.0, seconds=0.0, rate=0.0, window=0.0)
     system = double_twin(prepared)
     clock, last = prepared.clock, prepared.clock.count - 1
     return measure_growth(system, precision_of("double"), float(clock.at(0)), float(clock.at(last)))

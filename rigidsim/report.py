@@ -221,3 +221,52 @@ def print_verdict(verdict: dict[str, Any]) -> None:
             out.print(f"    {line}", markup=False)
     elif names:
         out.print("  versions, CPU features and settings are the same, so they don't explain it")
+
+
+def print_tradeoff(result: dict[str, Any]) -> None:
+    """What ``rigidsim tradeoff`` says, from ``Tradeoff.as_dict``."""
+    out = console()
+    out.print(Text.assemble((result["name"], "bold"), "  for this accuracy, use this"))
+    table = _table("attitude error, rad", "cost", "error reached", "keys of \\[integrator]")
+    over = result["measured_seconds"]
+    marked = False
+    for row in result["advice"]:
+        reach = f"<= {row['at_most']:.0e}"
+        if row["more_than"] * 10 < row["at_most"] * 0.5:
+            reach += f" to {row['more_than'] * 10:.0e}"
+        marked = marked or row["less"]
+        star = " *" if row["less"] else ""
+        table.add_row(
+            Text(reach), f"{row['cost']:.3g}", f"{row['error']:.1e}{star}", Text(", ".join(row["keys"]))
+        )
+    out.print(table)
+    if marked:
+        less = next(row["seconds"] for row in result["advice"] if row["less"])
+        out.print(Text(f"  * over the first {duration(less)} only: quadruple precision is slow"))
+    part = over / result["horizon_seconds"]
+    how_much = "all" if part >= 1 else f"the first {100 * part:.2g} %"
+    _line(out, "measured", f"{how_much} of {duration(result['horizon_seconds'])}; nothing is extrapolated")
+    _line(out, "compared", f"{result['compared']}; largest error at up to 38 times")
+    _line(out, "against", result["reference"])
+    _line(
+        out,
+        "cost",
+        f"CPU time of integration over that of double precision in quaternions, {result['processes']} fresh "
+        f"processes, medians; recording not counted",
+    )
+    if result["closed_form"] != "yes":
+        _line(out, "exact", f"no: {result['closed_form'].removeprefix('none: ')}")
+    _not_measured(out, result["settings"])
+    if result["folder"]:
+        _line(out, "folder", result["folder"])
+
+
+def _not_measured(out: Console, settings: list[dict[str, Any]]) -> None:
+    """Settings without numbers, those with the same reason together."""
+    reasons: dict[str, list[str]] = {}
+    for row in settings:
+        if row["reason"]:
+            reasons.setdefault(row["reason"], []).append(row["setting"])
+    for reason, names in reasons.items():
+        many = f"{len(names)} settings, from {names[0]} on" if len(names) > 4 else "; ".join(names)
+        _line(out, "no data", f"{many}: {reason}", "yellow")

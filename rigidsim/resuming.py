@@ -72,6 +72,8 @@ def resume(
                 f"{folder.path}: nothing is left to do: {done.summary.get('message', done.status)}; "
                 "--until goes on to a later end"
             )
+        if not finished and "dataset_sha256" in folder.read_summary() and not folder.segments.exists():
+            raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with --force")
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
         prepared = prepare(experiment, loads=loads)
         if chain.paths:
@@ -151,10 +153,10 @@ def _of_finished(folder: RunFolder) -> Chain:
         RunFolderError: it ended otherwise than at its last sample, or a file is damaged.
     """
     found = root_attributes(folder.dataset)
-    if found.get("status") != "finished" or not folder.checkpoint.exists():
-        raise RunFolderError(
-            f"{folder.path}: can't be prolonged: {found.get('status_message', 'it has no checkpoint')}"
-        )
+    if found.get("status") != "finished":
+        raise RunFolderError(f"{folder.path}: can't be prolonged: {found.get('status_message')}")
+    if not folder.checkpoint.exists():
+        raise RunFolderError(f"{folder.checkpoint}: is missing, so that this run can't be prolonged")
     last = check_seal(folder.dataset)
     check_seal(folder.checkpoint)
     after = root_attributes(folder.checkpoint)

@@ -28,6 +28,7 @@ from rigidsim.solve.lyapunov import LyapunovSpectrum, lyapunov_spectrum
 from rigidsim.solve.status import Status
 from rigidsim.store import netcdf, provenance
 from rigidsim.store.folder import RunFolder
+from rigidsim.store.opening import open_dataset
 from rigidsim.store.segments import Chain, SegmentWriter
 from rigidsim.trial import Setting
 
@@ -119,7 +120,8 @@ class Session:
         clock.next("build")
         self.observer.started(prepared, folder.path)
         self.observer.phase("integrate")
-        guards = Guards(prepared, recorder.watch, interruption, self.observer, steps_before=stepper.steps)
+        before = 0 if resumed is None else resumed.checkpoint.place.mark.steps
+        guards = Guards(prepared, recorder.watch, interruption, self.observer, steps_before=before)
         start = None if resumed is None else resumed.checkpoint
         advance: Advance | Direct
         if prepared.closed is not None:
@@ -229,7 +231,7 @@ class _Completion:
             observer.phase("timeline")
             from rigidsim.look.timeline import write_timeline
 
-            with Run(folder, summary).opened(indexed=False) as dataset:
+            with open_dataset(folder.dataset, indexed=False) as dataset:  # memory goes with the rows shown
                 write_timeline(dataset, folder.timeline, rows=output.timeline_rows)
             clock.next("timeline")
 

@@ -26,6 +26,9 @@ UNCERTAIN = "the attitude is uncertain"
 NEAR_SINGULAR = 1e-3
 """Factor from which Euler angles lose digits to their singularity."""
 
+CLOSED_FORM = 50.0
+"""eps: rounding of a sample from a closed form, thirty operations and sines right to 4 ulp, at any time."""
+
 _STEPS_TO_SINGULARITY = math.e**2  # a Taylor step is e^-2 of the way to it (Jorba & Zou 2005)
 
 
@@ -79,7 +82,7 @@ def invariant_table(
     Args:
         put_back: what was put back of those held, relative like the drifts.
     """
-    bound = DRIFT_FACTOR * prepared.effective_tolerance * math.sqrt(max(steps, 1))
+    bound = DRIFT_FACTOR * prepared.law_tolerance * math.sqrt(max(steps, 1))
     table = {}
     for invariant in prepared.system.invariants:
         values = initial[invariant.name]
@@ -102,7 +105,7 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
     """Reasons not to trust the result; empty for a sound run."""
     found = []
     system = prepared.system
-    bound = DRIFT_FACTOR * prepared.effective_tolerance * math.sqrt(max(progress.steps, 1))
+    bound = DRIFT_FACTOR * prepared.law_tolerance * math.sqrt(max(progress.steps, 1))
     for name, drift in watch.largest.items():
         if not drift <= bound:
             found.append(
@@ -110,8 +113,7 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
                 "rounding alone explains; choose a tighter tolerance, a higher precision or another "
                 "formulation"
             )
-    shortest = math.ldexp(progress.smallest_step, system.scaling.time)
-    passed = shortest * float(system.rate_bound) * _STEPS_TO_SINGULARITY
+    passed = _passed(prepared, progress)
     if watch.nearest_singularity < NEAR_SINGULAR:
         found.append(
             f"the Euler angles came near the singularity of {system.sequence} (factor "
@@ -130,8 +132,15 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
             "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] "
             "reference or center_of_mass for a top, or [initial] position for free flight"
         )
-    estimate = attitude_error(prepared, progress, growth)
-    if estimate is not None and estimate > _LOST_DIGITS:
+    estimate = estimated_error(prepared, progress, growth, watch)
+    if system.requirements.formulation == "rates":
+        if estimate is not None and estimate > _LOST_DIGITS:
+            found.append(
+                f"the angular velocity is uncertain by about {min(estimate, 2.0):.2g} of its size at the end, so "
+                f"its digits are gone{_since(prepared, progress, growth)}; choose a higher precision or a "
+                "nearer end"
+            )
+    elif estimate is not None and estimate > _LOST_DIGITS:
         found.append(
             f"{UNCERTAIN} by about {min(estimate, math.pi):.2g} rad at the end, so its "
             f"digits are gone{_since(prepared, progress, growth)}; choose a higher precision or a nearer end"
@@ -190,14 +199,47 @@ def largest_spacing(prepared: Prepared) -> float:
     return float(samples.span / samples.intervals)
 
 
-def attitude_error(prepared: Prepared, progress: Progress, growth: Growth | None) -> float | None:
-    """Estimate at the end, rad: the round-off law times the motion's growth; None without an attitude."""
+def _passed(prepared: Prepared, progress: Progress) -> float:
+    """About how near a chart's singularity the motion came between two samples, by the shortest step, rad."""
+    shortest = math.ldexp(progress.smallest_step, prepared.system.scaling.time)
+    return shortest * float(prepared.system.rate_bound) * _STEPS_TO_SINGULARITY
+
+
+def _condition(prepared: Prepared, progress: Progress, watch: Watch) -> float:
+    """What the formulation itself makes of a rounding error.
+
+    Rates from canonical momenta are I^-1 K^T p: a rounded momentum is of the size of the largest moment and
+    is divided by the smallest, and K has the inverse of the singular factor in it.
+    """
+    if prepared.system.requirements.formulation != "canonical":
+        return 1.0
+    moments = [m for m in prepared.scene.body.principal_moments if m != 0]
+    nearest = min(watch.nearest_singularity, _passed(prepared, progress), 1.0)
+    return float(max(moments) / min(moments)) / max(nearest, sys.float_info.min)
+
+
+def attitude_error(
+    prepared: Prepared, progress: Progress, growth: Growth | None, watch: Watch
+) -> float | None:
+    """``estimated_error``; None without an attitude."""
+    rates = prepared.system.requirements.formulation == "rates"
+    return None if rates else estimated_error(prepared, progress, growth, watch)
+
+
+def estimated_error(
+    prepared: Prepared, progress: Progress, growth: Growth | None, watch: Watch
+) -> float | None:
+    """Estimate at the end, rad (of rates: relative to their size): the round-off law times the motion's growth
+    and the formulation's own; a few roundings for a closed form.
+    """
     if growth is None:
         return None
+    if prepared.closed is not None:
+        return CLOSED_FORM * float(prepared.precision.epsilon)
     duration = abs(progress.time - float(prepared.scene.start))
     rate = float(prepared.system.rate_bound)
-    law = round_off_law(prepared.effective_tolerance, progress.steps, rate, duration)
-    estimate = law * growth.at(duration)
+    law = round_off_law(prepared.law_tolerance, progress.steps, rate, duration)
+    estimate = law * growth.at(duration) * _condition(prepared, progress, watch)
     return estimate if math.isfinite(estimate) else sys.float_info.max
 
 
@@ -210,14 +252,15 @@ def predictable_seconds(prepared: Prepared, progress: Progress, growth: Growth |
         return None
     duration = abs(progress.time - float(prepared.scene.start))
     rate = float(prepared.system.rate_bound)
-    law = round_off_law(prepared.effective_tolerance, progress.steps, rate, duration)
+    law = round_off_law(prepared.law_tolerance, progress.steps, rate, duration)
     if law == 0.0:
         return None
     horizon = duration
     for _ in range(50):  # a contraction: the law grows like t^1.5, the motion's growth exponentially
         seed = law * (max(horizon, 1e-3 * duration) / duration) ** 1.5 * growth.factor
+        seed = min(seed, sys.float_info.max)  # of a motion that broke down where growth was measured
         horizon = growth.window + math.log(_LOST_DIGITS / seed) / growth.rate
-    return horizon
+    return max(horizon, 0.0)
 
 
 def summarise(
@@ -239,7 +282,7 @@ def summarise(
     """The content of ``summary.json``."""
     scene, system = prepared.scene, prepared.system
     growth = _with_spectrum(growth, spectrum, float(system.rate_bound))
-    estimate = attitude_error(prepared, progress, growth)
+    estimate = attitude_error(prepared, progress, growth, watch)
     duration = abs(progress.time - float(scene.start))
     return {
         "name": scene.name,

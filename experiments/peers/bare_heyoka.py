@@ -29,9 +29,13 @@ def knobs(variant: str, scene: Scene) -> list[float]:
     return [10.0**-n for n in range(3, 16)] + [2.0**-52]
 
 
-def system(scene: Scene, orbit: str = "double") -> tuple[list[Any], list[float]]:
-    """Equations and initial values; the orbit's direction is carried as two states unless asked otherwise."""
-    a, b, c = scene.moments
+def system(scene: Scene, orbit: str = "double", number: Any = float) -> tuple[list[Any], list[float]]:
+    """Equations and initial values; the orbit's direction is carried as two states unless asked otherwise.
+
+    Args:
+        number: scalar type of the coefficients, whose quotients are rounded in it.
+    """
+    a, b, c = map(number, scene.moments)
     wx, wy, wz, w, x, y, z, cosine, sine = hy.make_vars(
         "wx", "wy", "wz", "qw", "qx", "qy", "qz", "cosine", "sine"
     )
@@ -76,7 +80,7 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
     key = scene.name, variant, knob
     scalar: Any = np.longdouble if variant == "extended" else np.float64
     if key not in _integrators:
-        equations, values = system(scene, variant)
+        equations, values = system(scene, variant, scalar)
         state = np.array(values, dtype=scalar)
         _integrators[key] = hy.taylor_adaptive(equations, state, fp_type=scalar, tol=scalar(knob))
         _starts[key] = state.copy()
@@ -92,12 +96,19 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
     return solve
 
 
-def reference(scene: Scene, end: float) -> list[str]:
-    """The final quaternion in 128-bit arithmetic, as decimal texts."""
-    equations, values = system(scene)
+def reference(scene: Scene, end: float) -> list[list[float]]:
+    """The final quaternion in 128-bit arithmetic, each component as doubles that add up to it."""
+    equations, values = system(scene, number=hy.real128)
     start = np.array([hy.real128(v) for v in values], dtype=hy.real128)
     integrator = hy.taylor_adaptive(
         equations, start, fp_type=hy.real128, tol=hy.real128("1e-32"), compact_mode=True
     )
     integrator.propagate_until(hy.real128(end))
-    return [str(q) for q in integrator.state[3:7]]
+    parts = []
+    for component in integrator.state[3:7]:
+        rest, doubles = component, []
+        for _ in range(3):
+            doubles.append(float(rest))
+            rest = rest - hy.real128(doubles[-1])
+        parts.append(doubles)
+    return parts

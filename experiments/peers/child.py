@@ -5,15 +5,17 @@ Run by ``experiments.peer_comparison``: python -m experiments.peers.child PEER R
 
 from __future__ import annotations
 
+import functools
 import importlib
 import json
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-_MOST_CALLS, _FEWEST_CALLS = 200, 3
+_MOST_CALLS = 200
+_HANDFUL = 3  # settings
 _PATIENCE = 1.0  # CPU seconds of one call from which it isn't repeated
 
 
@@ -34,13 +36,14 @@ def main() -> None:
     for scene_name, end in request["cases"]:
         scene = SCENES[scene_name]
         for variant in adapter.TITLES:
-            for knob in adapter.knobs(variant, scene)[:: request["stride"]]:
+            for knob in thinned(adapter.knobs(variant, scene), request["stride"]):
                 if (scene_name, end, variant, knob) in skipped:
                     continue
                 record = {"scene": scene_name, "end": end, "variant": variant, "knob": knob}
                 try:
-                    record |= measure(lambda: adapter.prepare(scene, end, variant, knob), request["fill"])  # noqa: B023
-                except (RuntimeError, ValueError) as error:
+                    prepare = functools.partial(adapter.prepare, scene, end, variant, knob)
+                    record |= measure(prepare, request["fill"], request["fewest"])
+                except (ImportError, RuntimeError, ValueError) as error:
                     emit(**record, refused=f"{type(error).__name__}: {error}")
                     continue
                 emit(**record, title=adapter.TITLES[variant])
@@ -48,12 +51,18 @@ def main() -> None:
                     break  # tighter ones cost more
 
 
-def measure(prepare: Callable[[], Callable[[], Any]], fill: float) -> dict[str, Any]:
+def thinned(knobs: Sequence[float], stride: int) -> Sequence[float]:
+    """Every n-th from the tightest on; a handful stays as it is."""
+    return knobs if len(knobs) <= _HANDFUL else knobs[::-1][::stride][::-1]
+
+
+def measure(prepare: Callable[[], Callable[[], Any]], fill: float, fewest: int = 2) -> dict[str, Any]:
     """CPU seconds of preparing, of the fastest integration, and of the fastest whole call.
 
     Args:
         prepare: returns the function to be timed.
-        fill: CPU seconds of calls to choose the fastest from; at least three calls, but of slow ones.
+        fill: CPU seconds of calls to choose the fastest from.
+        fewest: calls at least, but of slow ones.
     """
     started = time.process_time()
     solve = prepare()
@@ -67,7 +76,7 @@ def measure(prepare: Callable[[], Callable[[], Any]], fill: float) -> dict[str, 
         fastest = min(fastest, getattr(answer, "seconds", elapsed))
         whole = min(whole, elapsed)
         spent += elapsed
-        if elapsed > _PATIENCE or (spent > fill and number + 1 >= _FEWEST_CALLS):
+        if elapsed > _PATIENCE or (spent > fill and number + 1 >= fewest):
             break
     return {"prepare": prepared, "seconds": fastest, "whole": whole, "quaternion": quaternion}
 

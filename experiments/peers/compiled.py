@@ -1,8 +1,11 @@
-"""The right-hand side of each scene, compiled by numba: rates and quaternion, seven states."""
+"""The right-hand side of each scene, compiled by numba: rates and quaternion, seven states.
+
+On an orbit the quaternion is that from the body to the frame which turns with the orbit, where the attractor
+stands still: no sine, no cosine, no further state (``Scene.from_orbital`` turns the result back).
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -18,6 +21,7 @@ def right_hand_side(scene: Scene) -> Callable[[float, Any, Any], None]:
     ha, hb = scene.weight / a, scene.weight / b
     n = scene.orbit_rate
     ga, gb, gc = 3 * n * n * (c - b) / a, 3 * n * n * (a - c) / b, 3 * n * n * (b - a) / c
+    half = n / 2
     heavy, orbiting = scene.weight != 0, n != 0
 
     @numba.njit(error_model="numpy")
@@ -28,10 +32,8 @@ def right_hand_side(scene: Scene) -> Callable[[float, Any, Any], None]:
             dp += ha * 2.0 * (yy * z + w * x)
             dq -= hb * 2.0 * (x * z - w * yy)
         if orbiting:
-            cosine, sine = math.cos(n * t), math.sin(n * t)
-            rx = cosine * (w * w + x * x - yy * yy - z * z) + sine * 2.0 * (x * yy + w * z)
-            ry = cosine * 2.0 * (x * yy - w * z) + sine * (w * w - x * x + yy * yy - z * z)
-            rz = cosine * 2.0 * (x * z + w * yy) + sine * 2.0 * (yy * z - w * x)
+            rx = w * w + x * x - yy * yy - z * z
+            ry, rz = 2.0 * (x * yy - w * z), 2.0 * (x * z + w * yy)
             dp += ga * ry * rz
             dq += gb * rz * rx
             dr += gc * rx * ry
@@ -40,5 +42,10 @@ def right_hand_side(scene: Scene) -> Callable[[float, Any, Any], None]:
         out[4] = 0.5 * (w * p + yy * r - z * q)
         out[5] = 0.5 * (w * q + z * p - x * r)
         out[6] = 0.5 * (w * r + x * q - yy * p)
+        if orbiting:
+            out[3] += half * z
+            out[4] += half * yy
+            out[5] -= half * x
+            out[6] -= half * w
 
     return function

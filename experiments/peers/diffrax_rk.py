@@ -26,6 +26,7 @@ def knobs(variant: str, scene: Scene) -> list[float]:
 
 
 def _field(scene: Scene) -> Callable[[Any, Any, Any], Any]:
+    """The equations of ``compiled``."""
     a, b, c = scene.moments
     n = scene.orbit_rate
 
@@ -36,10 +37,9 @@ def _field(scene: Scene) -> Callable[[Any, Any, Any], Any]:
             dp += scene.weight / a * 2.0 * (y * z + w * x)
             dq -= scene.weight / b * 2.0 * (x * z - w * y)
         if n:
-            k, cosine, sine = 3 * n * n, jnp.cos(n * t), jnp.sin(n * t)
-            rx = cosine * (w * w + x * x - y * y - z * z) + sine * 2.0 * (x * y + w * z)
-            ry = cosine * 2.0 * (x * y - w * z) + sine * (w * w - x * x + y * y - z * z)
-            rz = cosine * 2.0 * (x * z + w * y) + sine * 2.0 * (y * z - w * x)
+            k = 3 * n * n
+            rx = w * w + x * x - y * y - z * z
+            ry, rz = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
             dp += k * (c - b) / a * ry * rz
             dq += k * (a - c) / b * rz * rx
             dr += k * (b - a) / c * rx * ry
@@ -48,10 +48,10 @@ def _field(scene: Scene) -> Callable[[Any, Any, Any], Any]:
                 dp,
                 dq,
                 dr,
-                -0.5 * (x * p + y * q + z * r),
-                0.5 * (w * p + y * r - z * q),
-                0.5 * (w * q + z * p - x * r),
-                0.5 * (w * r + x * q - y * p),
+                -0.5 * (x * p + y * q + z * r) + n / 2 * z,
+                0.5 * (w * p + y * r - z * q) + n / 2 * y,
+                0.5 * (w * q + z * p - x * r) - n / 2 * x,
+                0.5 * (w * r + x * q - y * p) - n / 2 * w,
             ]
         )
 
@@ -83,6 +83,6 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
     integrate = _solvers[scene.name]
 
     def solve() -> Sequence[float]:
-        return [float(q) for q in np.asarray(integrate(end, knob))[3:7]]
+        return scene.from_orbital(np.asarray(integrate(end, knob))[3:7].tolist(), end)
 
     return solve

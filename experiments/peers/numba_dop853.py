@@ -94,6 +94,6 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
         state, reached = integrate(start, end, knob, 0.0625)
         if reached < end:
             raise RuntimeError(f"steps vanished at t = {reached:g} with tolerance {knob:g}")
-        return [float(q) for q in state[3:7]]
+        return scene.from_orbital(state[3:7].tolist(), end)
 
     return solve

@@ -43,6 +43,6 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
         states, success = solver(address, start, times, rtol=knob, atol=knob, mxstep=2**30)
         if not success:
             raise RuntimeError(f"numbalsoda {variant} failed at tolerance {knob:g}")
-        return [float(q) for q in states[-1, 3:7]]
+        return scene.from_orbital(states[-1, 3:7].tolist(), end)
 
     return solve

@@ -1,4 +1,4 @@
-"""REBOUND's Gragg-Bulirsch-Stoer integrator for user's equations, with a right-hand side compiled by numba."""
+"""REBOUND's Gragg-Bulirsch-Stoer for equations of one's own, with a right-hand side compiled by numba."""
 
 from __future__ import annotations
 
@@ -46,6 +46,6 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
         for i, value in enumerate(scene.start):
             ode.y[i] = value
         simulation.integrate(end)
-        return [ode.y[i] for i in range(3, 7)]
+        return scene.from_orbital([ode.y[i] for i in range(3, 7)], end)
 
     return solve

@@ -1,9 +1,9 @@
 """CCSDS Attitude Ephemeris Message (504.0-B-2, version 2.0, KVN), attitude type QUATERNION.
 
 The message's quaternion "from frame A to frame B" turns the axes of A into the axes of B (annex F2 of the
-standard: a turn by 90 degrees about Z is Q3 = QC = 0.7071, and [1, 0, 0] in A reads [0, -1, 0] in B). With the
-space axes as A and the body axes as B that is the dataset's own quaternion, which turns a vector from its body
-coordinates to its space coordinates; only the scalar goes last: Q1 Q2 Q3 QC = x y z w.
+standard: a turn by 90 degrees about Z is Q3 = QC = 0.7071, and [1, 0, 0] in A reads [0, -1, 0] in B). With
+the space axes as A and the body axes as B that is the dataset's own quaternion, which turns a vector from
+its body coordinates to its space coordinates; only the scalar goes last: Q1 Q2 Q3 QC = x y z w.
 """
 
 from __future__ import annotations

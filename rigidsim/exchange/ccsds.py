@@ -1,8 +1,8 @@
 """What the CCSDS ephemeris messages share: time tags, numbers and lines of their KVN syntax.
 
-Attitude Data Messages, CCSDS 504.0-B-2, section 6 (the orbit messages, CCSDS 502.0-B, agree with it): lines of
-at most 254 printable ASCII characters; numbers of at most 16 digits, so that a double is rounded to a few
-parts in 1e16; no nan, infinity or negative zero; text all upper case.
+Attitude Data Messages, CCSDS 504.0-B-2, section 6 (the orbit messages, CCSDS 502.0-B, agree with it): lines
+of at most 254 printable ASCII characters; numbers of at most 16 digits, so that a double is rounded to a
+few parts in 1e16; no nan, infinity or negative zero; text all upper case.
 """
 
 from __future__ import annotations
@@ -102,9 +102,7 @@ def keyword(name: str, value: str) -> str:
     """
     text = value.upper()
     if not re.fullmatch(r"[\x21-\x7e]([\x20-\x7e]*[\x21-\x7e])?", text) or len(text) > 200:
-        raise RigidsimError(
-            f"{name}: given {ascii(value[:60])}; 1 to 200 printable ASCII characters are allowed"
-        )
+        raise RigidsimError(f"{name}: given {value[:60]!a}; 1 to 200 printable ASCII characters are allowed")
     return f"{name} = {text}"
 
 
@@ -167,8 +165,8 @@ def data_lines(
             tag = tags.tag(time)
             if tag == previous:
                 raise RigidsimError(
-                    f"samples {row - 1} and {row} are closer than 1e-{_FRACTION} s, which time tags can't tell "
-                    "apart; export csv, or sample less often"
+                    f"samples {row - 1} and {row} are closer than 1e-{_FRACTION} s, which time tags can't "
+                    "tell apart; export csv, or sample less often"
                 )
             yield " ".join([tag, *(number(value.scaleb(power_of_ten)) for value in state)])
             previous, row = tag, row + 1

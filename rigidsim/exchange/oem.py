@@ -35,7 +35,7 @@ def write_oem(table: Table, path: Path, *, naming: ccsds.Naming, title: str, bit
             [
                 f"rigidsim run {title}, numbers rounded to the 16 digits that the standard allows",
                 f"{naming.epoch} {ccsds.TIME_SYSTEM} is time zero of the scene",
-                f"{naming.frame} stands for the space axes X Y Z of the scene, {naming.center} for its origin",
+                f"{naming.frame} stands for the scene's space axes X Y Z, {naming.center} for its origin",
             ]
         ),
         f"CREATION_DATE = {ccsds.created()}",

@@ -182,7 +182,9 @@ class Advance:
             griddable = self.rhythm.whole_times and spacing * _GRID_ROWS >= self.rhythm.stride
             if griddable and spacing <= _GRID_STRIDES * self.rhythm.stride:
                 if self.stepper.at_whole_time and left >= _WORTH_A_GRID:
-                    count, stride = min(patience, left), self.rhythm.stride
+                    stride = self.rhythm.stride
+                    # past the end rather than almost there: what is left would go step by step
+                    count = min(patience, left + left // 2 + _WORTH_A_GRID)
                     return self._grid(count - count % stride if count > stride else count)
                 patience = min(patience, self.rhythm.left)  # to where grids can start
             elif spacing <= _BLOCK_SPACING and min(left, self.rhythm.left) >= _WORTH_A_BLOCK:
@@ -288,9 +290,20 @@ class Advance:
         return True
 
     def _finish(self, place: Place) -> None:
-        """From a boundary not past the last sample: end at the first boundary past it."""
+        """Back from where the last sample is passed to the first boundary past it, which is where every way
+        through the samples ends; ``place`` is a boundary before it.
+        """
         last = self.clock.at(self.clock.count - 1)
+        most = self.stepper.steps - place.mark.steps  # the sample lies within so many steps
         self.rhythm.back_to(place)
+        while most > 1:
+            here, half = self.rhythm.place(), most // 2
+            self.rhythm.skip(half)
+            if self.stepper.time >= last:
+                self.rhythm.back_to(here)
+                most = half
+            else:
+                most -= half
         while True:
             self._before_last = self.rhythm.place()
             self.stepper.step()

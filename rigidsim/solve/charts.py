@@ -31,9 +31,6 @@ from rigidsim.solve.winding import ANGLES, CHART, TURNS
 NEAR = 0.5
 """Singular factor from which a chart is left."""
 
-UNIT = 2.0**-28
-"""rad; asked angles are remembered in whole multiples of it, up to 3e10 rad, to be joined to by full turns."""
-
 _SWING = math.pi / 2  # of the outer angles within a step, from which it is looked at in parts
 _HALVINGS = 10  # of a step at most; what remains is a straight line but for 1e-4 of its length
 _STRAIGHT = math.pi - 2.0**-7  # swing in such a part from which it went straight through
@@ -157,7 +154,7 @@ class Charts:
             self._follow(integrator, middle, between, halvings - 1)
             self._follow(integrator, time, state, halvings - 1)
             return
-        self._turns[ANGLES] = _in_units(joined)
+        self._turns[ANGLES] = _as_bits(joined)
         self._passed.append((time, self._turns[ANGLES].copy()))
 
     def _angles(self, state: np.ndarray) -> Angles:
@@ -195,7 +192,7 @@ class Charts:
         self._turns[CHART] = 1 - self.chart
         if self.chart:
             turns[:] = 0
-            self._turns[ANGLES] = _in_units(before)
+            self._turns[ANGLES] = _as_bits(before)
         else:
             turns[:] = [round((b - a) / _TURN) for a, b in zip(angles, before, strict=True)]
             self._turns[ANGLES] = 0
@@ -211,9 +208,9 @@ class Charts:
 
 def angles_before(row: np.ndarray) -> Angles:
     """The asked angles that a row of ``turns`` remembers, rad."""
-    a, b, c = (UNIT * int(n) for n in row[ANGLES])
+    a, b, c = row[ANGLES].view(np.float64).tolist()
     return a, b, c
 
 
-def _in_units(angles: Angles) -> np.ndarray:
-    return np.array([round(a / UNIT) for a in angles], dtype=np.int64)
+def _as_bits(angles: Angles) -> np.ndarray:
+    return np.array(angles, dtype=np.float64).view(np.int64)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import heyoka as hy
 import mpmath
 import numpy as np
 
@@ -50,11 +51,11 @@ def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) ->
     parts = np.asarray(arrays[f"{name}_parts"], dtype=np.float64)
     if parts.ndim != 2 or len(parts) != precision.part_count:
         raise ValueError(f"{name} has parts of shape {parts.shape}")
-    total = parts[0].astype(precision.scalar)
     if precision.narrow:
-        return total
+        return parts[0].astype(precision.scalar)
+    total = _lifted(parts[0], precision)
     for part in parts[1:]:
-        total = total + part.astype(precision.scalar)
+        total = total + _lifted(part, precision)
     exponents = np.asarray(arrays[f"{name}_exponents"])
     if exponents.shape != total.shape:
         raise ValueError(f"{name} has exponents of shape {exponents.shape}")
@@ -63,6 +64,13 @@ def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) ->
         for _ in range(-int(exponent) // _STEP):
             total[i] = total[i] * down
     return total
+
+
+def _lifted(part: np.ndarray, precision: Precision) -> np.ndarray:
+    """float64 numbers in the run's own type; ``astype`` makes multi-precision numbers of 53 bits."""
+    if precision.scalar is not hy.real:
+        return part.astype(precision.scalar)
+    return np.array([hy.real(float(x), precision.bits) for x in part], dtype=hy.real)
 
 
 def _power(precision: Precision, exponent: int) -> Any:

@@ -76,9 +76,12 @@ class Precision:
                 scaled = float(np.ldexp(part, exponent))
             if part and (scaled == 0.0 or np.isinf(scaled)):
                 raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the internal range")
-            total = total + self._scalar(scaled)
+            with np.errstate(over="ignore", under="ignore"):
+                total = total + self._scalar(scaled)
             mantissa >>= _CHUNK_BITS
             exponent += _CHUNK_BITS
+        if self.scalar is np.float32 and (total == 0 or np.isinf(total)):
+            raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the range of single precision")
         return -total if sign else total
 
     def _scalar(self, value: float) -> Any:

@@ -78,11 +78,6 @@ class Rhythm:
             self.memories["held"] = holder.memory
 
     @property
-    def away(self) -> bool:
-        """Whether the run is in the partner chart, which no holder knows."""
-        return self.charts is not None and self.charts.chart != 0
-
-    @property
     def left(self) -> int:
         """Steps until the next corrections, at least 1."""
         return self.stride - self.stepper.steps % self.stride
@@ -97,6 +92,8 @@ class Rhythm:
             array[...] = place.memories[name]
         if self.charts is not None:
             self.stepper.use(self.charts.chart)
+            if self.holder is not None:
+                self.holder.use(self.charts.chart)
         self.stepper.back_to(place.mark)
 
     def skip(self, count: int) -> bool:
@@ -125,7 +122,7 @@ class Rhythm:
             self.stepper.to_whole_time()
         if due and self.winding.positions:
             self.winding.wrap(self.stepper.state)
-        if due and self.holder is not None and not self.away:
+        if due and self.holder is not None:
             self.holder.project(self.stepper.state, self.stepper.time)
         if change and self.charts is not None:
             self._change_chart(self.charts)
@@ -133,4 +130,6 @@ class Rhythm:
     def _change_chart(self, charts: Charts) -> None:
         state = charts.change(self.stepper.state)
         self.stepper.use(charts.chart)
+        if self.holder is not None:
+            self.holder.use(charts.chart)
         self.stepper.state[:] = state

@@ -22,6 +22,7 @@ _FAR = 1e300  # a target that no run reaches: propagation ends by the count of s
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
 _LONGEST_STEP = 2.0**30
+_LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,9 @@ class Stepper:
         self._charts = {0: self._integrator}
         far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
-        self._longest = precision.number(system.scene.context.mpf(_LONGEST_STEP))
+        bounds = (_LONGEST_STEP, _LONGEST_FOLLOWED)
+        self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
+        self._longest = self._bounds[0]
         self.steps = 0
         self.smallest = self.largest = 0.0
 
@@ -100,6 +103,7 @@ class Stepper:
         time = self._integrator.dtime
         self._integrator = self._charts[chart]
         self._integrator.dtime = time
+        self._longest = self._bounds[chart]
 
     def _watched(self) -> Watcher | None:
         if self.watcher is not None:
@@ -205,5 +209,7 @@ class Stepper:
 
     def _account(self, outcome: Any, smallest: Any, largest: Any, taken: int) -> bool:
         self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
+        if taken and self.largest == 0.0:  # heyoka leaves out steps of the greatest size allowed
+            self.smallest = self.largest = float(self._longest)
         self.steps += int(taken)
         return bool(outcome != hy.taylor_outcome.err_nf_state)

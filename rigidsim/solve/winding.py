@@ -14,7 +14,8 @@ from rigidsim.solve.precision import Precision
 
 TURNS, CHART, ANGLES = slice(0, 3), 3, slice(4, 7)
 """What stands where in ``Winding.turns``: full turns of the angle states, the chart that they are of (0: the
-asked sequence, 1: its partner), and in the partner chart the asked angles (see ``rigidsim.solve.charts``)."""
+asked sequence, 1: its partner), and in the partner chart the bits of the asked angles (float64, rad; see
+``rigidsim.solve.charts``)."""
 
 _LENGTH = 7
 

@@ -75,21 +75,28 @@ def check_seal(path: Path) -> str:
     Raises:
         RunFolderError: no seal (torn or foreign), or another content than was sealed (damaged, edited).
     """
+    return check_whole(path)[0]
+
+
+def check_whole(path: Path) -> tuple[str, str]:
+    """As ``check_seal``; also the digest of the file as it is, with its seal."""
     try:
         claimed = read_seal(path) if path.is_file() else None
         if claimed is None:
             raise RunFolderError(f"{path}: is torn or foreign: its end holds no seal of rigidsim")
-        found = hashlib.sha256()
+        running = hashlib.sha256()
         left = path.stat().st_size - _LENGTH
         with path.open("rb") as file:
             while left > 0:
                 piece = file.read(min(left, 1 << 20))
                 if not piece:
                     break
-                found.update(piece)
+                running.update(piece)
                 left -= len(piece)
+            found = running.hexdigest()
+            running.update(file.read(_LENGTH))
     except OSError as error:
         raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
-    if found.hexdigest() != claimed:
+    if found != claimed:
         raise RunFolderError(f"{path}: is damaged or was edited: its content isn't what its seal says")
-    return claimed
+    return claimed, running.hexdigest()

@@ -22,6 +22,7 @@ import numpy as np
 from rigidsim.errors import RunFolderError
 from rigidsim.store import netcdf
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
+from rigidsim.store.sink import sink
 from rigidsim.store.variables import Extra, Variable
 
 SEGMENT_BYTES = 32_000_000
@@ -180,10 +181,11 @@ class SegmentWriter:
             raise RunFolderError(f"{self._folder}: segment {len(paths):08d}.h5 is missing")
         rows = self.saved_rows + self._rows
         with self._writing(), netcdf.atomic(target) as temporary:
-            with h5netcdf.File(temporary, "w") as file:
+            with sink(temporary) as target_file, h5netcdf.File(target_file, "w") as file:
                 netcdf.declare(file, self._variables, rows, attributes, compressed=True)
                 first = 0
                 for path in paths:
+                    target_file.check()
                     first += _copy(path, file, self._variables, first)
                 if self._blocks:
                     netcdf.fill(file, self._variables, self._collected(), first, self._rows)

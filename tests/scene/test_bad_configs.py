@@ -779,13 +779,13 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         ["given 2;", "at most 1", '"auto"'],
     ),
     "start in the singularity of zxz": (
-        {"integrator": 'formulation = "euler_angles"'},
+        {"integrator": 'formulation = "canonical"'},
         "[integrator] formulation",
-        ["singularity of the sequence zxz", "middle angle 0.0 rad", 'choose formulation = "quaternion"'],
+        ["singularity of the sequence zxz", "middle angle 0.0 rad", 'choose formulation = "euler_angles"'],
     ),
     "start in the singularity of xyz": (
         spin('euler_angles = [0, "90 deg", 0]')
-        | {"integrator": 'formulation = "euler_angles"\neuler_sequence = "xyz"'},
+        | {"integrator": 'formulation = "canonical"\neuler_sequence = "xyz"'},
         "[integrator] formulation",
         ["singularity of the sequence xyz", "middle angle 1.5707963 rad", "another euler_sequence"],
     ),
@@ -907,7 +907,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "canonical from its singularity": (
         {"integrator": 'formulation = "canonical"'},
         "[integrator] formulation",
-        ["singularity of the sequence zxz", 'choose formulation = "quaternion"'],
+        ["singularity of the sequence zxz", '"quaternion", or another euler_sequence'],
     ),
     "gradient without a source": (
         {"loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1'},

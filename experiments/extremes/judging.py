@@ -1,0 +1,191 @@
+"""What a run says of a scene, held against its closed form at many digits.
+
+A result is right within the round-off law, or its doubts are announced, or the scene is refused. All else is
+a wrong answer given in silence.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import numpy as np
+
+import rigidsim
+from experiments.extremes.scenes import Extreme
+from rigidsim.assembly import assemble
+from rigidsim.errors import ConfigError
+from rigidsim.prepare import Prepared, motion_growth, prepare
+from rigidsim.solve.advance import Advance
+from rigidsim.solve.closed import ClosedForm, closed_form_of
+from rigidsim.solve.closed.direct import Direct
+from rigidsim.solve.harvest import Checkpoint
+from rigidsim.solve.status import Status
+from rigidsim.summary import Watch, estimated_error, round_off_law, warnings
+
+FACTOR = 3.0
+"""Between an error and the law or estimate that covers it."""
+_EVALUATION = 16.0
+"""eps; the initial state, and a sample made of the state, are some thirty operations on numbers up to 1."""
+_WALK = 4.0
+"""eps sqrt(steps): the walk of the attitude itself, a few roundings of each component and step."""
+_CLOSED = 50.0
+"""eps; thirty operations, and numpy's sines are right to 4 ulp."""
+_DIGITS = 50
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one scene in one formulation.
+
+    Attributes:
+        kind: "right", "announced", "refused", or "SILENT".
+        error: largest at the samples, rad, or relative to the rates; nan where refused.
+        bound: three times the law, and the last bits of a sample.
+        estimate: the run's own, or None.
+        text: message or warnings.
+    """
+
+    scene: Extreme
+    column: str
+    precision: str
+    kind: str
+    error: float
+    bound: float
+    estimate: float | None
+    text: str
+
+    @property
+    def line(self) -> str:
+        """For lists of what went wrong."""
+        estimate = "none" if self.estimate is None else f"{self.estimate:.2e}"
+        return (
+            f"{self.kind}: {self.scene.row} / {self.scene.name} / {self.column} / {self.precision}: error "
+            f"{self.error:.2e}, bound {self.bound:.2e}, estimate {estimate}; {self.text}"
+        )
+
+
+class _Samples:
+    """Keeps everything in memory, and watches it as a run does."""
+
+    def __init__(self, prepared: Prepared, evaluator: Any, name: str) -> None:
+        self._prepared, self._evaluator, self._name = prepared, evaluator, name
+        self.watch = Watch()
+        self.times: list[Any] = []
+        self.rows: list[list[Any]] = []
+
+    def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
+        recorded = self._evaluator.evaluate(states, turns)
+        for invariant in self._prepared.system.invariants:
+            self.watch.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
+        exact, exponent = self._prepared.precision.exact, self._prepared.clock.exponent
+        seconds = [mpmath.ldexp(exact(t), exponent) for t in times]
+        factors = self._evaluator.singular_factors(states, turns)
+        if factors is not None:
+            self.watch.see_singular(factors, np.array([float(t) for t in seconds]))
+        self.times += seconds
+        for row in zip(*recorded[self._name], strict=True):
+            self.rows.append([mpmath.fsum(float(x) for x in parts) for parts in zip(*row, strict=True)])
+
+    def due(self) -> bool:
+        return False
+
+    def save(self, checkpoint: Checkpoint) -> None:
+        """Never due."""
+
+
+def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) -> Verdict:
+    """Run a scene in one formulation."""
+
+    def verdict(
+        kind: str, text: str, error: float = math.nan, bound: float = math.nan, own: Any = None
+    ) -> Verdict:
+        return Verdict(scene, column, precision, kind, error, bound, own, text)
+
+    try:
+        prepared = prepare(rigidsim.parse(scene.text(column, precision, hold=hold)))
+        parts = assemble(prepared)
+    except ConfigError as refusal:
+        return verdict("refused", str(refusal).replace("\n", " "))
+    growth = motion_growth(prepared)
+    samples = _Samples(prepared, parts.evaluator, "angular_velocity" if column == "rates" else "quaternion")
+    clock, scalar = prepared.clock, prepared.precision
+    advance: Advance | Direct
+    if prepared.closed is not None:
+        advance = Direct(prepared.closed, prepared.system, parts.rhythm, clock, scalar, samples, _never)
+    else:
+        advance = Advance(parts.rhythm, clock, scalar, samples, _never)
+    progress = advance.run()
+    if progress.status is not Status.FINISHED:
+        return verdict("refused", f"the run ended: {progress.status.value}")
+    found = warnings(prepared, progress, samples.watch, growth)
+    estimate = estimated_error(prepared, progress, growth, samples.watch)
+    error = _largest_error(scene, column, prepared, samples)
+    epsilon = float(scalar.epsilon)
+    duration = float(samples.times[-1] - samples.times[0])
+    tolerance, rate = max(prepared.effective_tolerance, epsilon), float(prepared.system.rate_bound)
+    law = round_off_law(tolerance, progress.steps, rate, duration)
+    steps = math.sqrt(max(progress.steps, 1))
+    last_bits = _CLOSED * epsilon if prepared.closed is not None else epsilon * (_EVALUATION + _WALK * steps)
+    bound = FACTOR * law + last_bits
+    doubts = [w for w in found if "joined" not in w and "no effect" not in w]  # the others doubt the digits
+    covered = estimate is not None and error <= FACTOR * estimate + last_bits
+    kind = "SILENT"
+    if error <= bound and (covered or estimate is None):
+        kind = "right"
+    elif doubts or covered:
+        kind = "announced"
+    return verdict(kind, "; ".join(found), error, bound, estimate)
+
+
+def _never(_: object) -> None:
+    return None
+
+
+def _largest_error(scene: Extreme, column: str, prepared: Prepared, samples: _Samples) -> float:
+    form = reference(scene)
+    with mpmath.workdps(_DIGITS + 20):
+        exact = [form.exactly(time, _DIGITS) for time in samples.times]
+        if column != "rates":
+            return float(max(_angle(row, q) for row, (_, q) in zip(samples.rows, exact, strict=True)))
+        inertia = [[mpmath.mpf(x) for x in row] for row in prepared.scene.body.inertia]
+        rates = [w for w, _ in exact]
+        momenta = [[[mpmath.fdot(r, w) for r in inertia] for w in part] for part in (samples.rows, rates)]
+        return float(max(_relative(samples.rows, rates), _relative(*momenta)))
+
+
+_known: dict[str, ClosedForm] = {}
+
+
+def reference(scene: Extreme) -> ClosedForm:
+    """The scene's closed form, at many digits.
+
+    Raises:
+        ValueError: it has none, and doesn't belong into the table.
+    """
+    text = scene.text("closed_form", _DIGITS)
+    if text not in _known:
+        form = closed_form_of(prepare(rigidsim.parse(text)).scene)
+        if isinstance(form, str):
+            raise ValueError(f"{scene.row}, {scene.name}: {form}")
+        _known[text] = form
+    return _known[text]
+
+
+def _angle(one: Sequence[Any], other: Sequence[Any]) -> Any:
+    """Rotation angle between two attitudes, up to the quaternions' sign, rad; a norm off 1 counts."""
+    chord = min(mpmath.norm([a - s * b for a, b in zip(one, other, strict=True)]) for s in (1, -1))
+    return mpmath.pi if mpmath.isnan(chord) else 4 * mpmath.asin(min(chord / 2, mpmath.mpf(1)))
+
+
+def _relative(found: Sequence[Any], exact: Sequence[Any]) -> Any:
+    """Largest difference over the largest size, of vectors at all samples; w and I w both have to be right."""
+    size = max(mpmath.norm(x) for x in exact)
+    far = [
+        mpmath.norm([a - b for a, b in zip(*pair, strict=True)]) for pair in zip(found, exact, strict=True)
+    ]
+    largest = mpmath.inf if any(mpmath.isnan(x) for x in far) else max(far)
+    return largest / size if size else largest

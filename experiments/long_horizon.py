@@ -1,0 +1,255 @@
+"""How do errors grow over long runs, and what does holding the invariants change?
+
+Question: Brouwer (1937, Astron. J. 46, 149) found that rounding alone makes the energy of an orbit wander
+like t^(1/2) and its phase like t^(3/2). Do energy, angular momentum and attitude of a rigid body follow these
+laws, or does something systematic (a bias of rounding or truncation) make them grow faster?
+Method: a free asymmetric body and a heavy symmetric top, 12 nearby starts for each precision, against the
+closed form in quadruple precision, which is exact at any time. Times are in radians of the fastest rate. Lines
+are fitted to the logarithms of the root mean squares over the starts; the exponents' uncertainty is from
+resampling the starts (bootstrap).
+
+Run: python -m experiments.long_horizon [--full] [--out DIR]
+Reduced: single to 1e4, double to 1e5 rad, extended to 1e4; --full: 1e5, 1e7 and 1e6 (an hour and a half).
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import mpmath
+import numpy as np
+import xarray
+
+import rigidsim
+from experiments.common import BLUE, GREY, ORANGE, Check, main, new_figure, save, tidy
+from rigidsim.trial import Setting, angles_between, try_setting
+
+NAME = "long_horizon"
+STARTS = 12
+PER_DECADE = 4
+REDUCED = {"single": 1e4, "double": 1e5, "extended": 1e4}
+FULL = {"single": 1e5, "double": 1e7, "extended": 1e6}
+FIRST = 1e2
+FIT_FROM = 1e3  # before that the rounding of the evaluation itself is seen
+LOST = 0.03  # rad: beyond it an attitude error no longer grows freely
+QUANTITIES = ("energy", "angular momentum", "attitude")
+LAW = {"energy": 0.5, "angular momentum": 0.5, "attitude": 1.5}
+HELD_LAW = 1.0  # of the attitude where the frequencies are held
+
+BODIES = {
+    "free asymmetric body": """
+name = "free"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [{a}, {b}, {c}]
+euler_angles = [0, 1, 0]
+[time]
+end = {end}
+""",
+    "heavy symmetric top": """
+name = "top"
+[body]
+principal_moments = [1, 1, "1/2"]
+mass = 1
+center_of_mass = [0, 0, "1/4"]
+[initial]
+angular_velocity = [{a}, {b}, {c}]
+euler_angles = [0, 1, 0]
+[[loads]]
+kind = "uniform_gravity"
+acceleration = [0, 0, -1]
+[time]
+end = {end}
+""",
+}
+RATES = {"free asymmetric body": (0.5, 0.25, 1.0), "heavy symmetric top": (0.3, 0.2, 1.0)}
+MOMENTUM = {"free asymmetric body": "angular_momentum", "heavy symmetric top": "angular_momentum_vertical"}
+
+
+def times(horizon: float) -> list[float]:
+    """Radians: the start, and evenly spaced logarithms from 1e2 on; single precision means them exactly."""
+    count = round(PER_DECADE * math.log10(horizon / FIRST)) + 1
+    return [0.0, *(float(np.float32(round(t))) for t in np.geomspace(FIRST, horizon, count))]
+
+
+def experiment(body: str, start: int, end: float) -> rigidsim.Experiment:
+    """The scene of one start: rates a few thousandths off, in decimals that every precision reads exactly.
+
+    The fastest rate is the largest component of 1 (within the same thousandths), so that seconds are radians.
+    """
+    offsets = np.random.default_rng([start, len(body)]).integers(-64, 65, size=3) / 16384
+    a, b, c = (repr(rate + float(offset)) for rate, offset in zip(RATES[body], offsets, strict=True))
+    return rigidsim.parse(BODIES[body].format(a=a, b=b, c=c, end=repr(end)))
+
+
+def measure(body: str, precision: str, held: bool, horizon: float, starts: int = STARTS) -> xarray.Dataset:
+    """Absolute errors of every start at every time: dimensions ``start``, ``time``."""
+    moments = times(horizon)
+    grown = slice(1, None)  # nothing has grown at the start
+    exact = [mpmath.mpf(t) for t in moments]
+    errors = np.full((len(QUANTITIES), starts, len(moments) - 1), np.nan)
+    cpu = np.zeros(starts)
+    for start in range(starts):
+        scene = experiment(body, start, moments[-1])
+        reference = try_setting(scene, Setting("quadruple", method="closed_form"), exact)
+        trial = try_setting(scene, Setting(precision, hold_invariants=held), exact)
+        errors[0, start] = np.abs(trial.histories["energy"])[grown]
+        errors[1, start] = np.abs(trial.histories[MOMENTUM[body]])[grown]
+        errors[2, start] = angles_between(trial.attitudes, reference.attitudes)[grown]
+        cpu[start] = trial.cpu_seconds
+    return xarray.Dataset(
+        {
+            "error": (("quantity", "start", "time"), errors),
+            "cpu_seconds": (("start",), cpu),
+        },
+        coords={"quantity": list(QUANTITIES), "time": moments[grown]},
+        attrs={"body": body, "precision": precision, "held": int(held)},
+    )
+
+
+@dataclass(frozen=True)
+class Fit:
+    """error = factor * t^exponent; sigma: of the exponent; start, end: of the times that it was fitted to."""
+
+    exponent: float
+    sigma: float
+    factor: float
+    start: float
+    end: float
+
+
+def fit(measured: xarray.Dataset, quantity: str) -> Fit | None:
+    """Growth of one quantity; None where fewer than five times can be used."""
+    values = measured["error"].sel(quantity=quantity).values
+    moments = measured["time"].values
+    with np.errstate(invalid="ignore"):
+        usable = (moments >= FIT_FROM) & (np.median(values, axis=0) > 0)
+    if quantity == "attitude":
+        usable &= np.median(values, axis=0) < LOST
+    if usable.sum() < 5:
+        return None
+    x, chosen = np.log(moments[usable]), values[:, usable]
+    exponent, offset = _line(x, chosen)
+    generator = np.random.default_rng(0)
+    again = [_line(x, chosen[generator.integers(0, len(chosen), len(chosen))])[0] for _ in range(400)]
+    return Fit(exponent, float(np.std(again)), math.exp(offset), moments[usable][0], moments[usable][-1])
+
+
+def _line(x: np.ndarray, values: np.ndarray) -> tuple[float, float]:
+    typical = np.sqrt(np.mean(values**2, axis=0))
+    exponent, offset = np.polyfit(x, np.log(np.maximum(typical, 1e-300)), 1)
+    return float(exponent), float(offset)
+
+
+def checks(measured: Sequence[xarray.Dataset]) -> list[Check]:
+    """Exponents against the laws: faster growth than the law by more than three sigma fails."""
+    found = []
+    for data in measured:
+        body, precision, held = data.attrs["body"], data.attrs["precision"], bool(data.attrs["held"])
+        for quantity in QUANTITIES:
+            fitted = fit(data, quantity)
+            if fitted is None:
+                continue
+            law = LAW[quantity] if not held else (HELD_LAW if quantity == "attitude" else 0.5)
+            title = f"{body}, {precision}{', held' if held else ''}: exponent of {quantity}"
+            origin = f"Brouwer 1937: t^{LAW[quantity]}" if not held else f"frequencies held: at most t^{law}"
+            source = (
+                f"{origin}; fitted {fitted.exponent:.2f} +- {fitted.sigma:.2f}; three of these may be over"
+            )
+            over = max(fitted.exponent, law)
+            found.append(Check(title, over, law, max(3 * fitted.sigma, 0.02), "1", source, "absolute"))
+    return found
+
+
+def draw(measured: Sequence[xarray.Dataset], out: Path) -> Path:
+    """Medians, quartiles and lines: a row for each body, a column for each quantity."""
+    figure = new_figure(
+        14, 8.6, "Errors over long runs: random walks, t^1/2 and t^3/2, unless the invariants are held"
+    )
+    grid = figure.subplots(len(BODIES), len(QUANTITIES), squeeze=False)
+    colors = {"single": GREY, "double": BLUE, "extended": ORANGE}
+    for row, body in zip(grid, BODIES, strict=True):
+        for axes, quantity in zip(row, QUANTITIES, strict=True):
+            for data in measured:
+                if data.attrs["body"] == body:
+                    _curve(axes, data, quantity, colors[data.attrs["precision"]])
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            unit = "rad" if quantity == "attitude" else "relative"
+            tidy(axes, "time, radians of the fastest rate", f"{quantity} error, {unit}", body)
+            axes.legend(fontsize=7.5, loc="upper left", frameon=False)
+            low, high = axes.get_ylim()
+            axes.set_ylim(low, high * (high / low) ** 0.28)  # room for the legend
+    return save(figure, out, NAME)
+
+
+def _curve(axes, data: xarray.Dataset, quantity: str, color: str) -> None:  # type: ignore[no-untyped-def]
+    held = bool(data.attrs["held"])
+    values = np.maximum(data["error"].sel(quantity=quantity).values, 1e-23)
+    moments = data["time"].values
+    low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
+    fitted = fit(data, quantity)
+    label = f"{data.attrs['precision']}{', held' if held else ''}"
+    if fitted is not None:
+        label += f": t^({fitted.exponent:.2f} ± {fitted.sigma:.2f})"
+    axes.fill_between(moments, low, high, color=color, alpha=0.18 if not held else 0.1, linewidth=0)
+    axes.plot(
+        moments, middle, "o" if not held else "s", color=color, markersize=4, label=label,
+        markerfacecolor=color if held else "white",
+    )  # fmt: skip
+    if fitted is not None:
+        span = np.array([fitted.start, fitted.end])
+        axes.plot(span, fitted.factor * span**fitted.exponent, color=color, linewidth=1.1)
+
+
+def markdown(measured: Sequence[xarray.Dataset]) -> str:
+    """The exponents, and the attitude error at the end, as a table."""
+    lines = [
+        "| scene | precision | held | to, rad | energy | angular momentum | attitude | attitude error there |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for data in measured:
+        fits = [fit(data, quantity) for quantity in QUANTITIES]
+        cells = ["-" if f is None else f"{f.exponent:.2f} ± {f.sigma:.2f}" for f in fits]
+        final = data["error"].sel(quantity="attitude").values[:, -1]
+        quartiles = " to ".join(f"{x:.1e}" for x in np.percentile(final, (25, 75)))
+        lines.append(
+            f"| {data.attrs['body']} | {data.attrs['precision']} | {'yes' if data.attrs['held'] else 'no'} "
+            f"| {data['time'].values[-1]:.0e} | {' | '.join(cells)} | {np.median(final):.1e} ({quartiles}) |"
+        )
+    return "\n".join(lines)
+
+
+def long_horizon(full: bool, out: Path) -> list[Check]:
+    """Measure, draw, print the exponents."""
+    horizons = FULL if full else REDUCED
+    measured = []
+    for body in BODIES:
+        for precision, horizon in horizons.items():
+            for held in (False, True):
+                print(f"{body}, {precision}, {'held' if held else 'plain'}", file=sys.stderr, flush=True)
+                measured.append(measure(body, precision, held, horizon))
+                keep(measured, out)
+    draw(measured, out)
+    print(markdown(measured))
+    return checks(measured)
+
+
+def keep(measured: Sequence[xarray.Dataset], out: Path) -> None:
+    """What is there so far, as ``long_horizon.h5``: a group for each series."""
+    out.mkdir(parents=True, exist_ok=True)
+    for n, data in enumerate(measured):
+        mode = "w" if n == 0 else "a"
+        data.to_netcdf(out / f"{NAME}.h5", mode=mode, group=f"series_{n}", engine="h5netcdf")
+
+
+if __name__ == "__main__":
+    sys.exit(main(long_horizon, NAME))

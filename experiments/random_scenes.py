@@ -1,0 +1,293 @@
+"""Random scenes of every kind that rigidsim knows, as config texts: bodies, loads, units, horizons, samples.
+
+The same seed and number always give the same scene. Motions are drawn with rates of order one, and units of
+time, mass and length over many decades are put on afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+_CHAOTIC_HORIZON = 300.0  # rad: past it no number of digits in reach is left
+_TIGHT_HORIZON = 300.0  # where the accuracy asked for needs quadruple precision: seconds instead of minutes
+_TIGHT = 1e-15
+_LOOSE = 3e-5
+
+
+Vector = Sequence[float] | np.ndarray
+
+
+@dataclass(frozen=True)
+class RandomScene:
+    """One scene.
+
+    Attributes:
+        kind: of scene, a key of ``KINDS``.
+        text: TOML, with the accuracy asked for.
+        accuracy: rad.
+        radians: about how far the body turns.
+    """
+
+    number: int
+    kind: str
+    text: str
+    accuracy: float
+    radians: float
+
+
+class _Draw:
+    """Random numbers of one scene, in its own units."""
+
+    def __init__(self, generator: np.random.Generator) -> None:
+        self.random = generator
+        self.time = 10 ** generator.uniform(-3, 4)
+        self.mass = 10 ** generator.uniform(-6, 6)
+        self.length = 10 ** generator.uniform(-3, 3)
+        self.horizon = 1e4
+        self.lines: list[str] = []
+        self.more: list[str] = []
+        self.parameters: list[str] = []
+
+    def between(self, low: float, high: float) -> float:
+        return float(self.random.uniform(low, high))
+
+    def decades(self, low: float, high: float) -> float:
+        return float(10 ** self.random.uniform(low, high))
+
+    def direction(self) -> np.ndarray:
+        vector = self.random.standard_normal(3)
+        return vector / np.linalg.norm(vector)
+
+    def moments(self) -> np.ndarray:
+        """Of an asymmetric body, in random order."""
+        masses = self.random.uniform(0.2, 1.0, 3)  # the second moments of mass: any positive three
+        return masses.sum() - masses
+
+    def body(self, moments: Vector, arm: Vector | None = None, *, turned: bool = False) -> None:
+        """``[body]``; the arm of gravity in units of length; ``turned``: axes that aren't the principal ones."""
+        size = self.mass * self.length**2
+        inertia = np.diag(np.asarray(moments, dtype=float) * size)
+        if turned:
+            axes = np.linalg.qr(self.random.standard_normal((3, 3)))[0]
+            inertia = axes @ inertia @ axes.T
+            inertia = (inertia + inertia.T) / 2
+            self.lines.append(f"inertia_tensor = {[[float(x) for x in row] for row in inertia]}")
+        else:
+            self.lines.append(f"principal_moments = {[float(x) for x in np.diag(inertia)]}")
+        self.lines.append(f"mass = {self.mass!r}")
+        if arm is not None:
+            self.lines.append(f"center_of_mass = {[float(x * self.length) for x in arm]}")
+
+    def start(self, rates: Vector, **more: Vector) -> None:
+        """``[initial]``; further vectors are in units of length (and time, for velocities)."""
+        quaternion = self.random.standard_normal(4)
+        self.lines.append("[initial]")
+        self.lines.append(f"angular_velocity = {[float(w / self.time) for w in rates]}")
+        self.lines.append(f"quaternion = {[float(x) for x in quaternion / np.linalg.norm(quaternion)]}")
+        unit = {"position": self.length, "velocity": self.length / self.time}
+        self.lines += [f"{k} = {[float(x * unit[k]) for x in v]}" for k, v in more.items()]
+
+    def load(self, kind: str, *lines: str) -> None:
+        self.more += ["[[loads]]", f'kind = "{kind}"', *lines]
+
+    def gravity(self, strength: float) -> None:
+        """Such that mass times acceleration times a unit of length is the strength."""
+        down = [0.0, 0.0, -strength * self.length / self.time**2]
+        self.load("uniform_gravity", f"acceleration = {down}")
+
+    def sometimes(self, chance: float) -> bool:
+        return bool(self.random.random() < chance)
+
+
+def _symmetric(draw: _Draw) -> None:
+    along = draw.between(0.1, 1.9)
+    draw.body([1, 1, along], turned=draw.sometimes(0.3))
+    draw.start(draw.direction())
+
+
+def _asymmetric(draw: _Draw) -> None:
+    draw.body(draw.moments(), turned=draw.sometimes(0.4))
+    draw.start(draw.direction())
+
+
+def _near_separatrix(draw: _Draw) -> None:
+    draw.body(np.sort(draw.moments()))
+    draw.start([draw.decades(-12, -2), 1.0, draw.decades(-12, -2)])
+
+
+def _needle(draw: _Draw) -> None:
+    thin = draw.decades(-5, -2)
+    draw.body([1, 1 - thin * draw.between(-0.5, 0.5), thin])
+    draw.start(draw.direction() * [1, 1, draw.between(0.5, 10)])
+
+
+def _plate(draw: _Draw) -> None:
+    across = draw.between(0.2, 1)
+    draw.body([1, across, 1 + across], turned=draw.sometimes(0.3))
+    draw.start(draw.direction())
+
+
+def _heavy_symmetric(draw: _Draw) -> None:
+    draw.body([1, 1, draw.between(0.2, 1.5)], [0, 0, draw.between(0.3, 1)])
+    draw.start(draw.direction() * [1, 1, draw.between(1, 5)])
+    draw.gravity(draw.decades(-1, 0.5))
+
+
+def _kovalevskaya(draw: _Draw) -> None:
+    draw.body([2, 2, 1], [draw.between(0.2, 1), 0, 0])
+    draw.start(draw.direction() * 2)
+    draw.gravity(draw.decades(-1, 0))
+
+
+def _heavy_asymmetric(draw: _Draw) -> None:
+    draw.horizon = _CHAOTIC_HORIZON
+    draw.body(draw.moments(), draw.direction() * draw.between(0.2, 1))
+    draw.start(draw.direction() * draw.between(1, 3))
+    draw.gravity(draw.decades(-1, 0.3))
+
+
+def _fixed_source(draw: _Draw) -> None:
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction())
+    where = draw.direction() * 1e3 * draw.length
+    strength = (draw.decades(-1.5, -0.5) / draw.time) ** 2 * (1e3 * draw.length) ** 3
+    draw.load(
+        "gravity_gradient",
+        f"gravitational_parameter = {float(strength)!r}",
+        f"position = {[float(x) for x in where]}",
+    )
+
+
+def _orbit(draw: _Draw, eccentricity: float) -> None:
+    draw.horizon = 1e3
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction() * draw.between(0.5, 1))
+    axis = 1e3 * draw.length
+    motion = draw.between(0.05, 0.4) / draw.time
+    angles = ", ".join(
+        f"{name} = {draw.between(0, 3)!r}"
+        for name in ("inclination", "ascending_node", "periapsis", "mean_anomaly")
+    )
+    draw.load(
+        "gravity_gradient",
+        f"gravitational_parameter = {motion**2 * axis**3!r}",
+        f"orbit = {{semi_major_axis = {axis!r}, eccentricity = {eccentricity!r}, {angles}}}",
+    )
+
+
+def _circular_orbit(draw: _Draw) -> None:
+    _orbit(draw, 0.0)
+
+
+def _eccentric_orbit(draw: _Draw) -> None:
+    _orbit(draw, draw.between(0.01, 0.4))
+
+
+def _central_gravity(draw: _Draw) -> None:
+    draw.horizon = 1e3
+    draw.body(draw.moments())
+    distance, motion = draw.decades(1.5, 3), draw.between(0.05, 0.4)
+    speed = motion * distance * draw.between(0.9, 1.1)
+    tilt = draw.between(0, 3)
+    draw.start(
+        draw.direction(),
+        position=[distance, 0, 0],
+        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
+    )
+    strength = motion**2 * distance**3 * draw.length**3 / draw.time**2
+    draw.load("central_gravity", f"gravitational_parameter = {strength!r}")
+
+
+def _free_flight(draw: _Draw) -> None:
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction(), position=draw.direction(), velocity=draw.direction())
+    draw.gravity(draw.between(0.1, 1))
+
+
+def _viscous(draw: _Draw) -> None:
+    draw.body(draw.moments())
+    draw.start(draw.direction())
+    unit = draw.mass * draw.length**2 / draw.time * draw.decades(-5, -2)
+    draw.load("viscous_torque", f"coefficients = {[unit * draw.between(0.3, 1) for _ in range(3)]}")
+
+
+def _torque(draw: _Draw, frame: str, components: Sequence[str]) -> None:
+    draw.horizon = 1e3
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction())
+    size = draw.mass * draw.length**2 / draw.time**2
+    draw.parameters = [
+        f"k = {size * draw.decades(-4, -1)!r}",
+        f"n = {draw.between(0.1, 2) / draw.time!r}",
+    ]
+    draw.load("torque", f"components = {list(components)}", f'frame = "{frame}"')
+
+
+def _body_torque(draw: _Draw) -> None:
+    _torque(draw, "body", ["k*sin(n*t)", "0.5*k", "-k*wx*wy/n^2"])
+
+
+def _space_torque(draw: _Draw) -> None:
+    _torque(draw, "space", ["k*cos(n*t)^2", "-k*sin(n*t)", "0.2*k"])
+
+
+def _pulse(draw: _Draw) -> None:
+    """A short push late in the run, of which no beginning of the motion knows."""
+    _torque(draw, "body", ["k*exp(-(n*(t - late))^2)", "0", "3*k*exp(-(n*(t - late))^2)"])
+
+
+KINDS: dict[str, Callable[[_Draw], None]] = {
+    "symmetric": _symmetric,
+    "asymmetric": _asymmetric,
+    "near separatrix": _near_separatrix,
+    "needle": _needle,
+    "plate": _plate,
+    "heavy symmetric top": _heavy_symmetric,
+    "Kovalevskaya top": _kovalevskaya,
+    "heavy asymmetric top": _heavy_asymmetric,
+    "fixed source": _fixed_source,
+    "circular orbit": _circular_orbit,
+    "eccentric orbit": _eccentric_orbit,
+    "central gravity": _central_gravity,
+    "free flight": _free_flight,
+    "viscous": _viscous,
+    "torque, body axes": _body_torque,
+    "torque, space axes": _space_torque,
+    "late pulse": _pulse,
+}
+
+
+def random_scene(number: int, seed: int = 0) -> RandomScene:
+    """Scene ``number`` of a seed; kinds take turns."""
+    kind = list(KINDS)[number % len(KINDS)]
+    draw = _Draw(np.random.default_rng([seed, number]))
+    KINDS[kind](draw)
+    accuracy = draw.decades(-20, -15) if draw.sometimes(0.05) else draw.decades(-15, -3)
+    most = min(draw.horizon, _TIGHT_HORIZON if accuracy < _TIGHT else math.inf)
+    radians = draw.decades(1, math.log10(most))
+    end = radians * draw.time
+    if kind == "late pulse":
+        draw.parameters.append(f"late = {end * draw.between(0.5, 0.95)!r}")
+    samples = round(draw.decades(math.log10(2), math.log10(2000)))
+    parameters = ["[parameters]", *draw.parameters] if draw.parameters else []
+    fixed = []
+    if draw.sometimes(0.35):  # where there is a closed form it would nearly always be chosen
+        fixed.append('method = "taylor"')
+    if accuracy > _LOOSE and draw.sometimes(0.15):
+        fixed.append('precision = "single"')
+    lines = [
+        f'name = "scene{number}"',
+        *parameters,
+        "[body]",
+        *draw.lines,
+        *draw.more,
+        f"[time]\nend = {end!r}\nsamples = {samples}",
+        f"[integrator]\naccuracy = {accuracy!r}",
+        *fixed,
+        '[output]\nrecord = ["quaternion"]\ntimeline = false',
+    ]
+    return RandomScene(number, kind, "\n".join(lines) + "\n", accuracy, radians)

@@ -1,0 +1,1 @@
+"""Measuring how fast and how right the settings of one scene are."""

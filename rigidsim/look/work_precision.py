@@ -1,0 +1,156 @@
+"""The work-precision figure: attitude error against cost of every measured setting, and the Pareto front."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidsim.look.figures import STYLE
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLORS = {"single": "#8c8c8c", "double": "#2166ac", "extended": "#e08214", "quadruple": "#762a83"}
+_OTHER = "#1b9e77"
+_MARKERS = {
+    "quaternion": "o",
+    "rotation_matrix": "s",
+    "euler_angles": "^",
+    "canonical": "D",
+    "closed_form": "*",
+}
+_FRONT = "#1b2733"
+
+
+def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
+    """Draw a tradeoff dataset as a page: the plot, and beside it what its numbered points are.
+
+    Args:
+        path: PNG or SVG; replaced only when the new file is complete.
+    """
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        figure = Figure(figsize=(12, 6.4), layout="constrained")
+        FigureCanvasAgg(figure)
+        left, right = figure.subplots(1, 2, width_ratios=(1.55, 1))
+        draw_points(left, dataset)
+        _key(right, dataset)
+        _title(figure, dataset)
+        figure.canvas.draw()
+        figure.set_layout_engine("none")  # the numbers are placed by what is drawn now
+        error, cost, front = _plotted(dataset)
+        _number(left, cost[front], error[front])
+        partial = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+        try:
+            figure.savefig(partial, dpi=130, format=path.suffix[1:])
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
+    return path
+
+
+def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Error against cost on logarithmic axes, the front as a stair."""
+    error, cost, front = _plotted(dataset)
+    held, short = dataset["held"].values.astype(bool), dataset["status"].values == "measured over less"
+    for n in np.nonzero(np.isfinite(error) & np.isfinite(cost))[0]:
+        color, marker = _look(dataset, int(n))
+        axes.plot(
+            cost[n], error[n], marker, markersize=11 if marker == "*" else 6.5, color=color,
+            markerfacecolor=color if held[n] or marker == "*" else "white", markeredgewidth=1.3,
+            alpha=0.45 if short[n] else 1.0, linestyle="none", zorder=3,
+        )  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    if len(front):
+        axes.step(cost[front], error[front], where="post", color=_FRONT, linewidth=1.1, zorder=2)
+    axes.set_xlabel("CPU time, relative to double precision in quaternions (measured in the same processes)")
+    axes.set_ylabel("largest attitude error, rad")
+    axes.margins(0.08)
+    _legend(axes, dataset, short.any())
+
+
+def _number(axes: Axes, cost: np.ndarray, error: np.ndarray) -> None:
+    """Numbers left of the front's points, where nothing else is; where two are near, one goes below."""
+    points = axes.transData.transform(np.column_stack([cost, error])) * 72.0 / axes.figure.dpi
+    places: list[np.ndarray] = []
+    for number, point in enumerate(points, start=1):
+        place = np.array([point[0] - 7.0, point[1]])
+        while any(abs(place[0] - x) < 15.0 and abs(place[1] - y) < 9.5 for x, y in places):
+            place[1] -= 1.0
+        places.append(place)
+        axes.annotate(
+            str(number), point, xytext=place, xycoords="figure points", textcoords="figure points",
+            ha="right", va="center", fontsize=8.5, fontweight="bold", color=_FRONT, zorder=4,
+        )  # fmt: skip
+
+
+def _plotted(dataset: xarray.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Errors, costs, and the indices of the front from cheap to dear."""
+    error = np.maximum(dataset["attitude_error_largest"].values, dataset["reference_error"].values)
+    cost = dataset["cpu_ratio"].values
+    front = np.nonzero(dataset["on_front"].values)[0]
+    return error, cost, front[np.argsort(cost[front])]
+
+
+def _look(dataset: xarray.Dataset, n: int) -> tuple[str, str]:
+    one = dataset.isel(setting=n)
+    closed = one["method"].item() == "closed_form"
+    kind = "closed_form" if closed else str(one["formulation"].item())
+    return _COLORS.get(str(one["precision"].item()), _OTHER), _MARKERS.get(kind, "o")
+
+
+def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    def handle(label: str, **options: Any) -> Line2D:
+        return Line2D([], [], linestyle="none", label=label, markersize=7, **options)
+
+    shown = np.isfinite(dataset["cpu_ratio"].values)
+    precisions = set(dataset["precision"].values[shown])
+    kinds = set(dataset["formulation"].values[shown])
+    closed = (dataset["method"].values[shown] == "closed_form").any()
+    handles = [handle(p, marker="o", color=c) for p, c in _COLORS.items() if p in precisions]
+    grey = {"color": "#444444", "markerfacecolor": "white", "markeredgewidth": 1.3}
+    handles += [handle(k.replace("_", " "), marker=m, **grey) for k, m in _MARKERS.items() if k in kinds]
+    if closed:
+        handles.append(handle("closed form", marker="*", color="#444444"))
+    handles.append(handle("filled: invariants held", marker="o", color="#444444"))
+    if short:
+        handles.append(handle("pale: over less of the motion", marker="o", color="#444444", alpha=0.45))
+    handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
+    axes.legend(handles=handles, loc="upper right", ncols=2, fontsize=8, frameon=True, framealpha=0.9)
+
+
+def _key(axes: Axes, dataset: xarray.Dataset) -> None:
+    """The numbered points in words."""
+    error, cost, front = _plotted(dataset)
+    axes.axis("off")
+    axes.set_title("The best settings, from the cheapest")
+    size = 9.0 if len(front) <= 22 else 9.0 * 22 / len(front)
+    lines = 1.0 / max(len(front) + 1, 16)
+    columns = ((0.0, "left"), (0.05, "left"), (0.82, "right"), (1.0, "right"))
+    for (x, align), text in zip(columns, ("", "setting", "cost", "error, rad"), strict=True):
+        axes.text(x, 1.0, text, ha=align, va="top", color="#666666", fontsize=size, transform=axes.transAxes)
+    for row, n in enumerate(front, start=1):
+        shown = (str(row), str(dataset["setting"].values[n]), f"{cost[n]:.3g}", f"{error[n]:.1e}")
+        for (x, align), text, weight in zip(columns, shown, ("bold", *["normal"] * 3), strict=True):
+            axes.text(
+                x, 1.0 - row * lines, text, ha=align, va="top", fontsize=size, fontweight=weight,
+                transform=axes.transAxes,
+            )  # fmt: skip
+
+
+def _title(figure: Figure, dataset: xarray.Dataset) -> None:
+    attrs = dataset.attrs
+    over = "over its first" if attrs["measured_seconds"] < attrs["horizon_seconds"] else "over"
+    words = f"{attrs['title']}: speed against accuracy {over} {attrs['measured_seconds']:.4g} s"
+    figure.suptitle(words, fontsize=12.5, fontweight="bold")

@@ -1,0 +1,66 @@
+"""``rigidsim tradeoff`` from the command line: table, files, refusals."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import xarray
+
+
+def test_table_dataset_and_figure(config: Callable[..., str], rigidsim_command: Callable[..., Any]) -> None:
+    name = config(time="end = 20\nsamples = 5", rest='record = ["angular_velocity"]')
+    told = rigidsim_command("tradeoff", name, "--budget", "25", "--repeats", "1", "--json")
+    assert told.exit_code == 0, told.stderr
+    result = json.loads(told.stdout)
+    with xarray.open_dataset("runs/free_tradeoff/tradeoff.h5") as data:
+        assert data.sizes["setting"] == len(result["settings"])
+    assert Path("runs/free_tradeoff/tradeoff.png").stat().st_size > 20_000
+    levels = [row["at_most"] for row in result["advice"]]
+    costs = [row["cost"] for row in result["advice"]]
+    assert levels == sorted(levels, reverse=True)
+    assert costs == sorted(costs)
+    assert "attitudes" in result["compared"]
+    assert all(row["reason"] or row["cpu_ratio"] is not None for row in result["settings"]
+               if row["status"] == "left out")  # fmt: skip
+
+    again = rigidsim_command("tradeoff", name, "--budget", "25")
+    assert again.exit_code == 2
+    assert "there is an earlier measurement; give --force" in again.stderr
+
+    # what it advises can be run
+    for row in result["advice"][:2]:
+        keys = [f"--set=integrator.{key.replace(' ', '')}" for key in row["keys"]]
+        ran = rigidsim_command("run", name, "--force", *keys)
+        assert ran.exit_code == 0, ran.stderr
+
+
+def test_the_printed_table_says_what_was_measured(
+    config: Callable[..., str], rigidsim_command: Callable[..., Any]
+) -> None:
+    name = config(time="end = 1e7\nsamples = 5")
+    told = rigidsim_command("tradeoff", name, "--budget", "12", "--repeats", "1", "--out", "elsewhere")
+    assert told.exit_code == 0, told.stderr
+    assert "for this accuracy, use this" in told.stdout
+    assert "keys of [integrator]" in told.stdout
+    assert "nothing is extrapolated" in told.stdout
+    assert "the first 0." in told.stdout
+    assert "closed form to 50 digits" in told.stdout
+    assert Path("elsewhere/free_tradeoff/tradeoff.h5").exists()
+
+
+def test_impossible_requests_end_with_a_message(
+    config: Callable[..., str], rigidsim_command: Callable[..., Any]
+) -> None:
+    short = rigidsim_command("tradeoff", config(), "--budget", "1")
+    assert short.exit_code == 2
+    assert "--budget 1 s is too short; 5 s or more is needed" in short.stderr
+    bad = rigidsim_command("tradeoff", config(), "--set", "time.end=-1")
+    assert bad.exit_code == 2
+    assert "[time] end" in bad.stderr
+    Path("plain").write_text("")
+    blocked = rigidsim_command("tradeoff", config(), "--out", "plain")
+    assert blocked.exit_code == 2
+    assert "can't be made" in blocked.stderr
