@@ -308,9 +308,14 @@ def small_disk(folder: Path) -> Iterator[Callable[[int], None]]:
     mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", folder], capture_output=True)
     if mounted.returncode == 0:
         try:
-            yield lambda size: subprocess.run(
-                ["mount", "-o", f"remount,size={size}", folder], check=True, capture_output=True
-            ) and None
+            yield (
+                lambda size: (
+                    subprocess.run(
+                        ["mount", "-o", f"remount,size={size}", folder], check=True, capture_output=True
+                    )
+                    and None
+                )
+            )
         finally:
             subprocess.run(["umount", folder], check=True)
         return

@@ -68,7 +68,7 @@ class _Draw:
         return masses.sum() - masses
 
     def body(self, moments: Vector, arm: Vector | None = None, *, turned: bool = False) -> None:
-        """``[body]``; the arm of gravity in units of length; ``turned``: axes that aren't the principal ones."""
+        """``[body]``; the arm of gravity in units of length; ``turned``: not the principal axes."""
         size = self.mass * self.length**2
         inertia = np.diag(np.asarray(moments, dtype=float) * size)
         if turned:

@@ -23,6 +23,8 @@ from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.store.variables import Variable, time_variable
 
+_LARGEST_EXPONENT = 600.0  # keeps products within doubles
+
 
 @dataclass(frozen=True)
 class Prepared:
@@ -170,8 +172,8 @@ def _check_tolerance(tolerance: Any | None, precision: Precision) -> None:
         raise ConfigError(
             Problem(
                 "[integrator] tolerance",
-                f"given {given}, but {precision.name} precision rounds each number by about {epsilon}, so that "
-                f'tolerances below that gain nothing; {shortest} or more is allowed: choose "auto", or a '
+                f"given {given}, but {precision.name} precision rounds each number by about {epsilon}, so "
+                f'that tolerances below that gain nothing; {shortest} or more is allowed: choose "auto", or a '
                 "higher precision for more digits",
             )
         )
@@ -254,4 +256,27 @@ def motion_growth(prepared: Prepared) -> Growth:
         return Growth(factor=1.0, seconds=0.0, rate=0.0, window=0.0)
     system = double_twin(prepared)
     clock, last = prepared.clock, prepared.clock.count - 1
-    return measure_growth(system, precision_of("double"), float(clock.at(0)), float(clock.at(last)))
+    growth = measure_growth(system, precision_of("double"), float(clock.at(0)), float(clock.at(last)))
+    return _beyond_measure(prepared, growth) if growth.saturated else growth
+
+
+def _beyond_measure(prepared: Prepared, growth: Growth) -> Growth:
+    """The growth of a motion past an unstable axis, where offsets became too large to be measured.
+
+    In elliptic functions of parameter m a change of m moves each passage by 1 / (1 - m) times as much, as far
+    as there is time to: errors grow no faster than exp(p t), with p the rate of the functions' argument. The
+    motion being integrable, they don't grow exponentially for longer. In the unstable state itself, which
+    has no m, they grow as fast as they were seen to.
+    """
+    scene = prepared.scene
+    form = closed_form_of(scene, driven=bool(prepared.python_loads))
+    if isinstance(form, str):
+        return growth
+    seconds = float(scene.samples.last - scene.samples.start)
+    argument = getattr(form.motion, "argument", None)
+    if argument is None:
+        return replace(growth, rate=max(growth.rate, growth.passing_rate), window=0.0)
+    passage = min(float(argument.speed) * math.ldexp(seconds, -form.scaling.time), _LARGEST_EXPONENT)
+    complement = max(float(argument.lattice.complement), math.exp(-_LARGEST_EXPONENT))
+    factor = max(growth.factor, min(1 / complement, math.exp(passage)))
+    return replace(growth, factor=factor, rate=0.0)

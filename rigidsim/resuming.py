@@ -64,6 +64,7 @@ def resume(
         experiment = _config(folder, overrides)
         if until is not None:
             experiment = _prolonged(experiment, until)
+        experiment = _guarded(experiment, overrides)
         # a run that was killed while its dataset was completed has both, and is completed again
         finished = folder.dataset.exists() and not folder.segments.exists()
         if finished and until is None:
@@ -112,12 +113,16 @@ def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
         text = folder.config.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RunFolderError(f"{folder.config}: can't be read ({error})") from None
-    experiment = parse_saved(text, source=str(folder.config))
-    if overrides:
-        guarded = parse_saved(text, source=str(folder.config), overrides=overrides)
-        limits = guarded.config.limits
-        experiment = replace(experiment, config=experiment.config.model_copy(update={"limits": limits}))
-    return experiment
+    return parse_saved(text, source=str(folder.config))
+
+
+def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
+    """The same experiment, and text, under other guards."""
+    if not overrides:
+        return experiment
+    guarded = parse_saved(experiment.text, source=experiment.source, overrides=overrides)
+    limits = guarded.config.limits
+    return replace(experiment, config=experiment.config.model_copy(update={"limits": limits}))
 
 
 def _prolonged(experiment: Experiment, until: str) -> Experiment:

@@ -136,8 +136,8 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
     if system.requirements.formulation == "rates":
         if estimate is not None and estimate > _LOST_DIGITS:
             found.append(
-                f"the angular velocity is uncertain by about {min(estimate, 2.0):.2g} of its size at the end, so "
-                f"its digits are gone{_since(prepared, progress, growth)}; choose a higher precision or a "
+                f"the angular velocity is uncertain by about {min(estimate, 2.0):.2g} of its size at the end, "
+                f"so its digits are gone{_since(prepared, progress, growth)}; choose a higher precision or a "
                 "nearer end"
             )
     elif estimate is not None and estimate > _LOST_DIGITS:
@@ -229,8 +229,8 @@ def attitude_error(
 def estimated_error(
     prepared: Prepared, progress: Progress, growth: Growth | None, watch: Watch
 ) -> float | None:
-    """Estimate at the end, rad (of rates: relative to their size): the round-off law times the motion's growth
-    and the formulation's own; a few roundings for a closed form.
+    """Estimate at the end, rad (of rates: relative to their size): the round-off law times the growth by the
+    motion and by the formulation; a few roundings for a closed form.
     """
     if growth is None:
         return None

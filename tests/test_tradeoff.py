@@ -250,9 +250,9 @@ def test_of_a_long_motion_the_beginning_is_measured_and_that_is_said() -> None:
 
 @pytest.mark.slow
 def test_settings_past_the_budget_are_listed_as_left_out() -> None:
-    plan = fixed_plan(1e6, closed=True, count=2)
-    settings = [Setting("quadruple"), Setting("extended")]  # half an hour in quadruple precision
-    data = dataset_of(measure(free(1e6), plan=plan, repeats=1, settings=settings, budget=40.0))
+    plan = fixed_plan(3e4, closed=True, count=2)
+    settings = [Setting("quadruple"), Setting("extended")]  # a minute in quadruple precision
+    data = dataset_of(measure(free(3e4), plan=plan, repeats=1, settings=settings, budget=40.0))
     assert data.sizes["setting"] == 3
     status = dict(zip(data["setting"].values, data["status"].values, strict=True))
     assert status[DEFAULT.title] == MEASURED

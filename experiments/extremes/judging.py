@@ -87,8 +87,9 @@ class _Samples:
         if factors is not None:
             self.watch.see_singular(factors, np.array([float(t) for t in seconds]))
         self.times += seconds
-        for row in zip(*recorded[self._name], strict=True):
-            self.rows.append([mpmath.fsum(float(x) for x in parts) for parts in zip(*row, strict=True)])
+        with mpmath.workdps(_DIGITS + 20):
+            for row in zip(*recorded[self._name], strict=True):
+                self.rows.append([mpmath.fsum(float(x) for x in parts) for parts in zip(*row, strict=True)])
 
     def due(self) -> bool:
         return False
@@ -130,7 +131,7 @@ def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) ->
     law = round_off_law(tolerance, progress.steps, rate, duration)
     steps = math.sqrt(max(progress.steps, 1))
     last_bits = _CLOSED * epsilon if prepared.closed is not None else epsilon * (_EVALUATION + _WALK * steps)
-    bound = FACTOR * law + last_bits
+    bound = last_bits if prepared.closed is not None else FACTOR * law + last_bits
     doubts = [w for w in found if "joined" not in w and "no effect" not in w]  # the others doubt the digits
     covered = estimate is not None and error <= FACTOR * estimate + last_bits
     kind = "SILENT"
@@ -182,7 +183,7 @@ def _angle(one: Sequence[Any], other: Sequence[Any]) -> Any:
 
 
 def _relative(found: Sequence[Any], exact: Sequence[Any]) -> Any:
-    """Largest difference over the largest size, of vectors at all samples; w and I w both have to be right."""
+    """Largest difference over the largest size, of vectors at all samples."""
     size = max(mpmath.norm(x) for x in exact)
     far = [
         mpmath.norm([a - b for a, b in zip(*pair, strict=True)]) for pair in zip(found, exact, strict=True)

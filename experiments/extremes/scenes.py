@@ -53,15 +53,16 @@ class Extreme:
             attitude = f"euler_angles = {written(self.angles)}"
         load = f'[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, {-self.gravity!r}]\n'
         times = [f"{k * self.end!r}/4" if k % 4 else repr(k * self.end / 4) for k in range(5)]
-        digits = precision if isinstance(precision, int) else f'"{precision}"'
         return (
             f'name = "extreme"\n[body]\n{self.body}\n[initial]\nangular_velocity = {written(self.rates)}\n'
             f"{attitude}\n{load if self.gravity else ''}[time]\ntimes = {written(times)}\n[integrator]\n"
-            f"precision = {digits}\ntolerance = {'auto' if self.tolerance is None else self.tolerance!r}\n"
-            f'formulation = "{"auto" if closed else column}"\nmethod = "{"closed_form" if closed else "taylor"}"\n'
-            f'euler_sequence = "{self.sequence}"\nhold_invariants = {str(hold).lower()}\n'
+            f"precision = {precision if isinstance(precision, int) else repr(precision)}\n"
+            f"tolerance = {self.tolerance or 'auto'!r}\n"
+            f"formulation = '{'auto' if closed else column}'\n"
+            f"method = '{'closed_form' if closed else 'taylor'}'\n"
+            f"euler_sequence = '{self.sequence}'\nhold_invariants = {str(hold).lower()}\n"
             f'[output]\nrecord = ["{record}"]\ntimeline = false\n'
-        ).replace("tolerance = auto", 'tolerance = "auto"')
+        )
 
 
 def written(numbers: Sequence[object]) -> str:
@@ -264,8 +265,8 @@ def tops() -> Iterator[Extreme]:
             end = 1e-4 if name == "rod as a top" and digits > 3 else 20.0
             yield Extreme(f"heavy top, {name}", f"1e-{digits}", body, rates, end, start, gravity=1.0)
     for name, rates, start in (
-        ("asleep", (0, 0, -1), UPRIGHT), ("cusps", (0, 0, 3), TILTED), ("released from rest", (0, 0, 0), TILTED),
-        ("pendulum to the top", (2, 0, 0), UPRIGHT),
+        ("asleep", (0, 0, -1), UPRIGHT), ("cusps", (0, 0, 3), TILTED),
+        ("released from rest", (0, 0, 0), TILTED), ("pendulum to the top", (2, 0, 0), UPRIGHT),
     ):  # fmt: skip
         height = -1 if "pendulum" in name else 1
         yield Extreme("heavy top, other", name, top("1/2", height), rates, 20.0, start, gravity=1.0)

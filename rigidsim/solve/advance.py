@@ -23,6 +23,7 @@ _WORTH_A_GRID = 8
 _GRID_STRIDES = 4.0  # per sample, up to which grids (20 us each) cost less than skipping to each (85 us)
 _BLOCK_SPACING = 64.0  # steps per sample up to which blocks cost less than that: 0.8 us a step
 _GRID_ROWS = 2 * ROWS_AT_ONCE  # in a stride, which can't be shortened: bounds the memory
+_MOST_WAITING = 4 * ROWS_AT_ONCE  # samples in memory before they are evaluated, however fast they come
 _SPARSE = 12.0  # steps to a sample from which skipping costs less than single steps
 _FADING = 0.98  # of the longest step, per chunk
 _LOOK_AHEAD = 16  # samples
@@ -247,7 +248,8 @@ class Advance:
                 self._finish(place)
                 break
             self.rhythm.correct()
-            if not self.stepper.at_whole_time:
+            waiting = self.harvest.count - self.harvest.handed
+            if waiting >= _MOST_WAITING or not self.stepper.at_whole_time:
                 break
             count -= part
         return True

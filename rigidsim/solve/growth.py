@@ -8,23 +8,22 @@ knew only the law would promise digits that aren't there.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.solve.precision import Precision
-from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.stepper import Stepper
 
 PILOT_STEPS = 2000
 _CHUNK = 4  # steps between comparisons
 _LAUNCHES = 16
 _WINDOW = 64  # comparisons after each launch
-_LONG_WINDOW = 256  # where growth looks exponential
 _OFFSET = 2.0**-30  # of the scaled states: far above rounding, far below the motion
-_TOO_FAR = 2.0**-12
-"""Distance from which an offset is brought back to its size, so that growth is measured without an end: an
-offset of the size of the motion grows no more."""
+_SEEN = 2.0**-24  # distances between which an offset that saturates shows how fast it grew
+_SATURATED = 2.0**-7
+"""Distance of the size of the motion, from which an offset grows no more: what is found is a lower bound."""
 _STABLE = 4.0
 """Stable motions show up to about this, since an offset is no pure change of frequency."""
 _DOUBLING = math.log(
@@ -44,12 +43,16 @@ class Growth:
         seconds: how much of the motion was looked at.
         rate: of exponential growth beyond each comparison's window, 1/s; zero where growth is linear.
         window: length of a comparison, seconds.
+        saturated: whether ``factor`` is a lower bound only, since an offset became as large as the motion.
+        passing_rate: median rate of growth of the offsets that did, 1/s.
     """
 
     factor: float
     seconds: float
     rate: float
     window: float
+    saturated: bool = False
+    passing_rate: float = 0.0
 
     def at(self, seconds: float) -> float:
         """Amplification over a run of this length."""
@@ -67,76 +70,57 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
         system: built for ``precision``, which should be double: stability has no precision.
         start, end: of the run, internal units.
     """
-    followed = [
-        i for i, name in enumerate(system.states) if name not in ("x", "y", "z", "vx", "vy", "vz", "pace")
-    ]
+    apart = ("x", "y", "z", "vx", "vy", "vz", "pace")
+    followed = [i for i, name in enumerate(system.states) if name not in apart]
     reference = Stepper(system, precision, None, precision.scalar(start))
     marks = [reference.mark()]
     while reference.steps < PILOT_STEPS and float(reference.time) < end and reference.skip(_CHUNK):
         marks.append(reference.mark())
     times = [float(mark.time[0]) for mark in marks]
-    other = Stepper(system, precision, None, precision.scalar(start))
     rate = math.ldexp(float(system.rate_bound), system.scaling.time)
-    found = _compare(marks, other, followed, rate, _WINDOW)
-    if found.slope > _EXPONENTIAL:  # a window no longer than one passage near an unstable axis looks so too
-        longer = _compare(marks, other, followed, rate, _LONG_WINDOW)
-        if longer.span > 0:
-            found = replace(longer, largest=max(found.largest, longer.largest))
-    unit = math.ldexp(1.0, system.scaling.time)
-    exponential = found.slope > _EXPONENTIAL
-    return Growth(
-        factor=found.largest if found.largest > _STABLE else 1.0,
-        seconds=(min(times[-1], end) - start) * unit,
-        rate=(found.slope - _DOUBLING) / found.span / unit if exponential else 0.0,
-        window=found.window * unit,
-    )
-
-
-@dataclass(frozen=True)
-class _Found:
-    """What nearby motions did, internal units.
-
-    Attributes:
-        largest: growth of an offset over the linear one.
-        slope: median growth (logarithm) from half a window to a whole one, over ``span``; zero for none.
-        window: the longest.
-    """
-
-    largest: float
-    slope: float
-    span: float
-    window: float
-
-
-def _compare(marks: list[Mark], other: Stepper, followed: list[int], rate: float, looks: int) -> _Found:
-    """Launch motions next to the reference's marks and look how far they go from it."""
-    times = [float(mark.time[0]) for mark in marks]
     generator = np.random.default_rng(0)  # the same offsets each time
+    other = Stepper(system, precision, None, precision.scalar(start))
     largest, slopes, window = 0.0, [], 0.0
+    passing: list[float] = []
     for launch in np.linspace(0, max(len(marks) - 2, 0), _LAUNCHES).astype(int):
-        offset = np.zeros(len(marks[0].state))
+        offset = np.zeros(len(system.states))
         offset[followed] = generator.standard_normal(len(followed))
         offset *= _OFFSET / np.linalg.norm(offset)
         other.back_to(marks[launch])
         other.state[:] = marks[launch].state + offset
         grown: list[float] = []
-        brought_back = 1.0
-        for look in range(launch + 1, min(launch + 1 + looks, len(marks))):
+        for look in range(launch + 1, min(launch + 1 + _WINDOW, len(marks))):
             if not other.to(times[look]):
                 break
-            apart = other.state - marks[look].state
-            near = float(np.linalg.norm(apart[followed]))
-            distance = near * brought_back
+            distance = float(np.linalg.norm((other.state - marks[look].state)[followed]))
             linear = max(1.0, rate * (times[look] - times[launch]) / math.sqrt(3))
             largest = max(largest, distance / _OFFSET / linear)
             grown.append(distance)
-            if near > _TOO_FAR:
-                other.state[:] = marks[look].state + apart * (_OFFSET / near)
-                brought_back *= near / _OFFSET
+        passing += _passing_rate(times[launch + 1 : launch + 1 + len(grown)], grown)
         half = len(grown) // 2
-        if half >= looks // 4 and min(max(grown[:half]), max(grown[half:])) > 0:
+        if half >= _WINDOW // 4 and min(max(grown[:half]), max(grown[half:])) > 0:
             span = times[launch + 2 * half] - times[launch + half]
             slopes.append((math.log(max(grown[half:]) / max(grown[:half])), span))
             window = max(window, times[launch + 2 * half] - times[launch])
-    slope, span = sorted(slopes)[len(slopes) // 2] if slopes else (0.0, 0.0)
-    return _Found(largest, slope, span, window)
+    unit = math.ldexp(1.0, system.scaling.time)
+    slope, span = sorted(slopes)[len(slopes) // 2] if slopes else (0.0, 1.0)
+    exponential = slope > _EXPONENTIAL
+    return Growth(
+        factor=largest if largest > _STABLE else 1.0,
+        seconds=(min(times[-1], end) - start) * unit,
+        rate=(slope - _DOUBLING) / span / unit if exponential else 0.0,
+        window=window * unit,
+        saturated=bool(passing),
+        passing_rate=sorted(passing)[len(passing) // 2] / unit if passing else 0.0,
+    )
+
+
+def _passing_rate(times: list[float], grown: list[float]) -> list[float]:
+    """How fast an offset grew that saturated, in a list; an empty one for others."""
+    if not grown or max(grown) < _SATURATED:
+        return []
+    late = next(i for i, distance in enumerate(grown) if distance >= _SATURATED)
+    early = next(i for i, distance in enumerate(grown) if distance >= _SEEN)
+    if late == early:
+        return [0.0]
+    return [math.log(grown[late] / grown[early]) / (times[late] - times[early])]

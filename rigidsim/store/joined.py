@@ -80,9 +80,13 @@ def _rows(paths: Sequence[Path], starts: np.ndarray, name: str, rows: range, res
         return _rows(paths, starts, name, rows[::-1], rest)[::-1]
     pieces = []
     for path, start, stop in zip(paths, starts[:-1], starts[1:], strict=True):
-        inside = rows[-(-max(start - rows.start, 0) // rows.step) : -(-max(stop - rows.start, 0) // rows.step)]
+        inside = rows[
+            -(-max(start - rows.start, 0) // rows.step) : -(-max(stop - rows.start, 0) // rows.step)
+        ]
         if len(inside) or (not pieces and path == paths[-1]):
             with netcdf.reading(path) as file:
-                part = slice(inside.start - start, inside.stop - start, inside.step) if len(inside) else slice(0)
+                part = (
+                    slice(inside.start - start, inside.stop - start, inside.step) if len(inside) else slice(0)
+                )
                 pieces.append(np.asarray(file[name][(part, *rest)]))
     return np.concatenate(pieces)

@@ -53,7 +53,7 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def write_bytes(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: bytes | memoryview) -> None:
     """Write a small file atomically."""
     with atomic(path) as temporary:
         temporary.write_bytes(content)
@@ -114,7 +114,7 @@ def image(
     rows: int,
     attributes: Mapping[str, Any],
     groups: Mapping[str, Mapping[str, np.ndarray]],
-) -> bytes:
+) -> io.BytesIO:
     """A whole uncompressed file built in memory; ``groups`` hold plain arrays beside the variables."""
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
@@ -123,7 +123,7 @@ def image(
             fill(file, variables, block, 0, rows)
         for name, arrays in groups.items():
             _add_group(file.create_group(name), arrays)
-    return buffer.getvalue()
+    return buffer
 
 
 def _add_group(group: Any, arrays: Mapping[str, np.ndarray]) -> None:

@@ -7,6 +7,7 @@ something else, or by a version that didn't seal yet.
 from __future__ import annotations
 
 import hashlib
+import io
 import stat
 from pathlib import Path
 
@@ -16,14 +17,17 @@ _MARK = b"\nrigidsim sha256 "
 _LENGTH = len(_MARK) + 64 + 1
 
 
-def sealed(content: bytes) -> bytes:
-    """The content with its seal."""
-    return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+def sealed(content: io.BytesIO) -> memoryview:
+    """The content with its seal, in place: there may be a lot of it."""
+    digest = hashlib.sha256(content.getbuffer()).hexdigest()
+    content.seek(0, io.SEEK_END)
+    content.write(_MARK + digest.encode() + b"\n")
+    return content.getbuffer()
 
 
-def seal_of(content: bytes) -> str:
+def seal_of(content: memoryview) -> str:
     """The digest in the seal of sealed content."""
-    return content[-65:-1].decode()
+    return bytes(content[-65:-1]).decode()
 
 
 def seal(path: Path) -> tuple[str, str]:

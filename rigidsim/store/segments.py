@@ -129,7 +129,7 @@ class SegmentWriter:
 
     def _image(
         self, block: netcdf.Block, rows: int, checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
-    ) -> bytes:
+    ) -> memoryview:
         attributes = {**self._attributes, **place}
         groups = {"checkpoint": checkpoint, "events": events}
         return sealed(netcdf.image(self._variables, block, rows, attributes, groups))
@@ -146,14 +146,7 @@ class SegmentWriter:
             ) from error
 
     def _collected(self) -> netcdf.Block:
-        if not self._blocks:
-            return {}
-        return {
-            v.name: [
-                np.concatenate([block[v.name][part] for block in self._blocks]) for part in range(v.parts)
-            ]
-            for v in self._variables
-        }
+        return _Joined(self._blocks, self._variables)
 
     def complete(
         self,
@@ -199,6 +192,25 @@ class SegmentWriter:
             conclude()
         remove(self._folder)
         return rows
+
+
+class _Joined(Mapping[str, Sequence[np.ndarray]]):
+    """Blocks one after the other; only the variable that is asked for is in memory twice."""
+
+    def __init__(self, blocks: Sequence[netcdf.Block], variables: Sequence[Variable]) -> None:
+        self._blocks = blocks
+        self._parts = {v.name: v.parts for v in variables}
+
+    def __getitem__(self, name: str) -> list[np.ndarray]:
+        return [
+            np.concatenate([block[name][part] for block in self._blocks]) for part in range(self._parts[name])
+        ]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._parts)
+
+    def __len__(self) -> int:
+        return len(self._parts)
 
 
 def segment_paths(folder: Path) -> list[Path]:

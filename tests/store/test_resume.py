@@ -36,7 +36,9 @@ FLIGHT = (
     "[initial]\nangular_velocity = [0.3, 1.0, 0.5]\nposition = [4, 0, 1]\nvelocity = [0, 0.5, 0.1]\n"
     '[[loads]]\nkind = "central_gravity"\ngravitational_parameter = 1\n'
 )
-TINY = FREE.replace("[0.3, 1.0, 0.5]", '["1e-250", 1.0, "1e-290"]')  # no double residual holds their last bits
+TINY = FREE.replace(
+    "[0.3, 1.0, 0.5]", '["1e-250", 1.0, "1e-290"]'
+)  # no double residual holds their last bits
 EVENTS = '[[events]]\nname = "flip"\nexpression = "wz"\n'
 
 # body and loads, [integrator], [time], rest
@@ -128,9 +130,7 @@ def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> t
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_run_cut_many_times_is_the_run_in_one_go(
-    case: str, tmp_path: Path, impatient: None
-) -> None:
+def test_a_run_cut_many_times_is_the_run_in_one_go(case: str, tmp_path: Path, impatient: None) -> None:
     text = text_of(case)
     whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole")
     every = max(1, whole.summary["cost"]["steps"] // 4)
@@ -171,10 +171,16 @@ class Cut(BaseException):
 
 
 @pytest.mark.parametrize("moment", ["before the name", "after the name", "folder not synced"])
-@pytest.mark.parametrize("target", ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"])
+@pytest.mark.parametrize(
+    "target", ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"]
+)
 def test_a_crash_at_any_file(
-    moment: str, target: str, short: tuple[str, rigidsim.Run], tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch, eager: None,
+    moment: str,
+    target: str,
+    short: tuple[str, rigidsim.Run],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    eager: None,
 ) -> None:
     """The files of a run come into being one by one; between any two a process can die."""
     text, whole = short
@@ -220,6 +226,7 @@ def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: p
     size = whole.folder.dataset.stat().st_size
     write = Sink.write
     for room in (0, 3000, size // 2, size - 3000):
+
         class Full:
             def __init__(self, file: Any) -> None:
                 self._file = file
@@ -233,8 +240,8 @@ def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: p
                 return self._file.write(content)
 
         def small(self: Sink, content: Any) -> int:
-            if not isinstance(self._file, Full):  # noqa: B023
-                self._file = Full(self._file)  # type: ignore[assignment]  # noqa: B023
+            if not isinstance(self._file, Full):
+                self._file = Full(self._file)  # type: ignore[assignment]
             return write(self, content)
 
         out = tmp_path / str(room)
@@ -271,9 +278,7 @@ def test_only_guards_can_be_set(tmp_path: Path, impatient: None) -> None:
 
 
 @pytest.mark.parametrize("times", ["end = 60\nsamples = 121", "end = 60\nevery = 0.5"])
-@pytest.mark.parametrize(
-    "case", ["double, events", "double, Euler angles", "quadruple"]
-)
+@pytest.mark.parametrize("case", ["double, events", "double, Euler angles", "quadruple"])
 @pytest.mark.parametrize("begun", ["finished", "partial"])
 def test_a_later_end(case: str, times: str, begun: str, tmp_path: Path, impatient: None) -> None:
     """A finished run goes on, and one that wasn't finished, with the bits of a run that was as long at once."""
@@ -342,7 +347,9 @@ def test_a_bad_later_end_leaves_a_finished_run_finished(until: str, says: str, t
 
 def test_a_finished_run_has_nothing_left(tmp_path: Path) -> None:
     run = rigidsim.run(rigidsim.parse(text_with("end = 3\nsamples = 7")), out=tmp_path)
-    with pytest.raises(RunFolderError, match=r"nothing is left to do: the run reached its last sample; --until"):
+    with pytest.raises(
+        RunFolderError, match=r"nothing is left to do: the run reached its last sample; --until"
+    ):
         rigidsim.resume(run.folder.path)
 
 
@@ -369,7 +376,7 @@ def test_nothing_saved_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 CHANGES = {
-    "a value": (lambda t: t.replace("0.3, 1.0", "0.3, 1.1"), r'line 5 is .*1\.1, 0\.5.*it was .*1\.0, 0\.5'),
+    "a value": (lambda t: t.replace("0.3, 1.0", "0.3, 1.1"), r"line 5 is .*1\.1, 0\.5.*it was .*1\.0, 0\.5"),
     "a comment": (lambda t: "# mine\n" + t, 'line 1 is "# mine"'),
     "a table at the end": (lambda t: t + '[[events]]\nname = "e"\nexpression = "wz"\n', "lines"),
     "a setting at the end": (lambda t: t + "#:set body.principal_moments=[1,2,2.6]\n", "lines"),
@@ -402,7 +409,9 @@ def test_another_process_at_work_is_not_disturbed(tmp_path: Path, impatient: Non
 
 @pytest.mark.parametrize("what", ["segments", "segments/00000000.h5", "config.toml", ".dataset.h5.partial"])
 def test_links_out_of_the_folder_are_refused(what: str, tmp_path: Path, impatient: None) -> None:
-    run = rigidsim.run(rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 20")), out=tmp_path / "r")
+    run = rigidsim.run(
+        rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 20")), out=tmp_path / "r"
+    )
     place, elsewhere = run.folder.path / what, tmp_path / "elsewhere"
     if place.exists():
         place.rename(elsewhere)
@@ -439,7 +448,15 @@ def test_what_is_read_of_a_partial_run_is_read_lazily(tmp_path: Path, impatient:
     with run.dataset as partial:
         rows = partial.sizes["time"]
         assert 10 < rows < 121
-        for rule in (slice(None), slice(3, rows, 7), slice(rows, 3, -5), slice(5, 5), [0, rows - 1, 4], 7, -1):
+        for rule in (
+            slice(None),
+            slice(3, rows, 7),
+            slice(rows, 3, -5),
+            slice(5, 5),
+            [0, rows - 1, 4],
+            7,
+            -1,
+        ):
             expected = whole.isel(time=slice(rows)).isel(time=rule)
             assert differing(partial.isel(time=rule).load(), expected) == []
             assert not partial.energy.variable._in_memory
@@ -447,4 +464,3 @@ def test_what_is_read_of_a_partial_run_is_read_lazily(tmp_path: Path, impatient:
             partial.quaternion.sel(time=7, quaternion_component="x"),
             whole.quaternion.sel(time=7, quaternion_component="x"),
         )
-

@@ -41,7 +41,11 @@ def block(first: int, rows: int) -> dict[str, list[np.ndarray]]:
 
 
 def writer(folder: Path) -> SegmentWriter:
-    return SegmentWriter(folder, VARIABLES, {"title": "t", "status": "running", "run_id": "r", "schema_version": SCHEMA_VERSION})
+    return SegmentWriter(
+        folder,
+        VARIABLES,
+        {"title": "t", "status": "running", "run_id": "r", "schema_version": SCHEMA_VERSION},
+    )
 
 
 def names(folder: Path) -> list[str]:

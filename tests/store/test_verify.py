@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,7 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def forged(original: Path, target: Path, edit: Callable[[h5py.File], Any]) -> Path:
     """A copy, edited by someone who knows how to seal it again."""
     content = original.read_bytes()
-    target.write_bytes(content[: -len(seal.sealed(b""))])
+    target.write_bytes(content[: -len(seal.sealed(io.BytesIO()))])
     with h5py.File(target, "r+") as file:
         edit(file)
     seal.seal(target)
@@ -94,7 +95,9 @@ def test_a_bit_flipped_under_a_good_seal_is_found_by_integrating(
 
 
 @pytest.mark.parametrize("digit", [("0.3, 1.0", "0.3, 1.0000000000000002"), ("2.5]", "2.4]")])
-def test_a_changed_digit_in_the_embedded_config(digit: tuple[str, str], original: Path, tmp_path: Path) -> None:
+def test_a_changed_digit_in_the_embedded_config(
+    digit: tuple[str, str], original: Path, tmp_path: Path
+) -> None:
     path = forged(
         original, tmp_path / "forged.h5", lambda file: file.attrs.modify("config", TEXT.replace(*digit))
     )

@@ -1,0 +1,115 @@
+"""``resume``, ``verify`` and ``run --from`` as commands: exit codes, messages, signals to real processes."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rigidsim
+
+Config = Callable[..., str]
+Command = Callable[..., Any]
+Start = Callable[..., subprocess.Popen[str]]
+OFTEN = (
+    "import rigidsim.solve.harvest as a, rigidsim.store.segments as s\na._PATIENCE = s.SEGMENT_SECONDS = 0.05"
+)
+
+
+def test_resume_goes_on_and_verify_agrees(config: Config, rigidsim_command: Command) -> None:
+    name = config(time="end = 3000\nsamples = 31", rest="[limits]\nmax_steps = 50")
+    stopped = rigidsim_command("run", name)
+    assert stopped.exit_code == 3
+    done = rigidsim_command("resume", "runs/free", "--set", "limits.max_steps=1000000", "--json")
+    assert done.exit_code == 0, done.output
+    verified = rigidsim_command("verify", "runs/free", "--json")
+    assert verified.exit_code == 0
+    assert json.loads(verified.stdout)["identical"] is True
+    again = rigidsim_command("resume", "runs/free")
+    assert again.exit_code == 2
+    assert "nothing is left to do: the run reached its last sample" in again.stderr
+    later = rigidsim_command("resume", "runs/free", "--until", "4000", "--set", "limits.max_steps=1000000")
+    assert later.exit_code == 0, later.output
+    with rigidsim.open_run("runs/free").dataset as dataset:
+        assert dataset.sizes["time"] == 41
+
+
+def test_verify_exits_with_1(config: Config, rigidsim_command: Command) -> None:
+    assert rigidsim_command("run", config()).exit_code == 0
+    path = Path("runs/free/dataset.h5")
+    content = bytearray(path.read_bytes())
+    content[3000] ^= 1
+    path.write_bytes(content)
+    found = rigidsim_command("verify", "runs/free")
+    assert found.exit_code in (1, 2)  # 2 where the flipped bit leaves no HDF5 file to compare
+    assert "dataset.h5" in found.output
+
+
+def test_a_dataset_is_enough(config: Config, rigidsim_command: Command) -> None:
+    assert rigidsim_command("run", config()).exit_code == 0
+    Path("runs/free/dataset.h5").rename("mine.h5")
+    again = rigidsim_command("run", "--from", "mine.h5", "--out", "again")
+    assert again.exit_code == 0, again.output
+    assert rigidsim_command("verify", "mine.h5").exit_code == 0
+    assert Path("again/free/config.toml").read_text() == Path("free.toml").read_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_process_that_was_ended_is_gone_on_with(number: int, config: Config, start: Start) -> None:
+    """With the bits of a run in one go."""
+    time_table = "end = 40000\nsamples = 4001"
+    process = start("run", config(time=time_table, integrator='precision = "extended"'), prelude=OFTEN)
+    deadline = time.monotonic() + 60
+    while len(list(Path("runs/free/segments").glob("[0-9]*.h5"))) < 2:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == (-9 if number == signal.SIGKILL else 130)
+    assert "Traceback" not in err
+    with rigidsim.open_run("runs/free").dataset as partial:
+        assert 0 < partial.sizes["time"] < 4001
+    resumed = rigidsim.resume("runs/free")
+    whole = rigidsim.run("free.toml", out="whole")
+    with resumed.dataset as one, whole.dataset as other:
+        for name in other.variables:
+            np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name))
+
+
+def test_sigterm_while_the_equations_are_compiled(config: Config, start: Start) -> None:
+    """Before anything is integrated it ends like Ctrl-C, too, and can be gone on with."""
+    prelude = (
+        "import os, signal, rigidsim.guards as g\n"
+        "g.Observer.started = lambda *_: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "import rigidsim.progress as p\n"
+        "for c in vars(p).values():\n"
+        "    if isinstance(c, type) and issubclass(c, g.Observer): c.started = g.Observer.started"
+    )
+    process = start("run", config(), prelude=prelude)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "rigidsim: interrupted" in err
+    assert "Traceback" not in err
+    assert rigidsim.resume("runs/free").status == "finished"
+
+
+def test_two_processes_on_one_folder(config: Config, start: Start, rigidsim_command: Command) -> None:
+    process = start("run", config(time="end = 1e9\nevery = 1"))
+    deadline = time.monotonic() + 60
+    while not Path("runs/free/segments").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    for command in (["resume", "runs/free"], ["run", "free.toml", "--force"]):
+        second = rigidsim_command(*command)
+        assert second.exit_code == 2
+        assert "another process is at work there; wait for it" in second.stderr
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 130

@@ -1,0 +1,125 @@
+"""The double path of the closed forms: right to rounding at any horizon, next to anything singular."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from closed_scenes import EXTREMES, attitude_error, closed, scene, top
+from support import run_text
+
+import rigidsim
+from rigidsim.errors import ConfigError
+
+FAR = 1e8  # seconds; the fastest rates of these scenes are 0.3 to 25 rad/s, a rod's 1e12 about its axis
+PHASE_ERROR = 1e-7  # rad, asked for at 1e8 rad: 10 eps times the phase is 2.2e-7
+
+
+@pytest.mark.parametrize("name", [n for n in EXTREMES if "spin" not in n and "rod as a top" not in n])
+def test_the_attitude_is_right_after_a_hundred_million_radians(name: str) -> None:
+    form = closed(scene(**EXTREMES[name]))
+    start = form.scene.quaternion
+    seconds = FAR / max(1.0, float(max(abs(w) for w in form.scene.angular_velocity)))
+    times = np.array([0.0, seconds * 0.37, seconds])
+    rates, quaternion = form.rates_and_quaternions(times)
+    assert attitude_error([mpmath.mpf(x) for x in start], quaternion[0] * _sign(start, quaternion[0])) < 1e-14
+    for n, time in enumerate(times):
+        exact_rates, exact = form.exactly(mpmath.mpf(float(time)), 25)
+        assert attitude_error(exact, quaternion[n] * _sign(exact, quaternion[n])) < PHASE_ERROR
+        size = 2.0**-form.scaling.time  # of the motion's rates: those of a pendulum at rest are zero
+        assert np.linalg.norm(rates[n] - np.array([float(w) for w in exact_rates])) < PHASE_ERROR * size
+
+
+def _sign(exact: list, quaternion: np.ndarray) -> float:
+    return 1.0 if float(mpmath.fdot(exact, [float(q) for q in quaternion])) >= 0 else -1.0
+
+
+FREE = """
+name = "free"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.5, 0.25, 1]
+[time]
+end = 100
+samples = 11
+[integrator]
+method = "closed_form"
+"""
+
+
+def test_a_run_in_closed_form_takes_no_steps_and_keeps_every_invariant(runs: Path) -> None:
+    run = run_text(FREE, runs)
+    assert run.status == "finished"
+    assert run.summary["cost"]["steps"] == 0
+    assert run.summary["method"] == "closed_form"
+    for row in run.summary["invariants"].values():
+        assert row["largest_drift"] < 2.0**-48  # evaluated from the states: a few roundings, at any time
+    with run.dataset as dataset:
+        assert "method" in dataset.attrs
+        assert dataset.attrs["method"] == "closed_form"
+
+
+@pytest.mark.parametrize("precision", ["single", "double", "extended", "quadruple", "40"])
+def test_it_agrees_with_the_integration_in_each_precision(precision: str, runs: Path) -> None:
+    given = precision if precision.isdigit() else f'"{precision}"'
+    wide = f"integrator.precision={given}"
+    one = run_text(FREE, runs, wide, "time.end=10", 'name="c"')
+    two = run_text(FREE, runs, wide, "time.end=10", 'name="t"', 'integrator.method="taylor"')
+    bits = {"single": 24, "double": 53, "extended": 64, "quadruple": 113}.get(precision, 134)
+    for name in ("quaternion", "angular_velocity"):
+        parts = [name, f"{name}_lo", f"{name}_lo2"]
+        with one.dataset as a, two.dataset as b:
+            difference = sum(a[p].values - b[p].values for p in parts if p in a)
+        # some 30 steps of a few roundings each, over 10 rad
+        assert np.abs(difference).max() < 2.0 ** (9 - bits)
+
+
+def test_a_top_and_a_throw_in_closed_form(runs: Path) -> None:
+    heavy = FREE.replace("principal_moments = [1, 2, 3]", top(1, 0.5)).replace(
+        "[time]", '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1]\n[time]'
+    )
+    throw = FREE.replace(
+        "[time]", 'position = [1, 2, 3]\nvelocity = [0, 0, 5]\n[[loads]]\nkind = "uniform_gravity"\n[time]'
+    )
+    throw = throw.replace("[1, 2, 3]\n[initial]", "[1, 2, 3]\nmass = 2\n[initial]")
+    for text in (heavy, throw):
+        one = run_text(text, runs, "time.end=5", 'name="c"')
+        two = run_text(text, runs, "time.end=5", 'name="t"', 'integrator.method="taylor"')
+        with one.dataset as a, two.dataset as b:
+            assert set(a.data_vars) == set(b.data_vars)
+            for name in ("quaternion", "angular_velocity", "position"):
+                if name in a:
+                    scale = np.abs(b[name].values).max()
+                    assert np.abs(a[name].values - b[name].values).max() < 1e-12 * scale
+
+
+BAD = {
+    "a gravity-gradient load has no closed form": (
+        '[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1\nposition = [1, 0, 0]\n[time]'
+    ),
+    "remove \\[\\[events\\]\\]": '[[events]]\nname = "e"\nexpression = "wx"\n[time]',
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_what_has_none_is_refused(message: str) -> None:
+    with pytest.raises(ConfigError, match=rf"\[integrator\] method: given \"closed_form\".*{message}"):
+        rigidsim.plan(rigidsim.parse(FREE.replace("[time]", BAD[message])))
+
+
+def test_held_or_in_euler_angles_it_is_refused() -> None:
+    for key in ("hold_invariants = true", 'formulation = "euler_angles"'):
+        with pytest.raises(ConfigError, match=r"\[integrator\] method"):
+            rigidsim.plan(rigidsim.parse(FREE + "\n" + key))
+
+
+def test_plan_says_where_it_applies() -> None:
+    taylor = FREE.replace('method = "closed_form"', "")
+    assert rigidsim.plan(rigidsim.parse(taylor))["closed_form"] is not None
+    damped = taylor.replace("[time]", '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1, 1, 1]\n[time]')
+    plan = rigidsim.plan(rigidsim.parse(damped))
+    assert plan["closed_form"] is None
+    assert "viscous" in plan["closed_form_why_not"]

@@ -1,0 +1,173 @@
+"""Segments that are torn, missing, foreign, edited or old: named, moved aside, and made again with the same bits."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import rigidsim
+from rigidsim.errors import RunFolderError
+from rigidsim.solve import advance, harvest
+from rigidsim.store import seal, segments
+from rigidsim.store.segments import read_chain
+
+TEXT = (
+    'name = "d"\n[body]\nprincipal_moments = [1, 2, 2.5]\n'
+    "[initial]\nangular_velocity = [0.3, 1.0, 0.5]\n"
+    "[time]\nend = 30\nsamples = 61\n[output]\ntimeline = false\n"
+)
+NUMBER = 2  # of the segment that something happens to
+
+
+def begun(out: Path) -> rigidsim.Run:
+    """A run that was stopped, with a segment for every few steps."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(advance, "_CHUNK_SECONDS", 0.0)
+        patch.setattr(advance, "_BLOCK_STEPS", 4)
+        patch.setattr(harvest, "_PATIENCE", 0.0)
+        patch.setattr(segments, "SEGMENT_SECONDS", 0.0)
+        run = rigidsim.run(rigidsim.parse(TEXT + "[limits]\nmax_steps = 30\n"), out=out)
+    assert run.status == "stopped: max_steps"
+    assert len(list(run.folder.segments.iterdir())) >= 5
+    return run
+
+
+@pytest.fixture(scope="module")
+def originals(tmp_path_factory: pytest.TempPathFactory) -> dict[str, rigidsim.Run]:
+    """An unfinished run, another of the same config, and one in one go."""
+    place = tmp_path_factory.mktemp("runs")
+    whole = rigidsim.run(rigidsim.parse(TEXT), out=place / "whole")
+    return {"begun": begun(place / "a"), "twin": begun(place / "b"), "whole": whole}
+
+
+def torn(path: Path, _: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1000])
+
+
+def empty(path: Path, _: Path) -> None:
+    path.write_bytes(b"")
+
+
+def flipped(path: Path, _: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 16
+    path.write_bytes(content)
+
+
+def lost(path: Path, _: Path) -> None:
+    path.unlink()
+
+
+def foreign(path: Path, twin: Path) -> None:
+    shutil.copy(twin / path.name, path)
+
+
+def exchanged(path: Path, _: Path) -> None:
+    shutil.copy(path.with_name("00000001.h5"), path)
+
+
+def edited(path: Path, _: Path) -> None:
+    """By someone who seals it again: the chain of seals tells."""
+    content = path.read_bytes()
+    path.write_bytes(content[: content.rindex(b"\nrigidsim sha256 ")])
+    with h5py.File(path, "r+") as file:
+        file["energy"][0] = 7.0
+    seal.seal(path)
+
+
+def older(path: Path, _: Path) -> None:
+    """Of the schema version that had no seals."""
+    content = path.read_bytes()
+    path.write_bytes(content[: content.rindex(b"\nrigidsim sha256 ")])
+
+
+def pipe(path: Path, _: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+DAMAGES = {f.__name__: f for f in (torn, empty, flipped, lost, foreign, exchanged, edited, older, pipe)}
+SAYS = {
+    "torn": "is torn or foreign",
+    "empty": "is torn or foreign",
+    "flipped": "is damaged or was edited",
+    "lost": "is missing",
+    "foreign": "belongs to another run",
+    "exchanged": "doesn't follow the segment before it",
+    "edited": "doesn't follow the segment before it",
+    "older": "is torn or foreign",
+    "pipe": "is no file, but a folder, pipe or device",
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGES)
+def test_a_damaged_segment(kind: str, originals: dict[str, rigidsim.Run], tmp_path: Path) -> None:
+    folder = shutil.copytree(originals["begun"].folder.path, tmp_path / "d")
+    damage: Callable[[Path, Path], None] = DAMAGES[kind]
+    before = sorted((folder / "segments").iterdir())
+    damage(before[NUMBER], originals["twin"].folder.segments)
+
+    chain = read_chain(folder / "segments")
+    assert chain.damage is not None
+    assert SAYS[kind] in chain.damage
+    # an edited segment with a good seal is known by the next one, which was sealed with the old one's seal
+    good = NUMBER + 1 if kind == "edited" else NUMBER
+    assert f"{good:08d}.h5" in chain.damage
+    assert chain.paths == before[:good]
+    with pytest.raises(RunFolderError, match="rigidsim resume sets it aside"):
+        _ = rigidsim.open_run(folder).dataset
+
+    if kind == "edited":  # what follows is made again; what was forged well enough only verify finds
+        assert not rigidsim.verify(
+            rigidsim.resume(folder, overrides=["limits.max_steps=100000"]).folder.path
+        ).identical
+        return
+    done = rigidsim.resume(folder, overrides=["limits.max_steps=100000"])
+    assert done.status == "finished"
+    (told,) = [w for w in done.summary["warnings"] if "set_aside" in w]
+    assert SAYS[kind] in told
+    aside = sorted(p.name for p in done.folder.set_aside.iterdir())
+    assert aside == [p.name for p in before[good + (kind == "lost") :]]
+    with done.dataset as found, originals["whole"].dataset as expected:
+        for name in expected.variables:
+            np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=str(name))
+
+
+def test_an_intact_run_has_no_damage(originals: dict[str, rigidsim.Run]) -> None:
+    chain = read_chain(originals["begun"].folder.segments)
+    assert chain.damage is None
+    assert len(chain.paths) == len(list(originals["begun"].folder.segments.iterdir()))
+
+
+def test_a_segment_in_the_place_of_the_dataset(originals: dict[str, rigidsim.Run], tmp_path: Path) -> None:
+    folder = shutil.copytree(originals["whole"].folder.path, tmp_path / "d")
+    shutil.copy(originals["twin"].folder.segments / "00000001.h5", folder / "dataset.h5")
+    with pytest.raises(RunFolderError, match=r"dataset\.h5: is a segment of an unfinished run"):
+        _ = rigidsim.open_run(folder).dataset
+
+
+@pytest.mark.parametrize("name", ["dataset.h5", "checkpoint.h5"])
+def test_a_damaged_file_is_not_prolonged(
+    name: str, originals: dict[str, rigidsim.Run], tmp_path: Path
+) -> None:
+    folder = shutil.copytree(originals["whole"].folder.path, tmp_path / "d")
+    flipped(folder / name, folder)
+    before = sorted(p.name for p in folder.iterdir())
+    with pytest.raises(RunFolderError, match=rf"{name}: is damaged or was edited"):
+        rigidsim.resume(folder, until="60")
+    assert sorted(p.name for p in folder.iterdir()) == before
+
+
+def test_a_lost_dataset_is_said(originals: dict[str, rigidsim.Run], tmp_path: Path) -> None:
+    folder = shutil.copytree(originals["whole"].folder.path, tmp_path / "d")
+    (folder / "dataset.h5").unlink()
+    with pytest.raises(RunFolderError, match=r"its dataset\.h5 is missing; run it again with --force"):
+        _ = rigidsim.open_run(folder).dataset
+    with pytest.raises(RunFolderError, match=r"its dataset\.h5 is missing; run it again with --force"):
+        rigidsim.resume(folder)
