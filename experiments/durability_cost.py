@@ -1,11 +1,15 @@
 """What does it cost that nothing is lost, and does memory stay flat however long a run is?
 
 Question: a free asymmetric body in double precision.
-  cost: CPU of a run that writes segments, checkpoints and a sealed dataset, over the CPU of the same steps and
-  evaluations with everything that is written left out (allowed for a long sparse run: 1.05; the dense figure is
-  for information: there writing is what the run is for). Sparse: 1001 samples over 1e6 s and more, segments at
+  cost: CPU of a run that writes segments, checkpoints and a sealed dataset, over the CPU of the same steps
+  and
+  evaluations with everything that is written left out (allowed for a long sparse run: 1.05; the dense
+  figure is
+  for information: there writing is what the run is for). Sparse: 1001 samples over 1e6 s and more, segments
+  at
   their usual pace. Dense: a sample every 0.05 s.
-  memory: the largest resident set of a process that runs 1e6 and 1e7 samples (with timeline), 1e6 and 1e8 steps
+  memory: the largest resident set of a process that runs 1e6 and 1e7 samples (with timeline), 1e6 and 1e8
+  steps
   (allowed: 10 % apart). Longer runs keep nothing more: samples are in memory until a segment of 32 MB, and of
   the dataset the timeline reads every n-th row.
 

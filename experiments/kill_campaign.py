@@ -1,20 +1,25 @@
 """Is anything lost when a run is killed, the disk fills up, or its files are damaged?
 
-Question: after SIGKILL at any moment, is the folder readable, is every sample still there whose segment had its
+Question: after SIGKILL at any moment, is the folder readable, is every sample still there whose segment had
+its
 name before the kill, and is the dataset bit for bit that of a run that nobody disturbed? The same for a disk
 that fills up, and is every file that was truncated, flipped in a bit, exchanged or lost recognised?
 
 Method: each scene is run once undisturbed. Then it is begun in a child process, killed, resumed in another
-child, killed again, ..., and left to finish after one to six kills. A third of the moments are uniform over the
-scene's duration, a third while a temporary file is being written, a third just after a file got its name. What
+child, killed again, ..., and left to finish after one to six kills. A third of the moments are uniform over
+the
+scene's duration, a third while a temporary file is being written, a third just after a file got its name.
+What
 was saved is noted from outside before the kill. Segments are written some hundred times as often as usual
-(``frequent``), to have many moments at which something can go wrong. Then: the same on a small tmpfs (as root;
+(``frequent``), to have many moments at which something can go wrong. Then: the same on a small tmpfs (as
+root;
 else under a limit of the files' size), enlarged before each resume; and files of finished and unfinished runs
 damaged at random places.
 
 Seeded: the same kills are planned, though the machine's timing moves what they hit.
 
-Run: python -m experiments.kill_campaign [--kills 300] [--full-disks 40] [--damages 400] [--seconds 1200] [--seed 1]
+Run: python -m experiments.kill_campaign [--kills 300] [--full-disks 40] [--damages 400] [--seconds 1200]
+[--seed 1]
 """
 
 from __future__ import annotations

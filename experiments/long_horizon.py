@@ -4,9 +4,9 @@ Question: Brouwer (1937, Astron. J. 46, 149) found that rounding alone makes the
 like t^(1/2) and its phase like t^(3/2). Do energy, angular momentum and attitude of a rigid body follow these
 laws, or does something systematic (a bias of rounding or truncation) make them grow faster?
 Method: a free asymmetric body and a heavy symmetric top, 12 nearby starts for each precision, against the
-closed form in quadruple precision, which is exact at any time. Times are in radians of the fastest rate. Lines
-are fitted to the logarithms of the root mean squares over the starts; the exponents' uncertainty is from
-resampling the starts (bootstrap).
+closed form in quadruple precision, which is exact at any time. Times are in radians of the fastest rate.
+Lines are fitted to the logarithms of the root mean squares over the starts; the exponents' uncertainty is
+from resampling the starts (bootstrap).
 
 Run: python -m experiments.long_horizon [--full] [--out DIR]
 Reduced: single to 1e4, double to 1e5 rad, extended to 1e4; --full: 1e5, 1e7 and 1e6 (an hour and a half).
@@ -213,8 +213,8 @@ def _curve(axes, data: xarray.Dataset, quantity: str, color: str) -> None:  # ty
 def markdown(measured: Sequence[xarray.Dataset]) -> str:
     """The exponents, and the attitude error at the end, as a table."""
     lines = [
-        "| scene | precision | held | to, rad | energy | angular momentum | attitude | attitude error there |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| scene | precision | held | to, rad | energy | momentum | attitude | attitude error there, rad |",
+        "|" + " --- |" * 8,
     ]
     for data in measured:
         fits = [fit(data, quantity) for quantity in QUANTITIES]

@@ -173,8 +173,8 @@ def _check_tolerance(tolerance: Any | None, precision: Precision) -> None:
             Problem(
                 "[integrator] tolerance",
                 f"given {given}, but {precision.name} precision rounds each number by about {epsilon}, so "
-                f'that tolerances below that gain nothing; {shortest} or more is allowed: choose "auto", or a '
-                "higher precision for more digits",
+                f'that tolerances below that gain nothing; {shortest} or more is allowed: choose "auto", or '
+                "a higher precision for more digits",
             )
         )
 

@@ -203,7 +203,8 @@ def _compared(prepared: Prepared, chain: Chain) -> str:
     begun, text = str(saved.get("config", "")), prepared.experiment.text
     if not _prolongs(text, begun):
         raise RunFolderError(
-            f"{prepared.experiment.source}: was changed since the run began ({text_difference(text, begun)}); "
+            f"{prepared.experiment.source}: was changed since the run began "
+            f"({text_difference(text, begun)}); "
             "put it back (the segments hold it as their attribute config), or begin a new run"
         )
     if saved.get("schema_version") != SCHEMA_VERSION:
@@ -253,6 +254,6 @@ def _same_times(prepared: Prepared, chain: Chain) -> None:
                 if not np.array_equal(np.ldexp(grid, prepared.clock.exponent), times):
                     raise RunFolderError(
                         "--until: the longer grid's first sample times differ from those saved by a "
-                        "rounding; choose an end that is a multiple of the old one, or begin with [time] every"
+                        "rounding; choose an end that is a multiple of the old one, or [time] every"
                     )
                 first += len(times)

@@ -136,9 +136,9 @@ def warnings(prepared: Prepared, progress: Progress, watch: Watch, growth: Growt
     if system.requirements.formulation == "rates":
         if estimate is not None and estimate > _LOST_DIGITS:
             found.append(
-                f"the angular velocity is uncertain by about {min(estimate, 2.0):.2g} of its size at the end, "
-                f"so its digits are gone{_since(prepared, progress, growth)}; choose a higher precision or a "
-                "nearer end"
+                f"the angular velocity is uncertain by about {min(estimate, 2.0):.2g} of its size at "
+                f"the end, so its digits are gone{_since(prepared, progress, growth)}; choose a higher "
+                "precision or a nearer end"
             )
     elif estimate is not None and estimate > _LOST_DIGITS:
         found.append(

@@ -113,8 +113,8 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         quiet = experiment.config.output.model_copy(update={"timeline": False})
         unguarded = type(experiment.config.limits)()
         plain = experiment.config.integrator.model_copy(update={"accuracy": None})
-        changed = {"output": quiet, "limits": unguarded, "integrator": plain}
-        config = experiment.config.model_copy(update=changed)
+        replaced = {"output": quiet, "limits": unguarded, "integrator": plain}
+        config = experiment.config.model_copy(update=replaced)
         again = run(Experiment(experiment.text, config, experiment.source), out=scratch, observer=observer)
         if not again.folder.dataset.exists():
             raise RunFolderError(f"{dataset}: the run again {again.summary['message']}; nothing was compared")

@@ -178,7 +178,9 @@ def refusal(error: RigidsimError) -> str:
 # --- in the process that asks ----------------------------------------------------------------------------
 
 
-def ask(experiment: Experiment, tasks: Sequence[Task], *, deadline: float) -> Iterator[Answer]:
+def ask(
+    experiment: Experiment, tasks: Sequence[Task], *, deadline: float, first_by: float = 0.0
+) -> Iterator[Answer]:
     """Answers to tasks as they come, in order, from a fresh process.
 
     A task on which the process dies is answered with that, and a new process goes on with the rest. When time
@@ -186,12 +188,13 @@ def ask(experiment: Experiment, tasks: Sequence[Task], *, deadline: float) -> It
 
     Args:
         deadline: on ``time.monotonic``'s clock.
+        first_by: the same for the first answer, where it may be later.
     """
     first = 0
     while first < len(tasks):
         child = _Child(experiment, tasks[first:])
         try:
-            following = yield from _answers(child, first, deadline)
+            following = yield from _answers(child, first, deadline, first_by)
         finally:
             child.end()
         if following is None:
@@ -203,12 +206,15 @@ def ask(experiment: Experiment, tasks: Sequence[Task], *, deadline: float) -> It
         first = following
 
 
-def _answers(child: _Child, first: int, deadline: float) -> Generator[Answer, None, int | None]:
+def _answers(
+    child: _Child, first: int, deadline: float, first_by: float
+) -> Generator[Answer, None, int | None]:
     """Returns the first task without an answer, or None when time was up."""
     following = first
     while True:
         try:
-            line = child.lines.get(timeout=max(0.0, deadline - time.monotonic()))
+            until = deadline if following else max(deadline, first_by)
+            line = child.lines.get(timeout=max(0.0, until - time.monotonic()))
         except queue.Empty:
             return None
         if line is None:

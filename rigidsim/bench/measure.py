@@ -30,6 +30,7 @@ from rigidsim.trial import Setting, angles_between
 
 _LEAST_BUDGET = 5.0
 _SECOND = {"quadruple": 1e-30, DIGITS: 1e-44}  # tolerances of what tells the references' errors
+_GRACE = 120.0  # seconds for what a measurement can't do without
 _EXPLORING = 0.65  # of the budget, until attitudes must be there
 _TIMED = 0.03  # CPU seconds of passes for each setting in each process
 
@@ -189,7 +190,9 @@ def _explore(experiment: Experiment, plan: Plan, rows: list[Row], budget: float,
         row.part = plan.short if wide else plan.part
         tasks.append(_task(plan, row.setting, 0.4 * budget, wide=wide))
         row.problem = f"left out: the budget of {budget:g} s was used up before its turn"
-    for answer in ask(experiment, tasks, deadline=deadline):
+    # without the default there is nothing to compare with: on a busy machine it may be late
+    first_by = time.monotonic() + _GRACE
+    for answer in ask(experiment, tasks, deadline=deadline, first_by=first_by):
         row = rows[answer.index]
         row.problem = answer.problem
         if answer.values:
@@ -227,7 +230,8 @@ class _References(threading.Thread):
     def run(self) -> None:
         """See ``Thread``."""
         try:
-            for answer in ask(self._experiment, self._tasks, deadline=self._deadline):
+            first_by = time.monotonic() + _GRACE
+            for answer in ask(self._experiment, self._tasks, deadline=self._deadline, first_by=first_by):
                 if answer.values and not answer.problem:
                     parts = [np.array(part) for part in answer.values["attitudes"]]
                     self._found[self._settings[answer.index]] = parts
@@ -299,9 +303,9 @@ def _time(
         turns = [rows[0], *order[:middle], rows[0], *order[middle:], rows[0]]
         tasks = [Task(row.setting, "speed", plan.times, _TIMED, max(1, row.steps)) for row in turns]
         seconds: dict[int, float] = {}
-        # the first process goes on until all have a speed: without one there is nothing to compare
         limit = deadline if repeat else max(deadline, time.monotonic() + 30.0)
-        for answer in ask(experiment, tasks, deadline=limit):
+        first_by = 0.0 if repeat else time.monotonic() + _GRACE
+        for answer in ask(experiment, tasks, deadline=limit, first_by=first_by):
             if answer.values and not answer.problem:
                 seconds[answer.index] = answer.values["seconds"]
         defaults = [seconds[n] for n, row in enumerate(turns) if row is rows[0] and n in seconds]

@@ -78,7 +78,7 @@ def _rows(paths: Sequence[Path], starts: np.ndarray, name: str, rows: range, res
     """Rows of one variable, from the segments that hold them."""
     if rows.step < 0:
         return _rows(paths, starts, name, rows[::-1], rest)[::-1]
-    pieces = []
+    pieces: list[np.ndarray] = []
     for path, start, stop in zip(paths, starts[:-1], starts[1:], strict=True):
         inside = rows[
             -(-max(start - rows.start, 0) // rows.step) : -(-max(stop - rows.start, 0) // rows.step)

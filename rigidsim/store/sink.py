@@ -1,7 +1,9 @@
 """A file for HDF5 to write into that never fails while HDF5 looks.
 
-HDF5 keeps what it couldn't write, tries again while it closes, and then crashes the process (seen with HDF5 2.0
-on a full disk). So the first error is kept here, later writes are dropped, and the error is raised afterwards.
+HDF5 keeps what it couldn't write, tries again while it closes, and then crashes the process (seen with HDF5
+2.0
+on a full disk). So the first error is kept here, later writes are dropped, and the error is raised
+afterwards.
 """
 
 from __future__ import annotations

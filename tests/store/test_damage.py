@@ -1,4 +1,4 @@
-"""Segments that are torn, missing, foreign, edited or old: named, moved aside, and made again with the same bits."""
+"""Segments torn, missing, foreign, edited or old: named, moved aside, and made again with the same bits."""
 
 from __future__ import annotations
 

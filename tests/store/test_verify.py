@@ -1,4 +1,4 @@
-"""``verify``: identical, or what differs first; a flipped bit and a changed digit are found whoever hides them."""
+"""``verify``: identical, or what differs first; flipped bits and changed digits are found, sealed or not."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def test_a_dataset_exchanged_for_a_run_of_the_same_config(tmp_path: Path) -> Non
     assert not verdict.identical
     assert verdict.differing == []
     assert "was written for another dataset" in verdict.problems[0]
-    with pytest.raises(RunFolderError, match="isn't the dataset that summary.json beside it was written for"):
+    with pytest.raises(RunFolderError, match=r"isn't the dataset that summary\.json beside it"):
         _ = one.dataset
 
 
