@@ -168,6 +168,11 @@ def try_setting(
     """
     started = time.process_time()
     scene = trial_scene(experiment, setting, times)
+    samples, early = scene.samples, 0
+    if samples.times is not None and samples.times[0] > samples.start:
+        # a motion begins at its first sample, which must be its start
+        early, whole = 1, [samples.start, *samples.times]
+        scene = replace(scene, samples=replace(samples, times=whole, count=len(whole)))
     prepared = prepare_scene(experiment, scene, loads=loads, tolerance=setting.tolerance)
     if compact:
         prepared = compactly(prepared)
@@ -184,7 +189,7 @@ def try_setting(
     progress = advance.run()
     ended = time.process_time()
     order = int(parts.stepper.integrator.order)
-    attitudes = [np.concatenate(part) for part in zip(*keeper.pieces, strict=True)]
+    attitudes = [np.concatenate(part)[early:] for part in zip(*keeper.pieces, strict=True)]
     return Trial(
         setting=setting,
         status=progress.status,
@@ -195,7 +200,7 @@ def try_setting(
         cpu_seconds=ended - built,
         compile_seconds=built - started,
         work=float(progress.steps) * order**2 * len(prepared.system.states),
-        rows=progress.next_sample,
+        rows=max(progress.next_sample - early, 0),
         histories={name: np.concatenate(pieces) for name, pieces in keeper.histories.items()},
     )
 

@@ -22,6 +22,7 @@ from rigidsim import accuracy as accuracy_module  # noqa: E402
 from rigidsim.accuracy import choose, chosen  # noqa: E402
 from rigidsim.certify import certify  # noqa: E402
 from rigidsim.errors import ConfigError  # noqa: E402
+from rigidsim.model.loads import LoadModel  # noqa: E402
 from rigidsim.pilots import Pilots  # noqa: E402
 from rigidsim.trial import Setting, angles_between, try_setting  # noqa: E402
 
@@ -206,7 +207,7 @@ def test_a_wrong_run_warns_in_its_summary(tmp_path: Path) -> None:
 
 def test_digits_lost_to_chaos_are_certified_as_lost(tmp_path: Path) -> None:
     settings = ['integrator.precision="double"', 'integrator.tolerance="auto"', 'integrator.method="taylor"']
-    run = rigidsim.run(experiment(CHAOTIC, 1e-6, 300, *settings), out=tmp_path)
+    run = rigidsim.run(experiment(CHAOTIC, 1e-6, 1000, *settings, samples=50), out=tmp_path)
     assert run.summary["accuracy"]["certified"] == math.pi
 
 
@@ -245,6 +246,33 @@ def test_odd_runs_are_certified(more: list[str], tmp_path: Path) -> None:
     assert run.summary["accuracy"]["certified"] <= asked
     if "record" not in more[0] and "40" not in more[0]:
         assert true_error(run, of) <= run.summary["accuracy"]["certified"]
+
+
+class Magnet(LoadModel):
+    """A dipole along the body's z in a field along the space axis X; nothing else tells of it."""
+
+    title = "magnet"
+    reads = frozenset({"attitude"})
+    conservative = True
+
+    def torque(self, m: Any) -> Any:
+        field, size = m.matrix[0], m.scene.context.ldexp(m.scene.context.mpf("0.3"), -m.scaling.energy)
+        return [([-size, 0, 0], field[1]), ([0, size, 0], field[0])]
+
+    def potential(self, m: Any) -> Any:
+        size = m.scene.context.ldexp(m.scene.context.mpf("0.3"), -m.scaling.energy)
+        return -m.number(size) * m.matrix[0][2]
+
+
+def test_loads_from_python_are_part_of_the_certificate(tmp_path: Path) -> None:
+    of = experiment(FREE, 1e-9, 20)
+    run = rigidsim.run(of, out=tmp_path, loads=[Magnet()])
+    certificate = certify(run, rigidsim.load(run.folder.config), accuracy=1e-9, loads=[Magnet()])
+    assert certificate is not None
+    assert certificate.error == run.summary["accuracy"]["certified"] <= 1e-9
+    without = certify(run, rigidsim.load(run.folder.config), accuracy=1e-9)
+    assert without is not None
+    assert without.error > 0.1  # another motion
 
 
 def test_errors_far_below_a_double_are_told_apart() -> None:

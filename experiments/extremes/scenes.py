@@ -120,8 +120,8 @@ def separatrix() -> Iterator[Extreme]:
         for side, sign in (("outside", 1), ("inside", -1)):
             rates = (4, 10, beside(digits, sign, 3))
             yield Extreme("separatrix", f"{side} by 1e-{digits}", ASYMMETRIC, rates, lasting(200, 10))
-        rates = (f"1e-{digits}", 1, f"1e-{digits}")
-        yield Extreme("middle axis", f"off by 1e-{digits}", ASYMMETRIC, rates, lasting(200, 1))
+        beside_it = (f"1e-{digits}", 1, f"1e-{digits}")
+        yield Extreme("middle axis", f"off by 1e-{digits}", ASYMMETRIC, beside_it, lasting(200, 1))
     yield Extreme("separatrix", "on it", ASYMMETRIC, (4, 10, 3), lasting(200, 10))
 
 

@@ -88,7 +88,8 @@ def _number(axes: Axes, cost: np.ndarray, error: np.ndarray) -> None:
             place[1] -= 1.0
         places.append(place)
         axes.annotate(
-            str(number), point, xytext=(place[0], place[1]), xycoords="figure points", textcoords="figure points",
+            str(number), point, xytext=(place[0], place[1]), xycoords="figure points",
+            textcoords="figure points",
             ha="right", va="center", fontsize=8.5, fontweight="bold", color=_FRONT, zorder=4,
         )  # fmt: skip
 

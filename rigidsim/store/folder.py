@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store import netcdf, segments
+from rigidsim.store import netcdf, segments, summary_file
 
 _REOPENED = ".segments.reopened"
 
@@ -179,13 +179,7 @@ class RunFolder:
         """
         if not self.summary.exists():
             return {"status": "running", "message": "the run is under way, or was killed"}
-        try:
-            content = json.loads(self.summary.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise RunFolderError(f"{self.summary}: can't be read ({error})") from None
-        if not isinstance(content, dict):
-            raise RunFolderError(f"{self.summary}: is no summary")
-        return content
+        return summary_file.read_summary(self.summary)
 
 
 def find_run(path: str | Path) -> RunFolder:

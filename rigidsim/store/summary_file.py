@@ -42,7 +42,7 @@ class _Invariant(_Shape):
 
 class _Accuracy(_Shape):
     estimated_attitude_error: Number | None
-    amplification: Number = 1.0
+    amplification: Number | None = 1.0
 
 
 class _Lyapunov(_Shape):
@@ -54,7 +54,7 @@ class _Lyapunov(_Shape):
 class _Brief(_Shape):
     """Of a run that is under way."""
 
-    status: Annotated[StrictStr, Field(pattern=r"^[a-z_ -]{1,40}$")]
+    status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$")]
     message: Text = ""
     name: Text = ""
     description: StrictStr = ""

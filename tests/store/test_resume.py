@@ -304,6 +304,7 @@ def test_a_later_end(case: str, times: str, begun: str, tmp_path: Path, impatien
     assert rigidsim.verify(done.folder.path).identical
 
 
+@pytest.mark.slow
 def test_a_prolonged_run_that_is_killed_goes_on_to_its_later_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, eager: None
 ) -> None:

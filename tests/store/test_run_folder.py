@@ -120,7 +120,7 @@ def test_a_place_that_cannot_be_written(where: str, tmp_path: Path, free_body: C
 
 
 def test_a_config_that_cannot_run_writes_nothing(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    text = free_body("end = 1", formulation="euler_angles").replace("[0.2, 1.1, 0.7]", "[0.2, 0, 0.7]")
+    text = free_body("end = 1", formulation="canonical").replace("[0.2, 1.1, 0.7]", "[0.2, 0, 0.7]")
     with pytest.raises(rigidsim.ConfigError, match="singularity"):
         rigidsim.run(rigidsim.parse(text), out=tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
@@ -160,7 +160,7 @@ def test_no_run_there(what: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", [b"", b'{"status": "fini', b"[]", b"\xff\xfe"])
 def test_a_damaged_summary_is_refused(content: bytes, finished: rigidsim.Run) -> None:
     finished.folder.summary.write_bytes(content)
-    with pytest.raises(RunFolderError, match=r"summary\.json: (can't be read|is no summary)"):
+    with pytest.raises(RunFolderError, match=r"summary\.json: is damaged or no summary"):
         rigidsim.open_run(finished.folder.path)
 
 
