@@ -35,7 +35,7 @@ def assemble(prepared: Prepared) -> Assembly:
     Raises:
         ConfigError: invariants are to be held where there are none.
     """
-    system, precision, start = prepared.system, prepared.precision, prepared.clock.at(0)
+    system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     winding = Winding(system.angle_states, precision, prepared.scene.context)
     log = EventLog([c.stop for c in system.crossings], winding.turns)
     stepper = Stepper(system, precision, prepared.tolerance, start, log)

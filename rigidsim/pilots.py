@@ -74,7 +74,7 @@ def forecast(experiment: Experiment, *, loads: Sequence[Any] = ()) -> Forecast:
     scene = trial_scene(experiment, Setting())
     prepared = compactly(prepare_scene(experiment, scene, loads=loads))
     clock = prepared.clock
-    begin, end = float(clock.at(0)), float(clock.at(clock.count - 1))
+    begin, end = float(clock.start), float(clock.at(clock.count - 1))
     closed = not isinstance(closed_form_of(scene, driven=bool(loads)), str)
     return Forecast(
         steps=_steps(prepared),
@@ -91,8 +91,8 @@ def _steps(prepared: Prepared) -> float:
     from rigidsim.solve.stepper import Stepper
 
     clock = prepared.clock
-    begin, end = float(clock.at(0)), float(clock.at(clock.count - 1))
-    stepper = Stepper(prepared.system, prepared.precision, None, clock.at(0))
+    begin, end = float(clock.start), float(clock.at(clock.count - 1))
+    stepper = Stepper(prepared.system, prepared.precision, None, clock.start)
     while stepper.steps < _PILOT_STEPS and float(stepper.time) < end and stepper.skip(64):
         pass
     done = max(float(stepper.time) - begin, 1e-300)

@@ -46,7 +46,7 @@ def plan(experiment: Experiment, *, loads: Sequence[LoadModel] = ()) -> dict[str
     closed = closed_form_of(prepared.scene, driven=bool(loads))
     started = time.perf_counter()
     winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
     evaluator = Evaluator(prepared.system, prepared.precision, winding)
     compile_seconds = time.perf_counter() - started
     pilot = _pilot(prepared, Rhythm(stepper, winding), evaluator)

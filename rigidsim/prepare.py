@@ -256,7 +256,7 @@ def motion_growth(prepared: Prepared) -> Growth:
         return Growth(factor=1.0, seconds=0.0, rate=0.0, window=0.0)
     system = double_twin(prepared)
     clock, last = prepared.clock, prepared.clock.count - 1
-    growth = measure_growth(system, precision_of("double"), float(clock.at(0)), float(clock.at(last)))
+    growth = measure_growth(system, precision_of("double"), float(clock.start), float(clock.at(last)))
     return _beyond_measure(prepared, growth) if growth.saturated else growth
 
 

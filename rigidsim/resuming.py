@@ -212,7 +212,7 @@ def _compared(prepared: Prepared, chain: Chain) -> str:
             f"{chain.paths[-1]}: has schema version {saved.get('schema_version')}; only runs of version "
             f"{SCHEMA_VERSION} can be gone on with; begin a new run"
         )
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
     now = labels.root_attributes(prepared, stepper, chain.run)
     for key in _SAME_SYSTEM:
         if key in saved and saved[key] != now.get(key):

@@ -239,7 +239,7 @@ class _Completion:
 def _lyapunov(prepared: Prepared, interruption: Interruption) -> LyapunovSpectrum | None:
     clock, last = prepared.clock, prepared.clock.count - 1
     system = double_twin(prepared)
-    start, end = float(clock.at(0)), float(clock.at(last))
+    start, end = float(clock.start), float(clock.at(last))
     return lyapunov_spectrum(system, start, end, lambda _: not interruption.requested)
 
 

@@ -58,7 +58,7 @@ def amplification(experiment: rigidsim.Experiment, points: int = 120) -> float:
     count = len(system.states)
     start = np.concatenate([[float(x) for x in system.initial], np.eye(count).ravel()])
     integrator = hy.taylor_adaptive(list(variational.sys), start, compact_mode=True, time=0.0)
-    end = float(prepared.clock.at(prepared.clock.count - 1)) - float(prepared.clock.at(0))
+    end = float(prepared.clock.at(prepared.clock.count - 1)) - float(prepared.clock.start)
     states = integrator.propagate_grid(np.linspace(0.0, end, points))[-1]
     matrices = states[:, count:].reshape(points, count, count)
     largest = 1.0

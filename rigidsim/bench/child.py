@@ -119,7 +119,7 @@ def speed(experiment: Experiment, task: Task) -> dict[str, Any]:
     if prepared.closed is not None:
         closed, system, precision = prepared.closed, prepared.system, prepared.precision
         rows = np.resize(prepared.clock.internal(0, prepared.clock.count), _CLOSED_ROWS[precision.narrow])
-        begin = prepared.clock.at(0)
+        begin = prepared.clock.start
 
         def one_pass(_: int) -> bool:
             closed.states(system, precision, rows, begin)

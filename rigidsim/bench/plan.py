@@ -102,7 +102,7 @@ def make_plan(experiment: Experiment, budget: float) -> Plan:
     prepared = prepare_scene(experiment, trial_scene(experiment, DEFAULT))
     rhythm = assemble(prepared).rhythm
     stepper = rhythm.stepper
-    begin, last = float(prepared.clock.at(0)), float(prepared.clock.at(prepared.clock.count - 1))
+    begin, last = float(prepared.clock.start), float(prepared.clock.at(prepared.clock.count - 1))
     rhythm.skip(32)
     begun = time.process_time()
     rhythm.skip(64)

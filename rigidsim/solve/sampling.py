@@ -14,6 +14,9 @@ from rigidsim.solve.precision import Precision
 class SampleClock:
     """Times of the samples, block by block.
 
+    Attributes:
+        start: of the motion, a scalar of the precision: a list of times may begin later.
+
     Args:
         samples: where they lie (mpf, seconds).
         precision: of the run.
@@ -38,6 +41,7 @@ class SampleClock:
             self._intervals = wide(samples.start.context.mpf(samples.intervals))
             self._end = wide((samples.start + samples.span) / unit)
             self._last_index = samples.intervals
+        self.start = precision.number(samples.start / unit) if self._list is not None else self.at(0)
         self._refuse_coinciding(samples)
 
     def internal(self, first: int, stop: int) -> np.ndarray:

@@ -80,6 +80,17 @@ def test_samples_that_a_precision_can_not_tell_apart_are_refused() -> None:
     assert len(times("start = 1e6\nend = 1000001\nevery = 0.01", "double")) == 101
 
 
+@pytest.mark.parametrize("integrator", ["", 'method = "closed_form"', "hold_invariants = true"])
+def test_the_motion_begins_at_start_and_not_at_the_first_sample(integrator: str, runs: Path) -> None:
+    text = SPIN + "{}\n[integrator]\n" + integrator
+    late = run_text(text.format("times = [12.5, 25]"), runs, 'name="a"').dataset
+    grid = run_text(text.format("end = 25\nsamples = 3"), runs, 'name="b"').dataset
+    np.testing.assert_array_equal(late["quaternion"], grid["quaternion"][1:])
+    before = run_text(text.format("start = -12.5\ntimes = [0, 12.5]"), runs, 'name="c"').dataset
+    # the same motion on a clock that is 12.5 s behind: times are exact in both
+    assert np.abs(before["quaternion"].values - grid["quaternion"].values[1:]).max() < 1e-14
+
+
 def test_one_sample_only(runs: Path) -> None:
     run = run_text(SPIN + "times = [5]", runs)
     assert run.dataset.sizes["time"] == 1

@@ -306,7 +306,7 @@ def _states(prepared: Prepared) -> np.ndarray:
     """The states at the samples, integrated again."""
     pieces = []
     winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.at(0))
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
 
     class Collected:
         def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:

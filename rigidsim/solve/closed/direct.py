@@ -40,7 +40,7 @@ class Direct:
         self._keeper = keeper
         self._check = check
         self._place = rhythm.place()  # the start: the way to a sample leads over no other
-        self._begin = clock.at(0)
+        self._begin = clock.start
         self.progress = Progress(clock.count, 0 if start is None else start.next_sample)
 
     def checkpoint(self) -> Checkpoint:
