@@ -226,7 +226,8 @@ class Search:
 
 def _truth_setting(experiment: Experiment, setting: Setting, scene: RandomScene, how: str = "") -> Setting:
     """Twelve digits and more beyond the accuracy, and another precision or method than the certificate's."""
-    closed = Setting(60, method="closed_form")
+    digits = max(60, int(working_bits(setting.precision) * 0.302) + 40)  # and more than the run has
+    closed = Setting(digits, method="closed_form")
     if "closed form" not in how or scene.radians > _LONG:
         try:
             try_setting(experiment, closed, [mpmath.mpf(_last(experiment))])
@@ -237,7 +238,7 @@ def _truth_setting(experiment: Experiment, setting: Setting, scene: RandomScene,
         return Setting("quadruple", 1e-30)
     if working_bits(setting.precision) <= 53 and scene.accuracy >= _TIGHT:
         return Setting("quadruple", 1e-26)
-    return Setting(60 if working_bits(setting.precision) <= 113 else 90, scene.accuracy * 1e-12)
+    return Setting(digits, scene.accuracy * 1e-12)
 
 
 def _last(experiment: Experiment) -> float:

@@ -84,9 +84,13 @@ class Table:
                 read: dict[str, np.ndarray] = {}
                 for name in dict.fromkeys(part for column in wanted for part in column.parts):
                     read[name] = piece[name].isel({self.dim: here}).values
-                yield [
-                    [read[part][(slice(None), *column.index)] for part in column.parts] for column in wanted
-                ]
+                yield [[_column(read[part], column.index) for part in column.parts] for column in wanted]
+
+
+def _column(values: np.ndarray, index: tuple[int, ...]) -> np.ndarray:
+    """One component along the first dimension."""
+    key: Any = (slice(None), *index)
+    return np.asarray(values[key])
 
 
 def tables_of(pieces: Sequence[xarray.Dataset]) -> list[Table]:

@@ -10,10 +10,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))  # the studies are no installed package
 
-import rigidsim  # noqa: E402
-from experiments import fuzzing  # noqa: E402
-from rigidsim.errors import RigidsimError  # noqa: E402
-from rigidsim.scene.scene import build_scene  # noqa: E402
+import rigidsim
+from experiments import fuzzing
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.scene import build_scene
 
 TEXT = """
 name = "base"
