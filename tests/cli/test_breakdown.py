@@ -1,9 +1,9 @@
 """Runs that can't go on: the status, the reason in words, and the good samples kept.
 
 Euler angles that are not allowed to change to another chart break down in their singularity. For the
-sequence xyz, whose middle angle is singular at 90 degrees, a body that turns about its y axis with
-psi = offset passes it at a distance of about ``offset``: phi and psi then turn by half a turn within a time of offset / |w|, and a Taylor step is
-about e^-2 of that.
+sequence xyz, whose middle angle is singular at 90 degrees, a body that turns about its y axis with psi =
+offset passes it at a distance of about ``offset``: phi and psi then turn by half a turn within a time of
+offset / |w|, and a Taylor step is about e^-2 of that.
 """
 
 from __future__ import annotations
