@@ -270,7 +270,7 @@ def _parts(dataset: Any, name: str, rows: np.ndarray) -> list[np.ndarray]:
     return [np.asarray(dataset[n].values[rows]) for n in names]
 
 
-def study(full: bool, out: Path) -> list[Check]:
+def campaign(full: bool, out: Path) -> list[Check]:
     """Violations, refusals and cost ratios over random scenes; 200 of them with ``full``."""
     outcomes = [examine(random_scene(number)) for number in range(_FULL if full else _REDUCED)]
     _figure(outcomes, out)
@@ -344,4 +344,4 @@ def calibrate() -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    raise SystemExit(common.main(study, NAME))
+    raise SystemExit(common.main(campaign, NAME))

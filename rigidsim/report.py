@@ -130,9 +130,9 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
         _line(out, "chosen", f"{accuracy['chosen']}: {accuracy['chosen_why']}")
     estimate = accuracy["estimated_attitude_error"]
     if accuracy.get("certified") is not None:
-        asked, found = accuracy["requested"], accuracy["certified"]
+        asked, found = accuracy.get("requested") or math.nan, accuracy["certified"]
         text = f"certified to {found:.1e} rad, {asked:.1e} asked for ({accuracy['how']}, "
-        _line(out, "attitude", f"{text}{accuracy['times_compared']} times)")
+        _line(out, "attitude", f"{text}{accuracy.get('times_compared', 0)} times)")
     elif estimate is not None:
         factor = accuracy.get("amplification", 1)
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""

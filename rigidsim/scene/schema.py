@@ -190,6 +190,19 @@ class Integrator(Table):
             f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
         )
 
+    @field_validator("accuracy", mode="before")
+    @classmethod
+    def _possible_accuracy(cls, value: Any) -> Any:
+        if value is None:
+            return value
+        try:
+            number = parse_number(value, "rad")
+        except ValueError as error:
+            raise refuse(str(error)) from None
+        if not 0 < number.rational < 3:
+            raise refuse(f"given {shown(value)}; an angle above 0 and below pi is allowed, in rad")
+        return value
+
     @field_validator("tolerance", mode="before")
     @classmethod
     def _positive_tolerance(cls, value: Any) -> Any:

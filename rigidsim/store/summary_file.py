@@ -36,6 +36,8 @@ class _Invariant(_Shape):
     initial: Number | list[Number] | None
     largest_drift: Number | None
     final_drift: Number | None
+    final_drift: Number | None
+    put_back: Number | None = None
     bound: Number
     scale_name: Text
 
@@ -43,6 +45,12 @@ class _Invariant(_Shape):
 class _Accuracy(_Shape):
     estimated_attitude_error: Number | None
     amplification: Number | None = 1.0
+    requested: Number | None = None
+    certified: Number | None = None
+    how: Text = ""
+    times_compared: StrictInt = 0
+    chosen: Text = ""
+    chosen_why: Text = ""
 
 
 class _Lyapunov(_Shape):
@@ -72,6 +80,8 @@ class _Full(_Brief):
     tolerance: Number
     samples: StrictInt
     samples_planned: StrictInt
+    method: Text = "taylor"
+    hold_invariants: StrictBool = False
     invariants: dict[Text, _Invariant]
     accuracy: _Accuracy
     warnings: list[Text]
@@ -93,6 +103,7 @@ def read_summary(path: Path) -> dict[str, Any]:
         if not isinstance(content, dict):
             raise ValueError("no JSON object")
         (_Full if "cost" in content else _Brief).model_validate(content)
+        return {key: _visible(value) for key, value in content.items()}
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(step)[:40] for step in first["loc"])
@@ -103,7 +114,6 @@ def read_summary(path: Path) -> dict[str, Any]:
         raise RunFolderError(f"{path}: is damaged or no summary of rigidsim (nested too deeply)") from None
     except (OSError, ValueError) as error:
         raise RunFolderError(f"{path}: is damaged or no summary of rigidsim ({str(error)[:200]})") from None
-    return {key: _visible(value) for key, value in content.items()}
 
 
 def _visible(value: Any) -> Any:

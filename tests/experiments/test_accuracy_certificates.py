@@ -60,6 +60,6 @@ def test_a_certificate_that_lies_fails_the_study(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(certify, "certify", lying)
     monkeypatch.setattr(study, "_REDUCED", 1)
     monkeypatch.setattr(study, "random_scene", lambda _: random_scene(7))
-    checks = study.study(False, tmp_path)
+    checks = study.campaign(False, tmp_path)
     assert not checks[0].passed
     assert "exceeds the certificate" in checks[0].name
