@@ -36,7 +36,6 @@ class _Invariant(_Shape):
     initial: Number | list[Number] | None
     largest_drift: Number | None
     final_drift: Number | None
-    final_drift: Number | None
     put_back: Number | None = None
     bound: Number
     scale_name: Text
