@@ -147,11 +147,11 @@ def _spoiled(path: Path, rng: random.Random, bases: list[Path]) -> bytes:
         return rng.choice([*foreign, other, content[:-1]])
     if path.suffix == ".json" and rng.random() < 0.7:
         tree = json.loads(content)
-        for _ in range(rng.choice([1, 1, 2, 5])):
-            fuzzing.mutate(tree, tree, rng)
         try:
+            for _ in range(rng.choice([1, 1, 2, 5])):
+                fuzzing.mutate(tree, tree, rng)
             return json.dumps(tree, default=str).encode("utf-8", "surrogatepass")
-        except (ValueError, RecursionError):  # past what the writer itself can do
+        except (ValueError, RecursionError):  # a tree within itself, or a number past what can be written
             return b"[" * 100_000
     return fuzzing.damaged(content, other, rng)
 

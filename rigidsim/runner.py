@@ -215,6 +215,9 @@ class _Completion:
             "cpu_seconds": self.effort.cpu,
             "finished_at": provenance.now(),
         }
+        if self.prepared.holds_invariants:
+            rows = summary["invariants"].items()
+            final["put_back"] = json.dumps({name: row["put_back"] for name, row in rows})
         checkpoint = None
         if progress.status is Status.FINISHED:
             arrays = self.recorder.packed(self.advance.checkpoint())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import heyoka as hy
 import numpy as np
@@ -11,7 +13,7 @@ from equations import Random, array, prepared
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from support import angle_between, law
+from support import angle_between, law, run_text
 
 from rigidsim.errors import ConfigError
 from rigidsim.model.held import held_invariants
@@ -384,3 +386,30 @@ def test_the_least_correction_is_that_of_least_squares() -> None:
     expected = np.linalg.lstsq(rows, right, rcond=None)[0]
     condition = np.linalg.cond(rows) ** 2
     assert found == pytest.approx(expected, rel=0, abs=100 * condition * np.finfo(float).eps)
+
+
+def test_a_held_run_says_so_and_tells_what_its_drift_would_have_been(runs: Path) -> None:
+    text = """
+name = "held"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.5, 0.25, 1]
+[time]
+end = 2000
+samples = 11
+[integrator]
+hold_invariants = true
+"""
+    held = run_text(text, runs)
+    plain = run_text(text, runs, "integrator.hold_invariants=false", 'name="plain"')
+    assert held.summary["hold_invariants"] is True
+    put_back = held.summary["invariants"]["energy"]["put_back"]
+    drifted = plain.summary["invariants"]["energy"]["largest_drift"]
+    # both are the same random walk of rounding errors, though not its same path
+    assert 0.02 * drifted < abs(put_back) < 50 * drifted
+    assert held.summary["invariants"]["energy"]["largest_drift"] < 2.0**-48
+    with held.dataset as dataset:
+        assert json.loads(dataset.attrs["put_back"])["energy"] == put_back
+    with plain.dataset as dataset:
+        assert "put_back" not in dataset.attrs
