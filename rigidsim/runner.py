@@ -18,14 +18,14 @@ from rigidsim.assembly import assemble
 from rigidsim.certify import certified
 from rigidsim.crossings import event_counts, event_variables
 from rigidsim.guards import Guards, Interruption, Observer
-from rigidsim.prepare import Prepared, double_twin, motion_growth, prepare
+from rigidsim.prepare import Prepared, motion_growth, prepare
 from rigidsim.recorder import Effort, Recorder
 from rigidsim.restoring import Resumed, restore
 from rigidsim.scene.reading import Experiment, load
 from rigidsim.solve.advance import Advance
 from rigidsim.solve.closed.direct import Direct
-from rigidsim.solve.lyapunov import LyapunovSpectrum, lyapunov_spectrum
 from rigidsim.solve.status import Status
+from rigidsim.spectra import spectrum_of
 from rigidsim.store import netcdf, provenance
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.opening import open_dataset
@@ -141,7 +141,7 @@ class Session:
             spectrum = None
             if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
                 self.observer.phase("lyapunov")
-                spectrum = _lyapunov(prepared, interruption)
+                spectrum = spectrum_of(prepared, folder, str(attributes["run_id"]), interruption)
                 clock.next("lyapunov")
                 if interruption.requested:
                     progress.status = Status.INTERRUPTED
@@ -237,13 +237,6 @@ class _Completion:
             with open_dataset(folder.dataset, indexed=False) as dataset:  # memory goes with the rows shown
                 write_timeline(dataset, folder.timeline, rows=output.timeline_rows)
             clock.next("timeline")
-
-
-def _lyapunov(prepared: Prepared, interruption: Interruption) -> LyapunovSpectrum | None:
-    clock, last = prepared.clock, prepared.clock.count - 1
-    system = double_twin(prepared)
-    start, end = float(clock.start), float(clock.at(last))
-    return lyapunov_spectrum(system, start, end, lambda _: not interruption.requested)
 
 
 class _Phases:

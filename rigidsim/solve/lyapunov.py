@@ -8,8 +8,8 @@ are known to their statistical error at best.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import heyoka as hy
 import numpy as np
@@ -54,15 +54,59 @@ class LyapunovSpectrum:
         return self.largest * duration > 2 * regular + 3
 
 
+@dataclass
+class Convergence:
+    """How far a spectrum is: plain float64 arrays, all that is needed to go on with the same bits.
+
+    Attributes:
+        number: intervals done.
+        state: of the motion and its tangent vectors, orthogonalised; empty at the start.
+        sums: logarithms of lengths so far, in the order of the vectors.
+        times, exponents: estimates kept so far.
+    """
+
+    number: int = 0
+    state: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    sums: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    times: list[float] = field(default_factory=list)
+    exponents: list[np.ndarray] = field(default_factory=list)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """For a file."""
+        return {
+            "number": np.array([self.number], dtype=np.int64),
+            "state": self.state,
+            "sums": self.sums,
+            "times": np.array(self.times),
+            "exponents": np.array(self.exponents),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Convergence:
+        """What was put into a file; an empty array isn't there."""
+        return cls(
+            int(arrays["number"][0]),
+            arrays["state"],
+            arrays["sums"],
+            [float(t) for t in arrays.get("times", ())],
+            list(arrays.get("exponents", ())),
+        )
+
+
 def lyapunov_spectrum(
-    system: System, start: float, end: float, go_on: Callable[[float], bool]
+    system: System,
+    start: float,
+    end: float,
+    go_on: Callable[[Convergence], bool],
+    done: Convergence | None = None,
 ) -> LyapunovSpectrum | None:
     """Integrate the variational equations over a run.
 
     Args:
         system: built for double precision.
         start, end: internal units.
-        go_on: is told the fraction done at each orthogonalisation; False ends it.
+        go_on: is told how far it is at each orthogonalisation; False ends it.
+        done: to go on from; the same bits as in one go.
 
     Returns:
         The spectrum; None where it was ended early or the tangent vectors stopped being finite.
@@ -73,9 +117,11 @@ def lyapunov_spectrum(
     integrator = hy.taylor_adaptive(equations, initial, time=start, compact_mode=True)
     intervals = max(1, math.ceil((end - start) / _INTERVAL))
     stride = max(1, math.ceil(intervals / _MOST_ROWS))
-    sums = np.zeros(count)
-    times, exponents = [], []
-    for number in range(1, intervals + 1):
+    done = done or Convergence(sums=np.zeros(count))
+    if done.number:
+        integrator.time = start + (end - start) * done.number / intervals
+        integrator.state[:] = done.state
+    for number in range(done.number + 1, intervals + 1):
         time = start + (end - start) * number / intervals
         outcome = integrator.propagate_until(time)[0]
         tangents = np.array(integrator.state[count:]).reshape(count, count)
@@ -83,11 +129,12 @@ def lyapunov_spectrum(
             return None
         basis, triangle = np.linalg.qr(tangents)
         lengths = np.abs(np.diag(triangle))
-        sums += np.log(np.maximum(lengths, np.finfo(float).tiny))
+        done.sums = done.sums + np.log(np.maximum(lengths, np.finfo(float).tiny))
         integrator.state[count:] = basis.ravel()
         if number % stride == 0 or number == intervals:
-            times.append(math.ldexp(time - start, system.scaling.time))
-            exponents.append(np.sort(sums)[::-1] / times[-1])
-        if not go_on(number / intervals):
+            done.times.append(math.ldexp(time - start, system.scaling.time))
+            done.exponents.append(np.sort(done.sums)[::-1] / done.times[-1])
+        done.number, done.state = number, np.array(integrator.state)
+        if not go_on(done):
             return None
-    return LyapunovSpectrum(np.array(times), np.array(exponents))
+    return LyapunovSpectrum(np.array(done.times), np.array(done.exponents))

@@ -10,6 +10,7 @@ import pytest
 from support import run_text
 
 import rigidsim
+from rigidsim.solve import lyapunov
 
 SATELLITE = """
 name = "satellite"
@@ -98,3 +99,51 @@ def test_a_free_body_is_regular(runs: Path) -> None:
     plain = run_text(text.format(record='["quaternion"]').replace("lyapunov = true", ""), runs)
     assert plain.summary["lyapunov"] is None
     assert "lyapunov_exponents" not in plain.dataset
+
+
+def test_a_spectrum_that_was_interrupted_goes_on_with_the_same_bits(
+    runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rigidsim import spectra
+
+    text = """
+name = "free"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.5, 0.25, 1]
+[time]
+end = 500
+samples = 11
+[output]
+lyapunov = true
+timeline = false
+"""
+    whole = run_text(text, runs, 'name="whole"')
+    seen = []
+
+    def impatient(prepared, folder, run_id, interruption):
+        plain = lyapunov.lyapunov_spectrum
+
+        def interrupted(system, start, end, go_on, done=None):
+            def some(progress):
+                seen.append(progress.number)
+                interruption.requested = interruption.requested or len(seen) in (5, 11)
+                return go_on(progress)
+
+            return plain(system, start, end, some, done)
+
+        monkeypatch.setattr(spectra, "lyapunov_spectrum", interrupted)
+        return spectrum_of(prepared, folder, run_id, interruption)
+
+    spectrum_of = spectra.spectrum_of
+    monkeypatch.setattr("rigidsim.runner.spectrum_of", impatient)
+    run = run_text(text, runs)
+    assert run.status == "interrupted"
+    for _ in range(2):
+        run = rigidsim.resume(run.folder.path)
+    assert run.status == "finished"
+    assert seen == list(range(1, len(seen) + 1))  # nothing was done twice
+    with run.dataset as one, whole.dataset as other:
+        np.testing.assert_array_equal(one.lyapunov_exponents, other.lyapunov_exponents)
+        np.testing.assert_array_equal(one.quaternion, other.quaternion)

@@ -1,0 +1,66 @@
+"""The Lyapunov spectrum of a run, saved on the way: it costs tens of times what the run does."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from rigidsim.errors import RunFolderError
+from rigidsim.guards import Interruption
+from rigidsim.prepare import Prepared, double_twin
+from rigidsim.solve.lyapunov import Convergence, LyapunovSpectrum, lyapunov_spectrum
+from rigidsim.store import netcdf, segments
+from rigidsim.store.folder import RunFolder
+from rigidsim.store.seal import check_seal, sealed
+from rigidsim.store.variables import SCHEMA_VERSION
+
+
+def spectrum_of(
+    prepared: Prepared, folder: RunFolder, run_id: str, interruption: Interruption
+) -> LyapunovSpectrum | None:
+    """Integrate the variational equations, or what is left of them.
+
+    Returns:
+        The spectrum; None where it was interrupted, or stopped being finite.
+
+    Raises:
+        RunFolderError: the folder can't be written.
+    """
+    clock = prepared.clock
+    system = double_twin(prepared)
+    path = folder.segments / "lyapunov.h5"
+    saved = time.monotonic()
+
+    def go_on(done: Convergence) -> bool:
+        nonlocal saved
+        stop = interruption.requested
+        if stop or time.monotonic() - saved >= segments.SEGMENT_SECONDS:
+            _save(path, done, run_id)
+            saved = time.monotonic()
+        return not stop
+
+    start, end = float(clock.start), float(clock.at(clock.count - 1))
+    return lyapunov_spectrum(system, start, end, go_on, _saved(path, run_id))
+
+
+def _save(path: Path, done: Convergence, run_id: str) -> None:
+    labels = {"run_id": run_id, "schema_version": SCHEMA_VERSION}
+    content = sealed(netcdf.image([], {}, 0, labels, {"lyapunov": done.arrays()}))
+    try:
+        netcdf.write_bytes(path, content)
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be written: {error.strerror or error}") from None
+
+
+def _saved(path: Path, run_id: str) -> Convergence | None:
+    """What an earlier session saved; what doesn't belong to this run, or is damaged, is worked out anew."""
+    if not path.exists():
+        return None
+    try:
+        check_seal(path)
+        with netcdf.reading(path) as file:
+            if str(file.attrs.get("run_id", "")) != run_id:
+                return None
+        return Convergence.from_arrays(netcdf.read_group(path, "lyapunov"))
+    except (RunFolderError, KeyError):
+        return None
