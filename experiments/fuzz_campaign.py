@@ -159,7 +159,7 @@ def _spoiled(path: Path, rng: random.Random, bases: list[Path]) -> bytes:
 def _resealed(target: Path) -> None:
     from rigidsim.store.provenance import file_sha256
 
-    with contextlib.suppress(OSError, ValueError, TypeError):
+    with contextlib.suppress(OSError, ValueError, TypeError, RecursionError):
         summary = json.loads((target / "summary.json").read_text())
         if "dataset_sha256" in summary:
             summary["dataset_sha256"] = file_sha256(target / "dataset.h5")
