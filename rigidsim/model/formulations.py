@@ -7,7 +7,7 @@ and Euler angles as expressions of its states.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import heyoka as hy
 
@@ -15,6 +15,24 @@ from rigidsim.model import rotations
 from rigidsim.model.rotations import Expression, ExpressionMatrix
 from rigidsim.scene import attitude
 from rigidsim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from rigidsim.model.loads import ExtraStates
+
+
+@dataclass(frozen=True)
+class OrbitalFrame:
+    """What an attitude gives that is carried relative to a circular orbit (``rigidsim.model.orbital``).
+
+    Attributes:
+        direction: unit vector towards the attracting body, body axes.
+        normal: of the orbit, body axes.
+        states: the orbit's own, from which attitudes in space follow.
+    """
+
+    direction: list[Expression]
+    normal: list[Expression]
+    states: ExtraStates
 
 
 @dataclass(frozen=True)
@@ -33,6 +51,7 @@ class AttitudeStates:
         angles: positions within ``names`` of states that are angles and grow without bound.
         defect: name, long name and expression of what should stay constant by construction, or None.
         singular_factor: expression that vanishes where the formulation breaks down, or None.
+        orbital: where the states are the attitude relative to an orbital frame.
     """
 
     kind: str
@@ -46,20 +65,31 @@ class AttitudeStates:
     defect: tuple[str, str, Expression] | None = None
     singular_factor: Expression | None = None
     sequence: str = field(default="")
+    orbital: OrbitalFrame | None = None
+
+    @property
+    def variables(self) -> list[Expression]:
+        """The states as heyoka variables."""
+        return list(hy.make_vars(*self.names))
+
+
+def quaternion_kinematics(q: list[Expression], rates: list[Expression]) -> list[Expression]:
+    """q (0, w) / 2 for a quaternion [w, x, y, z] and rates in body axes."""
+    w, x, y, z = q
+    p, r, s = rates
+    return [
+        0.5 * (-x * p - y * r - z * s),
+        0.5 * (w * p + y * s - z * r),
+        0.5 * (w * r + z * p - x * s),
+        0.5 * (w * s + x * r - y * p),
+    ]
 
 
 def quaternion_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
     """Four states, no singularity: q' = q (0, w) / 2 (the cheapest and the default)."""
     names = ["qw", "qx", "qy", "qz"]
     q = list(hy.make_vars(*names))
-    w, x, y, z = q
-    p, r, s = rates
-    derivatives = [
-        0.5 * (-x * p - y * r - z * s),
-        0.5 * (w * p + y * s - z * r),
-        0.5 * (w * r + z * p - x * s),
-        0.5 * (w * s + x * r - y * p),
-    ]
+    derivatives = quaternion_kinematics(q, rates)
     squared = hy.sum([c * c for c in q])
     return AttitudeStates(
         "quaternion",

@@ -50,7 +50,7 @@ def _squared_rows(m: Mechanics) -> list[Expression]:
 # What stands for a root that can vanish: its scalars, and their relative drift over the root's
 _SQUARES: dict[str, tuple[Callable[[Mechanics], list[Expression]], int]] = {
     "angular_momentum_norm": (lambda m: [hy.sum([x * x for x in m.momentum_body])], 2),
-    "quaternion_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.attitude).quaternion])], 2),
+    "quaternion_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.attitude).variables])], 2),
     "vertical_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.vertical)])], 2),
     "orthogonality_defect": (_squared_rows, 1),
 }

@@ -140,8 +140,15 @@ class UniformGravityModel(LoadModel):
         return bool(norm(m.scene.context, cross(arm, axis)) <= norm(m.scene.context, arm) * tiny)
 
 
-def gradient_terms(m: Mechanics, direction: list[Expression], strength: Expression) -> list[Term]:
-    """Torque 3 strength c x (I c) for a unit direction c in body axes (MacCullagh)."""
+def gradient_terms(
+    m: Mechanics, direction: list[Expression], strength: Any, factor: Expression | None = None
+) -> list[Term]:
+    """Torque 3 strength factor c x (I c) for a unit direction c in body axes (MacCullagh).
+
+    Args:
+        strength: constant part (mpf), which becomes one coefficient with the moments.
+        factor: what varies of it.
+    """
     context = m.scene.context
     inertia = m.numbers.inertia
     one, zero = context.one, context.zero
@@ -154,7 +161,9 @@ def gradient_terms(m: Mechanics, direction: list[Expression], strength: Expressi
             if j != a:
                 vector = [x + y for x, y in zip(vector, cross(units[j], columns[a]), strict=True)]
             if any(x != 0 for x in vector):
-                terms.append(([3 * x for x in vector], strength * (direction[a] * direction[j])))
+                product = direction[a] * direction[j]
+                scaled = [3 * strength * x for x in vector]
+                terms.append((scaled, product if factor is None else factor * product))
     return terms
 
 
@@ -190,6 +199,8 @@ class GravityGradientModel(LoadModel):
 
     def extra_states(self, m: Mechanics) -> ExtraStates | None:
         """Those of the orbit."""
+        if m.attitude is not None and m.attitude.orbital is not None:
+            return m.attitude.orbital.states
         orbit = self.orbit(m)
         if orbit is None:
             return None
@@ -202,6 +213,8 @@ class GravityGradientModel(LoadModel):
 
     def direction(self, m: Mechanics) -> list[Expression]:
         """Unit vector towards the attracting body, body axes."""
+        if m.attitude is not None and m.attitude.orbital is not None:
+            return m.attitude.orbital.direction
         orbit = self.orbit(m)
         if orbit is not None:
             return apply(transpose(m.matrix), orbit.direction)
@@ -212,8 +225,8 @@ class GravityGradientModel(LoadModel):
         fixed = [as_factor(m.number(x / length)) for x in self.spec.position]
         return apply(transpose(m.matrix), fixed)
 
-    def strength(self, m: Mechanics) -> Expression:
-        """G M / R^3 in internal units."""
+    def strength(self, m: Mechanics) -> tuple[Any, Expression | None]:
+        """G M / R^3 in internal units: at a constant distance (mpf), and what it varies by."""
         context = m.scene.context
         orbit = self.orbit(m)
         factor = None if orbit is None else orbit.inverse_distance**3
@@ -225,16 +238,17 @@ class GravityGradientModel(LoadModel):
         else:
             distance = norm(context, m.carried(self.spec.position))
         value = context.ldexp(self.spec.gravitational_parameter / distance**3, 2 * m.scaling.time)
-        constant = as_factor(m.number(value))
-        return constant if factor is None else constant * factor
+        return value, factor
 
     def torque(self, m: Mechanics) -> list[Term]:
         """(3 G M / R^3) c x (I c)."""
-        return gradient_terms(m, self.direction(m), self.strength(m))
+        return gradient_terms(m, self.direction(m), *self.strength(m))
 
     def potential(self, m: Mechanics) -> Expression | None:
         """(3 G M / 2 R^3) c . I c (the part that doesn't depend on the attitude is left out)."""
-        return 1.5 * self.strength(m) * quadratic_form(m, self.direction(m))
+        strength, factor = self.strength(m)
+        potential = as_factor(m.number(3 * strength / 2)) * quadratic_form(m, self.direction(m))
+        return potential if factor is None else factor * potential
 
     def keeps_axial(self, m: Mechanics, axis: Vector) -> bool:
         """c x (I c) has no part along an axis of symmetry."""
@@ -271,8 +285,7 @@ class CentralGravityModel(LoadModel):
     def torque(self, m: Mechanics) -> list[Term]:
         """(3 G M / r^3) c x (I c)."""
         _, body, inverse = self.geometry(m)
-        strength = m.number(self._strength(m, 3, 2 * m.scaling.time)) * inverse**3
-        return gradient_terms(m, body, strength)
+        return gradient_terms(m, body, self._strength(m, 3, 2 * m.scaling.time), inverse**3)
 
     def force(self, m: Mechanics) -> list[Term]:
         """-GM r/r^3 - (3GM / 2 M r^4)[(tr I - 5 c . I c) r/|r| + 2 R I c] (physics of MacCullagh)."""

@@ -13,9 +13,10 @@ import heyoka as hy
 
 from rigidsim.model.dynamics import Number, ScaledNumbers
 from rigidsim.model.formulations import AttitudeStates
-from rigidsim.model.loads import GravityGradientModel, LoadModel, Term, quadratic_form
+from rigidsim.model.loads import GravityGradientModel, LoadModel, Term
 from rigidsim.model.rotations import Expression, ExpressionMatrix, apply
 from rigidsim.model.scaling import Scaling
+from rigidsim.model.split import as_factor
 from rigidsim.scene.context import dot
 from rigidsim.scene.scene import Scene
 
@@ -182,18 +183,21 @@ class Mechanics:
         if orbit is None or not orbit.circular or not orbit.fixed_plane:
             return None
         context = self.scene.context
-        sin_i, cos_i = context.sin(orbit.inclination), context.cos(orbit.inclination)
-        normal = [
-            sin_i * context.sin(orbit.ascending_node),
-            -sin_i * context.cos(orbit.ascending_node),
-            cos_i,
-        ]
         motion = context.ldexp(orbit.mean_motion, self.scaling.time)
-        carried = [
-            self.number(motion * o) * x for o, x in zip(normal, self.momentum_space, strict=True) if o != 0
-        ]
-        tidal = 1.5 * load.strength(self) * quadratic_form(self, load.direction(self))
-        return self.rotational_energy - hy.sum(carried) + tidal
+        if self.attitude is not None and self.attitude.orbital is not None:
+            factor = as_factor(self.number(motion))
+            normal_body = self.attitude.orbital.normal
+            carried = [factor * (o * x) for o, x in zip(normal_body, self.momentum_body, strict=True)]
+        else:
+            sin_i, cos_i = context.sin(orbit.inclination), context.cos(orbit.inclination)
+            normal = [
+                sin_i * context.sin(orbit.ascending_node),
+                -sin_i * context.cos(orbit.ascending_node),
+                cos_i,
+            ]
+            pairs = zip(normal, self.momentum_space, strict=True)
+            carried = [self.number(motion * o) * x for o, x in pairs if o != 0]
+        return self.rotational_energy - hy.sum(carried) + load.potential(self)
 
 
 def in_common_unit(states: list[Expression], units: list[Any], number: Number) -> list[Expression]:

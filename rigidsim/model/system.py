@@ -27,6 +27,7 @@ from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
 from rigidsim.model.loads import LoadModel
 from rigidsim.model.mechanics import Mechanics, in_common_unit
 from rigidsim.model.observables import WORK, work_is_needed
+from rigidsim.model.orbital import note_orbital_frame, orbital_load, orbital_states
 from rigidsim.model.pace import PACE, arguments, pace_derivative
 from rigidsim.model.recording import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.requirements import Requirements, choose_requirements
@@ -143,6 +144,10 @@ def build_system(
     if not canonical and requirements.formulation != "rates":
         if requirements.formulation == "euler_angles":
             attitude = euler_states(scene, rates, sequence)
+        elif (orbiting := orbital_load(scene, loads, requirements.formulation)) is not None:
+            unit = context.ldexp(context.one, scaling.time)
+            attitude = orbital_states(scene, rates, orbiting, unit, number)
+            note_orbital_frame(requirements.reasons)
         else:
             attitude = BUILDERS[requirements.formulation](scene, rates)
         names += attitude.names
