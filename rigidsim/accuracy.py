@@ -11,34 +11,38 @@ Choices depend on counts alone, never on a clock, so that a config always choose
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.guards import Observer
 from rigidsim.pilots import Forecast, Pilots, epsilon, forecast
+from rigidsim.prepare import auto_tolerance
 from rigidsim.scene.context import working_bits
 from rigidsim.scene.reading import Experiment, parse_saved
 from rigidsim.scene.schema import LARGEST_DIGITS
 from rigidsim.trial import Setting
 
-__all__ = ["Choice", "Forecast", "choose", "chosen", "cost", "forecast", "is_open"]
+__all__ = ["Choice", "Forecast", "choose", "chosen", "cost", "forecast", "taylor_order"]
 
 _SAFETY = 3.0  # between a forecast and what was asked for
 _HOPE = 0.6  # of what was asked for: worth a try where the next precision costs ten times as much
 _HOPE_LONG = 3.0  # the same of a long run, which mostly does better than forecast from its beginning
 _PROGRESS = 0.2  # of the error forecast of a setting that failed: what the next must promise
-_DIGITS: dict[str | int, range] = {"single": range(4, 7), "double": range(4, 16), "extended": range(13, 19)}
+_DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
 """Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""
 _LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100, 150, 200, LARGEST_DIGITS)
-_STEP_COST: dict[str | int, float] = {"single": 0.9, "double": 1.0, "extended": 9.0, "quadruple": 170.0}
-_DIGITS_STEP = 210.0  # at 50 digits
-_HELD = 1.1
-_CLOSED_SAMPLE = 6.0
-_WIDE_CLOSED_SAMPLE = 3000.0
-"""Measured (experiments/accuracy_certificates.py): a step over the square of its Taylor order, in that of
-double precision; a sample of the closed form, in steps of double precision at its epsilon."""
+_STEP_COST: dict[str | int, float] = {"single": 1.25, "double": 1.0, "extended": 9.0, "quadruple": 135.0}
+_DIGITS_STEP = 155.0  # at 50 digits
+_HELD = 1.05
+_CLOSED_START = 800.0
+_CLOSED_SAMPLE = 0.4
+_WIDE_CLOSED_SAMPLE = 1400.0
+_DIGITS_CLOSED_SAMPLE = 1900.0  # at 50 digits
+"""Measured (experiments/accuracy_certificates.py --calibrate): a step over the square of its Taylor order, in
+that of double precision; the closed form's first sample and each further one, in steps of double precision at
+its epsilon, which take about a microsecond."""
 _SECONDS_PER_STEP = 1e-6  # of double precision, a free body on one core: for the message about cost only
 
 
@@ -50,18 +54,22 @@ class Choice:
         forecast: attitude error at the end, rad.
         steps: natural steps, roughly.
         why: one sentence for the summary.
-        seconds: that choosing took.
+        known: of the motion.
     """
 
     setting: Setting
     forecast: float
     steps: int
     why: str
-    seconds: float = 0.0
+    known: Forecast
 
 
 def chosen(
-    experiment: Experiment, *, loads: Sequence[Any] = (), beyond: Setting | None = None
+    experiment: Experiment,
+    *,
+    loads: Sequence[Any] = (),
+    beyond: Setting | None = None,
+    observer: Observer | None = None,
 ) -> tuple[Experiment, Choice | None]:
     """The experiment with the settings that its ``accuracy`` asks for written into it.
 
@@ -72,6 +80,7 @@ def chosen(
     Args:
         loads: given from Python.
         beyond: a setting that was run and didn't keep the accuracy; only dearer ones are looked at.
+        observer: is told of the trials.
 
     Raises:
         ConfigError: no setting reaches the accuracy; says what can be reached.
@@ -82,41 +91,35 @@ def chosen(
     given = integrator.model_fields_set
     if {"precision", "tolerance", "method"} <= given:
         return experiment, None
-    started = time.perf_counter()
+    observer = observer or Observer()
+    observer.choosing(experiment.config.name)
     accuracy = float(integrator.accuracy.rational)
     try:
-        choice = choose(experiment, accuracy, loads=loads, beyond=beyond)
+        choice = choose(experiment, accuracy, loads=loads, beyond=beyond, observer=observer)
     except ConfigError as error:
         raise error.at(experiment.source) from None
-    choice = replace(choice, seconds=time.perf_counter() - started)
     keys = [text for text in choice.setting.overrides() if text[11:].partition("=")[0] not in given]
     return parse_saved(experiment.text, source=experiment.source, overrides=keys), choice
 
 
-def is_open(experiment: Experiment, choice: Choice, loads: Sequence[Any] = ()) -> bool:
-    """Whether a dearer setting than the one chosen is left to try."""
-    asked = experiment.config.integrator.accuracy
-    assert asked is not None
-    try:
-        choose(experiment, float(asked.rational), loads=loads, beyond=choice.setting)
-    except ConfigError:
-        return False
-    return True
-
-
 def choose(
-    experiment: Experiment, accuracy: float, *, loads: Sequence[Any] = (), beyond: Setting | None = None
+    experiment: Experiment,
+    accuracy: float,
+    *,
+    loads: Sequence[Any] = (),
+    beyond: Setting | None = None,
+    observer: Observer | None = None,
 ) -> Choice:
     """The cheapest setting whose forecast keeps an accuracy, within what the config leaves open.
 
     Args:
         accuracy: rad, at the end.
-        beyond: as of ``chosen``.
+        beyond, observer: as of ``chosen``.
 
     Raises:
         ConfigError: none does.
     """
-    pilots = Pilots(experiment, accuracy, loads)
+    pilots = Pilots(experiment, accuracy, loads, observer)
     known = pilots.known
     candidates = _candidates(experiment, known)
     candidates.sort(key=lambda s: cost(s, known.steps, pilots.samples))
@@ -144,27 +147,43 @@ def _first(pilots: Pilots, candidates: list[Setting], most: float, hope: float) 
     for n, setting in enumerate(candidates):
         error = pilots.error(setting)
         if error <= most:
-            return Choice(setting, error, steps, pilots.why(setting))
+            return Choice(setting, error, steps, pilots.why(setting), pilots.known)
         dearer = all(s.precision != setting.precision for s in candidates[n + 1 :] if s.method == "taylor")
         if dearer and setting.method == "taylor" and error <= hope:
             why = f"{pilots.why(setting)}; the next precision costs ten times as much"
-            return Choice(setting, error, steps, why)
+            return Choice(setting, error, steps, why, pilots.known)
     return None
 
 
 def cost(setting: Setting, steps: float, samples: int) -> float:
     """In steps of double precision at its epsilon, roughly: a count, so that no clock decides.
 
-    A step's work goes with the square of the Taylor order (Jorba and Zou 2005), which goes with the
-    tolerance's digits; steps are about as long at any tolerance.
+    A step's work goes with the square of the Taylor order; steps are about as long at any tolerance.
+
+    Args:
+        steps: natural steps of the run; of no account to a closed form.
+        samples: of the run; they cost next to nothing where steps are taken.
     """
     if setting.method == "closed_form":
-        return samples * (_CLOSED_SAMPLE if working_bits(setting.precision) <= 53 else _WIDE_CLOSED_SAMPLE)
+        return _closed_cost(setting.precision, samples)
     step = _STEP_COST.get(setting.precision, 0.0)
     if isinstance(setting.precision, int):
         step = _DIGITS_STEP * max(1.0, setting.precision / 50)
-    order = 1 - math.log(setting.tolerance or epsilon(setting.precision)) / 2
-    return steps * step * (order / 20) ** 2 * (_HELD if setting.hold_invariants else 1.0)
+    return steps * step * (taylor_order(setting) / 20) ** 2 * (_HELD if setting.hold_invariants else 1.0)
+
+
+def _closed_cost(precision: str | int, samples: int) -> float:
+    if working_bits(precision) <= 53:
+        return _CLOSED_START + samples * _CLOSED_SAMPLE
+    if isinstance(precision, int):
+        return samples * _DIGITS_CLOSED_SAMPLE * max(1.0, precision / 50)
+    return samples * _WIDE_CLOSED_SAMPLE
+
+
+def taylor_order(setting: Setting) -> int:
+    """Of the series that a tolerance needs: Jorba and Zou 2005, eq. 11."""
+    auto = auto_tolerance(epsilon(setting.precision))
+    return max(2, math.ceil(1 - math.log(setting.tolerance or auto) / 2))
 
 
 def _candidates(experiment: Experiment, known: Forecast) -> list[Setting]:

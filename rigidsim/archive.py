@@ -78,7 +78,11 @@ def _whole(path: Path, expected: str | None) -> Path:
     Raises:
         RunFolderError: damaged, edited, exchanged, or of a version that is newer than this rigidsim.
     """
-    digest = check_whole(path)[1] if read_seal(path) is not None else provenance.file_sha256(path)
+    try:
+        unsealed = read_seal(path) is None
+        digest = provenance.file_sha256(path) if unsealed else check_whole(path)[1]
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
     labels = segments.root_attributes(path)
     version = labels.get("schema_version")
     if not isinstance(version, int) or version > SCHEMA_VERSION:
@@ -86,7 +90,7 @@ def _whole(path: Path, expected: str | None) -> Path:
             f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
             "install a newer one"
         )
-    if version > 1 and read_seal(path) is None:
+    if version > 1 and unsealed:
         raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
     if "segment" in labels:
         raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")

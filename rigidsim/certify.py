@@ -9,13 +9,10 @@ of rounding with the growth seen at the motion's beginning, and by the growth th
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mpmath
 import numpy as np
 
 from rigidsim.accuracy import Choice
@@ -23,11 +20,15 @@ from rigidsim.archive import Run
 from rigidsim.errors import ConfigError
 from rigidsim.guards import Observer
 from rigidsim.pilots import Forecast, epsilon, forecast
+from rigidsim.recorded import exact_times, parts_of, rows_to_compare
 from rigidsim.scene.context import working_bits
 from rigidsim.scene.reading import Experiment
 from rigidsim.solve.status import Status
 from rigidsim.summary import UNCERTAIN
-from rigidsim.trial import Setting, angles_between, try_setting
+from rigidsim.trial import Setting, angles_between, setting_of, try_setting
+
+if TYPE_CHECKING:
+    from rigidsim.session import Session
 
 _MOST_TIMES = 4096
 _WIDE_TIMES = 129  # where a time compared costs milliseconds
@@ -72,23 +73,31 @@ class Certificate:
 
 
 def certify(
-    run: Run, experiment: Experiment, *, accuracy: float, loads: Sequence[Any] = ()
+    run: Run,
+    experiment: Experiment,
+    *,
+    accuracy: float,
+    loads: Sequence[Any] = (),
+    known: Forecast | None = None,
+    observer: Observer | None = None,
 ) -> Certificate | None:
     """Compare a finished run with an independent solution.
 
     Args:
         experiment: that was run.
         accuracy: asked for, rad; decides how good the reference must be.
+        known: of the motion, where it was looked at already.
+        observer: is told of the comparisons.
 
     Returns:
         None where the run recorded too little to be compared.
     """
     setting = setting_of(experiment)
-    known = forecast(experiment, loads=loads)
+    known = known or forecast(experiment, loads=loads)
     with run.dataset as dataset:
         if dataset.sizes["time"] == 0:
             return None
-        compared = _Compared(dataset, experiment, setting, known, loads)
+        compared = _Compared(dataset, experiment, setting, known, loads, observer or Observer())
     best: Certificate | None = None
     for reference in _references(setting, known):
         found = compared.against(reference, accuracy)
@@ -151,16 +160,23 @@ class _Compared:
     """
 
     def __init__(
-        self, dataset: Any, experiment: Experiment, setting: Setting, known: Forecast, loads: Sequence[Any]
+        self,
+        dataset: Any,
+        experiment: Experiment,
+        setting: Setting,
+        known: Forecast,
+        loads: Sequence[Any],
+        observer: Observer,
     ) -> None:
+        self._observer = observer
         self._experiment, self._setting, self._known, self._loads = experiment, setting, known, loads
         self._count = dataset.sizes["time"]
-        self._rows = {most: _rows(dataset, most) for most in (_MOST_TIMES, _WIDE_TIMES)}
+        self._rows = {most: rows_to_compare(dataset, most) for most in (_MOST_TIMES, _WIDE_TIMES)}
         everything = np.unique(np.concatenate(list(self._rows.values())))
         self._place = {row: n for n, row in enumerate(everything)}
-        self._times = _exact_times(dataset, everything)
+        self._times = exact_times(dataset, everything)
         if "quaternion" in dataset:
-            self._parts = _parts(dataset, "quaternion", everything)
+            self._parts = parts_of(dataset, "quaternion", everything)
         else:
             self._parts = try_setting(experiment, setting, self._times, loads=loads).attitudes
         self.largest = self.own = math.inf
@@ -201,7 +217,14 @@ class _Compared:
     def _attitudes(self, setting: Setting, rows: np.ndarray) -> list[np.ndarray] | None:
         times = [self._times[self._place[row]] for row in rows]
         try:
-            trial = try_setting(self._experiment, setting, times, loads=self._loads, compact=True)
+            trial = try_setting(
+                self._experiment,
+                setting,
+                times,
+                loads=self._loads,
+                compact=True,
+                told=self._observer.trying,
+            )
         except ConfigError:  # a chart or a load that the reference can't have
             return None
         return trial.attitudes if trial.rows == len(times) else None
@@ -252,51 +275,6 @@ class _Compared:
         return tolerance if tolerance > epsilon(reference.precision) else None
 
 
-def _rows(dataset: Any, most: int) -> np.ndarray:
-    """All samples, or of each of ``most`` stretches the one where the body turns fastest, and the last."""
-    count = dataset.sizes["time"]
-    if count <= most:
-        return np.arange(count)
-    rates = np.zeros(count)
-    if "angular_velocity" in dataset:
-        rates = np.linalg.norm(dataset["angular_velocity"].values, axis=1)
-    elif "quaternion" in dataset:
-        turned = np.abs(np.einsum("ij,ij->i", *_neighbours(dataset["quaternion"].values)))
-        rates[1:] = np.arccos(np.minimum(turned, 1.0)) / np.diff(dataset["time"].values)
-    edges = np.linspace(0, count, most).astype(int)
-    picked = [a + int(np.argmax(rates[a:b])) for a, b in pairwise(edges)]
-    return np.unique([*picked, count - 1])
-
-
-def _neighbours(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return values[:-1], values[1:]
-
-
-def setting_of(experiment: Experiment) -> Setting:
-    """The setting that an experiment's ``[integrator]`` stands for."""
-    integrator = experiment.config.integrator
-    tolerance = integrator.tolerance
-    return Setting(
-        integrator.precision,
-        None if isinstance(tolerance, str) else float(tolerance.rational),
-        "quaternion" if integrator.formulation in ("auto", "rates") else integrator.formulation,
-        integrator.hold_invariants,
-        integrator.method,
-    )
-
-
-def _exact_times(dataset: Any, rows: np.ndarray) -> list[Any]:
-    parts = zip(*_parts(dataset, "time", rows), strict=True)
-    with mpmath.workprec(1200):
-        return [mpmath.fsum(float(part) for part in row) for row in parts]
-
-
-def _parts(dataset: Any, name: str, rows: np.ndarray) -> list[np.ndarray]:
-    """A variable's float64 parts at some rows."""
-    names = [name, *(n for n in (f"{name}_lo", *(f"{name}_lo{i}" for i in range(2, 20))) if n in dataset)]
-    return [np.asarray(dataset[n].values[rows]) for n in names]
-
-
 def verdict(certificate: Certificate, accuracy: float) -> str | None:
     """A warning where the accuracy asked for wasn't certified; None where it was."""
     if certificate.error <= accuracy:
@@ -312,10 +290,13 @@ def certified(
     result: Run,
     experiment: Experiment,
     choice: Choice | None,
-    observer: Observer,
+    session: Session,
     loads: Sequence[Any] = (),
 ) -> tuple[Run, bool]:
     """A finished run's certificate, put into its summary, where ``accuracy`` asks for one.
+
+    Args:
+        session: that the run was made in; the certificate's cost is part of its.
 
     Returns:
         The run, and False where the accuracy was not kept.
@@ -323,10 +304,16 @@ def certified(
     asked = experiment.config.integrator.accuracy
     if asked is None or result.status not in (Status.FINISHED.value, Status.EVENT.value):
         return result, True
-    started = time.perf_counter()
-    observer.phase("certify")
+    session.observer.phase("certify")
     accuracy = float(asked.rational)
-    found = certify(result, experiment, accuracy=accuracy, loads=loads)
+    found = certify(
+        result,
+        experiment,
+        accuracy=accuracy,
+        loads=loads,
+        known=None if choice is None else choice.known,
+        observer=session.observer,
+    )
     summary = {**result.summary, "accuracy": {**result.summary["accuracy"], "requested": accuracy}}
     doubt: str | None = "too little was recorded to certify the accuracy asked for"
     if found is not None:
@@ -339,9 +326,13 @@ def certified(
         summary["warnings"] = [w for w in summary["warnings"] if not w.startswith(UNCERTAIN)]
     else:
         summary["warnings"] = [*summary["warnings"], doubt]
-    spent = {"certify": time.perf_counter() - started}
-    if choice is not None:
-        spent["choose"] = choice.seconds
-    summary["cost"] = {**summary["cost"], "seconds": {**summary["cost"]["seconds"], **spent}}
+    session.phases.next("certify")
+    summary["cost"] = {
+        **summary["cost"],
+        "seconds": dict(session.phases.wall),
+        "cpu_by_phase": dict(session.phases.cpu),
+        "cpu_seconds": session.effort.cpu,
+        "wall_seconds": session.effort.wall,
+    }
     result.folder.write_summary(summary)
     return Run(result.folder, summary), doubt is None

@@ -17,7 +17,7 @@ def event_variables(prepared: Prepared, log: EventLog, evaluator: Evaluator, las
         last: time of the run's last sample, internal units; steps, and crossings, go past it.
     """
     extras: list[Extra] = []
-    variables = [v for v in prepared.variables() if not v.name.endswith("_drift")]
+    variables = [v for v in prepared.variables() if not v.name.endswith(("_drift", "_put_back"))]
     for index, crossing in enumerate(prepared.system.crossings):
         found = [f for f in log.found if f.index == index and float(f.time) <= last]
         count = len(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -64,3 +65,22 @@ class StoppedError(RigidsimError):
     """A run could not go on; the last good state was kept."""
 
     exit_code = 3
+
+
+class StoppedWritingError(RunFolderError, StoppedError):
+    """A run's folder can't be written any more; what was saved stays."""
+
+
+_ONCE = {
+    errno.ENOSPC: "once there is room",
+    errno.EDQUOT: "once there is room",
+    errno.EFBIG: "once files may be larger",
+    errno.EROFS: "once its file system is mounted for writing again",
+    errno.EACCES: "once it may be written",
+    errno.EPERM: "once it may be written",
+}
+
+
+def once_mended(error: OSError) -> str:
+    """What has to happen before a place that couldn't be written can be."""
+    return _ONCE.get(error.errno or 0, "once that is mended")

@@ -126,7 +126,8 @@ def _replacing(path: Path) -> Iterator[Path]:
         with netcdf.atomic(path) if path.suffix != ".zarr" and not path.is_dir() else _folder(path) as place:
             yield place
     except OSError as error:
-        raise RigidsimError(f"{path}: can't be written: {error.strerror or error}") from None
+        why = error.strerror or error
+        raise RigidsimError(f"{path}: can't be written: {why}; choose another --out") from None
 
 
 @contextmanager

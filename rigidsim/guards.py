@@ -25,7 +25,13 @@ class Observer:
         """Called between chunks, at most some tens of times per second."""
 
     def phase(self, name: str) -> None:
-        """A new phase begins: "integrate", "dataset", "timeline"."""
+        """A new phase begins: "integrate", "lyapunov", "dataset", "timeline", "certify"."""
+
+    def choosing(self, name: str) -> None:
+        """Settings for the run of this name are about to be chosen, by trials; its integration follows."""
+
+    def trying(self, title: str, fraction: float) -> None:
+        """A trial for the choice or the certificate has come so far; some tens of times per second."""
 
 
 class Interruption:

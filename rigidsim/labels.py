@@ -111,7 +111,11 @@ def lyapunov_variables(spectrum: LyapunovSpectrum | None) -> list[Extra]:
     if spectrum is None:
         return []
     along = {"units": "s", "long_name": "time since the run's start, of the estimates"}
-    what = {"units": "s-1", "long_name": "Lyapunov exponents of the scaled states so far, largest first"}
+    what = {
+        "units": "s-1",
+        "long_name": "Lyapunov exponents of the scaled states so far, largest first",
+        "states": " ".join(spectrum.states),
+    }
     return [
         Extra("lyapunov_time", ("lyapunov_time",), spectrum.times, along),
         Extra("lyapunov_exponents", ("lyapunov_time", "lyapunov_index"), spectrum.exponents, what),

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidsim.errors import ConfigError
+from rigidsim.guards import Observer
 from rigidsim.prepare import Prepared, double_twin, prepare_scene
 from rigidsim.scene.context import working_bits
 from rigidsim.scene.reading import Experiment
@@ -108,10 +109,17 @@ class Pilots:
         part: of the run that is tried.
     """
 
-    def __init__(self, experiment: Experiment, accuracy: float, loads: Sequence[Any] = ()) -> None:
+    def __init__(
+        self,
+        experiment: Experiment,
+        accuracy: float,
+        loads: Sequence[Any] = (),
+        observer: Observer | None = None,
+    ) -> None:
         from rigidsim.scene.scene import build_scene
 
         self._experiment, self._accuracy, self._loads = experiment, accuracy, loads
+        self._observer = observer or Observer()
         self.known = forecast(experiment, loads=loads)
         self.samples = build_scene(experiment).samples.count
         self.part = min(1.0, _PILOT_STEPS / self.known.steps)
@@ -225,7 +233,14 @@ class Pilots:
 
     def _trial(self, setting: Setting, times: list[Any]) -> Trial | None:
         try:
-            trial = try_setting(self._experiment, setting, times, loads=self._loads, compact=True)
+            trial = try_setting(
+                self._experiment,
+                setting,
+                times,
+                loads=self._loads,
+                compact=True,
+                told=self._observer.trying,
+            )
         except ConfigError:
             return None
         return trial if trial.status is Status.FINISHED and trial.rows == len(times) else None

@@ -27,6 +27,7 @@ _PHASES = {
     "lyapunov": "Lyapunov exponents",
     "dataset": "writing dataset.h5",
     "timeline": "drawing timeline.rrd",
+    "certify": "certifying",
 }
 
 
@@ -58,9 +59,7 @@ class TerminalObserver(Observer):
         last = float(prepared.scene.samples.last) - float(prepared.scene.start)
         self._start = float(prepared.scene.start)
         self._last = last
-        name = prepared.scene.name
-        title = name if len(name) <= _TITLE else name[: _TITLE - 1] + "…"
-        self._task = self._bar.add_task("", total=1.0, title=title, said="")
+        self._draw(_shortened(prepared.scene.name), 1.0)
 
     def progressed(self, progress: Progress) -> None:
         """See ``Observer``."""
@@ -76,9 +75,25 @@ class TerminalObserver(Observer):
 
     def phase(self, name: str) -> None:
         """See ``Observer``."""
-        if name in _PHASES and self._task is not None:
+        if name in _PHASES:
+            self._draw(_PHASES[name])
+
+    def choosing(self, name: str) -> None:
+        """See ``Observer``."""
+        self._draw(f"{_shortened(name)}: choosing")
+
+    def trying(self, title: str, fraction: float) -> None:
+        """See ``Observer``."""
+        if self._task is not None:
+            self._bar.update(
+                self._task, total=1.0, completed=fraction, said=f"{100 * fraction:5.1f} %  {title}"
+            )
+
+    def _draw(self, title: str, total: float | None = None) -> None:
+        """One bar in place of the last; it runs to and fro where its end isn't known."""
+        if self._task is not None:
             self._bar.remove_task(self._task)
-            self._task = self._bar.add_task("", total=None, title=_PHASES[name], said="")
+        self._task = self._bar.add_task("", total=total, title=title, said="")
 
 
 class LineObserver(Observer):
@@ -87,6 +102,7 @@ class LineObserver(Observer):
     def __init__(self) -> None:
         self._begin = self._latest = time.perf_counter()
         self._name = ""
+        self._tried, self._verb = "", "trying"
 
     def __enter__(self) -> LineObserver:
         return self
@@ -121,12 +137,35 @@ class LineObserver(Observer):
     def phase(self, name: str) -> None:
         """See ``Observer``."""
         if name in _PHASES:
-            print(f"{self._name}: {_PHASES[name]}", file=sys.stderr, flush=True)
+            self._say(_PHASES[name])
+        self._tried, self._verb = "", "comparing with" if name == "certify" else "trying"
+
+    def choosing(self, name: str) -> None:
+        """See ``Observer``."""
+        self._name = name
+        self._say("choosing settings by short trials")
+
+    def trying(self, title: str, fraction: float) -> None:
+        """See ``Observer``."""
+        now = time.perf_counter()
+        if title != self._tried:
+            self._tried, self._latest = title, now
+            self._say(f"{self._verb} {title}")
+        elif now - self._latest >= _LINE_EVERY:
+            self._latest = now
+            self._say(f"{self._verb} {title}: {100 * fraction:.1f} %")
+
+    def _say(self, text: str) -> None:
+        print(f"{self._name}: {text}", file=sys.stderr, flush=True)
 
 
 def observer() -> TerminalObserver | LineObserver:
     """The one that suits stderr; use it in a ``with``."""
     return TerminalObserver() if sys.stderr.isatty() else LineObserver()
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= _TITLE else name[: _TITLE - 1] + "…"
 
 
 def _left(elapsed: float, fraction: float) -> str:

@@ -14,6 +14,7 @@ from rigidsim.solve.advance import Progress
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.harvest import Checkpoint
+from rigidsim.solve.hold import put_back_by_invariant
 from rigidsim.solve.packing import pack_checkpoint, pack_events
 from rigidsim.store.segments import SegmentWriter
 from rigidsim.summary import Watch
@@ -73,13 +74,18 @@ class Recorder:
         self._events_saved = len(log.found)
         self.watch = Watch()
 
-    def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
+    def take(
+        self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray
+    ) -> None:
         """Evaluate and collect samples."""
         recorded: dict[str, list[np.ndarray]] = self._evaluator.evaluate(states, turns)
         exponent = self._prepared.clock.exponent
         recorded["time"] = [np.ldexp(part, exponent) for part in self._prepared.precision.parts(times)]
         for invariant in self._prepared.system.invariants:
             self.watch.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
+        for name, values in put_back_by_invariant(self._prepared.held_scalars, put_back).items():
+            recorded[f"{name}_put_back"] = [values[:, None]]
+            self.watch.put_back[name] = float(values[-1])
         factors = self._evaluator.singular_factors(states, turns)
         if factors is not None:
             self.watch.see_singular(factors, recorded["time"][0])
@@ -103,6 +109,7 @@ class Recorder:
         arrays["watched"] = np.array(
             [[watched.get(name, math.nan) for name in names] for watched in (watch.largest, watch.final)]
         )
+        arrays["put_back"] = np.array([watch.put_back.get(name, math.nan) for name in names])
         arrays["singularity"] = np.array([watch.nearest_singularity, watch.singularity_time])
         arrays["steps_seen"] = np.array([progress.smallest_step, progress.largest_step])
         arrays["effort"] = np.array([self._effort.wall, self._effort.cpu, progress.integration_seconds])
@@ -124,6 +131,9 @@ class Recorder:
         for name, most, last in zip(names, largest, final, strict=True):
             if not math.isnan(last):
                 self.watch.largest[name], self.watch.final[name] = float(most), float(last)
+        for name, value in zip(names, arrays.get("put_back", ()), strict=False):  # of held runs alone
+            if not math.isnan(value):
+                self.watch.put_back[name] = float(value)
         nearest, when = arrays["singularity"]
         self.watch.nearest_singularity, self.watch.singularity_time = float(nearest), float(when)
         progress.smallest_step, progress.largest_step = (float(x) for x in arrays["steps_seen"])

@@ -108,6 +108,9 @@ def print_summary(summary: dict[str, Any], folder: str, out: Console | None = No
         f"{duration(seconds)} wall ({duration(cost['seconds']['engine'])} integrating), "
         f"{duration(cost['cpu_seconds'])} CPU",
     )
+    if cost.get("cpu_by_phase"):
+        spent = [f"{name.replace('_', ' ')} {duration(s)}" for name, s in cost["cpu_by_phase"].items()]
+        _line(out, "CPU", ", ".join(spent))
     held = bool(summary.get("hold_invariants"))
     columns = ["invariant", "initial", "largest drift", "final", "bound"]
     table = _table(*columns, *(["put back"] if held else []))

@@ -15,8 +15,8 @@ from rigidsim.certify import certified
 from rigidsim.errors import RunFolderError
 from rigidsim.guards import Observer
 from rigidsim.prepare import Prepared, prepare
-from rigidsim.runner import Session
 from rigidsim.scene.reading import Experiment, parse_saved
+from rigidsim.session import Session
 from rigidsim.solve.stepper import Stepper
 from rigidsim.store import netcdf, provenance
 from rigidsim.store.folder import RunFolder, find_run
@@ -53,14 +53,16 @@ def resume(
         on others the summary says so.
 
     Raises:
-        RunFolderError: no run, a finished one, one in use, or one whose config or segments were changed.
+        RunFolderError: no run, a finished one, one in use, one that can't be written, or one whose config or
+            segments were changed.
         ConfigError: a bad ``until`` or override.
     """
     folder = find_run(path)
     session = Session(observer or Observer())
     with folder.locked():
         _refuse_links(folder)
-        folder.remove_torn()
+        if folder.read_only is None:
+            folder.remove_torn()
         experiment = _config(folder, overrides)
         if until is not None:
             experiment = _prolonged(experiment, until)
@@ -73,6 +75,7 @@ def resume(
                 f"{folder.path}: nothing is left to do: {done.summary.get('message', done.status)}; "
                 "--until goes on to a later end"
             )
+        folder.refuse_read_only()
         if not finished and "dataset_sha256" in folder.read_summary() and not folder.segments.exists():
             raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with --force")
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
@@ -91,7 +94,7 @@ def resume(
             run = session.execute(prepared, folder)
         else:
             run = session.execute(prepared, folder, chain)
-        return certified(run, prepared.experiment, None, session.observer, loads)[0]
+        return certified(run, prepared.experiment, None, session, loads)[0]
 
 
 def _refuse_links(folder: RunFolder) -> None:
@@ -207,9 +210,10 @@ def _compared(prepared: Prepared, chain: Chain) -> str:
             f"({text_difference(text, begun)}); "
             "put it back (the segments hold it as their attribute config), or begin a new run"
         )
-    if saved.get("schema_version") != SCHEMA_VERSION:
+    version, oldest = saved.get("schema_version"), 3 if prepared.holds_invariants else 2
+    if not isinstance(version, int) or not oldest <= version <= SCHEMA_VERSION:
         raise RunFolderError(
-            f"{chain.paths[-1]}: has schema version {saved.get('schema_version')}; only runs of version "
+            f"{chain.paths[-1]}: has schema version {version}; only runs of versions {oldest} to "
             f"{SCHEMA_VERSION} can be gone on with; begin a new run"
         )
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
 from rigidsim.guards import Interruption
 from rigidsim.prepare import Prepared, double_twin
 from rigidsim.solve.lyapunov import Convergence, LyapunovSpectrum, lyapunov_spectrum
@@ -49,7 +49,10 @@ def _save(path: Path, done: Convergence, run_id: str) -> None:
     try:
         netcdf.write_bytes(path, content)
     except OSError as error:
-        raise RunFolderError(f"{path}: can't be written: {error.strerror or error}") from None
+        raise StoppedWritingError(
+            f"{path}: can't be written: {error.strerror or error}; all samples are saved as segments, and "
+            f"{once_mended(error)}, rigidsim resume goes on with the exponents"
+        ) from None
 
 
 def _saved(path: Path, run_id: str) -> Convergence | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -38,11 +38,13 @@ class Watch:
 
     Attributes:
         largest, final: drifts by invariant.
+        put_back: of those held, what was put back before the latest sample.
         nearest_singularity: smallest absolute singular factor at a sample, and its time.
     """
 
     largest: dict[str, float] = field(default_factory=dict)
     final: dict[str, float] = field(default_factory=dict)
+    put_back: dict[str, float] = field(default_factory=dict)
     nearest_singularity: float = math.inf
     singularity_time: float = math.nan
 
@@ -75,13 +77,8 @@ def invariant_table(
     watch: Watch,
     steps: int,
     initial: dict[str, list[float]],
-    put_back: Mapping[str, float],
 ) -> dict[str, Any]:
-    """One entry per invariant.
-
-    Args:
-        put_back: what was put back of those held, relative like the drifts.
-    """
+    """One entry per invariant."""
     bound = DRIFT_FACTOR * prepared.law_tolerance * math.sqrt(max(steps, 1))
     table = {}
     for invariant in prepared.system.invariants:
@@ -94,7 +91,7 @@ def invariant_table(
             "largest_drift": watch.largest.get(invariant.name),
             "final_drift": watch.final.get(invariant.name),
             "bound": bound,
-            "put_back": put_back.get(invariant.name),
+            "put_back": watch.put_back.get(invariant.name),
             "why": invariant.why,
             "numerical": invariant.numerical,
         }
@@ -177,6 +174,7 @@ def _lyapunov(
         "e_folding_seconds": 1 / spectrum.largest if chaotic else None,
         "predictable_seconds": predictable_seconds(prepared, progress, growth),
         "exponents": [float(x) for x in spectrum.exponents[-1]],
+        "states": list(spectrum.states),
         "units": "s-1",
     }
 
@@ -277,7 +275,6 @@ def summarise(
     provenance: dict[str, Any],
     remarks: Sequence[str] = (),
     mixed: str = "",
-    put_back: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     scene, system = prepared.scene, prepared.system
@@ -308,7 +305,7 @@ def summarise(
         },
         "method": scene.config.integrator.method,
         "hold_invariants": prepared.holds_invariants,
-        "invariants": invariant_table(prepared, watch, progress.steps, initial, put_back or {}),
+        "invariants": invariant_table(prepared, watch, progress.steps, initial),
         "accuracy": {
             "requested": None,
             "estimated_attitude_error": estimate,

@@ -24,6 +24,8 @@ from rigidsim.solve.closed.direct import Direct
 from rigidsim.solve.harvest import Checkpoint
 from rigidsim.solve.status import Status
 
+_TOLD_EVERY = 0.05  # seconds
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -31,7 +33,7 @@ class Setting:
 
     Attributes:
         precision: as in a config.
-        tolerance: None for the precision's epsilon.
+        tolerance: None for "auto".
     """
 
     precision: str | int = "double"
@@ -98,7 +100,9 @@ class _Collected:
         self.drifts: dict[str, float] = {}
         self.histories: dict[str, list[np.ndarray]] = {}
 
-    def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
+    def take(
+        self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray
+    ) -> None:
         recorded = self._evaluator.evaluate(states, turns)
         self.pieces.append(recorded["quaternion"])
         for invariant in self._prepared.system.invariants:
@@ -112,6 +116,19 @@ class _Collected:
 
     def save(self, checkpoint: Checkpoint) -> None:
         """Never due."""
+
+
+def setting_of(experiment: Experiment) -> Setting:
+    """The setting that an experiment's ``[integrator]`` stands for."""
+    integrator = experiment.config.integrator
+    tolerance = integrator.tolerance
+    return Setting(
+        integrator.precision,
+        None if isinstance(tolerance, str) else float(tolerance.rational),
+        "quaternion" if integrator.formulation in ("auto", "rates") else integrator.formulation,
+        integrator.hold_invariants,
+        integrator.method,
+    )
 
 
 def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[Any] | None = None) -> Scene:
@@ -151,6 +168,7 @@ def try_setting(
     *,
     loads: Sequence[Any] = (),
     go_on: Callable[[Progress], Status | None] | None = None,
+    told: Callable[[str, float], None] | None = None,
     compact: bool = False,
 ) -> Trial:
     """Integrate an experiment's motion under a setting.
@@ -160,6 +178,7 @@ def try_setting(
         times: where to sample, mpf seconds; None keeps the experiment's.
         loads: given from Python.
         go_on: asked between chunks; a status ends the trial.
+        told: the setting's title, and how far the trial has come (0 to 1), some tens of times per second.
         compact: compiled in a tenth of the time to code that takes up to twice as long a step in double
             precision, and as long in the others; rounding differs.
 
@@ -179,6 +198,9 @@ def try_setting(
     parts = assemble(prepared)
     keeper = _Collected(prepared, parts.evaluator)
     check = go_on or (lambda _: None)
+    if told is not None:
+        told(setting.title, 0.0)
+        check = _telling(check, told, setting.title, float(scene.start), float(samples.last))
     clock, precision = prepared.clock, prepared.precision
     advance: Advance | Direct
     if prepared.closed is not None:
@@ -203,6 +225,27 @@ def try_setting(
         rows=max(progress.next_sample - early, 0),
         histories={name: np.concatenate(pieces) for name, pieces in keeper.histories.items()},
     )
+
+
+def _telling(
+    check: Callable[[Progress], Status | None],
+    told: Callable[[str, float], None],
+    title: str,
+    start: float,
+    last: float,
+) -> Callable[[Progress], Status | None]:
+    """A check between chunks that also tells how far a trial has come."""
+    latest = time.monotonic()
+
+    def both(progress: Progress) -> Status | None:
+        nonlocal latest
+        now = time.monotonic()
+        if now - latest > _TOLD_EVERY and last > start:
+            latest = now
+            told(title, min(1.0, (progress.time - start) / (last - start)))
+        return check(progress)
+
+    return both
 
 
 def compactly(prepared: Prepared) -> Prepared:

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from rigidsim.archive import Run, open_run
+from rigidsim.claims import summary_problems, timeline_problems
 from rigidsim.errors import RunFolderError
 from rigidsim.guards import Observer
 from rigidsim.runner import run
@@ -53,8 +54,9 @@ class Verdict:
     """What a verification found.
 
     Attributes:
-        identical: every number of every variable agrees in every bit, and the file is whole.
-        problems: what is wrong with the files themselves, in words.
+        identical: every number of every variable agrees in every bit, the files are whole, and the summary's
+            claims hold.
+        problems: what is wrong with the files themselves, or with what the summary claims, in words.
         difference: the first one, or None.
         differing: names of all variables that differ.
         environment: versions and machine features that changed since, which can explain it.
@@ -88,7 +90,7 @@ class Verdict:
 
 
 def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
-    """Integrate a run's embedded config again and compare everything recorded.
+    """Integrate a run's embedded config again and compare everything recorded, and what the summary claims.
 
     Args:
         path: run folder with a dataset, or a dataset alone.
@@ -108,8 +110,9 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         raise RunFolderError(
             f"{dataset}: the run had loads from Python ({saved['python_loads']}), which its config lacks"
         )
+    version = int(saved.get("schema_version", 1))
     experiment = embedded(dataset)
-    with tempfile.TemporaryDirectory(prefix="rigidsim-verify-") as scratch:
+    with _scratch() as scratch:
         quiet = experiment.config.output.model_copy(update={"timeline": False})
         unguarded = type(experiment.config.limits)()
         plain = experiment.config.integrator.model_copy(update={"accuracy": None})
@@ -118,8 +121,12 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         again = run(Experiment(experiment.text, config, experiment.source), out=scratch, observer=observer)
         if not again.folder.dataset.exists():
             raise RunFolderError(f"{dataset}: the run again {again.summary['message']}; nothing was compared")
-        differing, first, samples = _compare(dataset, again.folder.dataset)
+        differing, first, samples = _compare(dataset, again.folder.dataset, version)
         now = root_attributes(again.folder.dataset)
+    if folder is not None:
+        claimed = folder.read_summary()
+        problems += summary_problems(claimed, again.summary, folder, version)
+        problems += timeline_problems(claimed, folder)
     for key in _SETTINGS:
         if key in saved and saved[key] != now.get(key):
             problems.append(f"{key} is {saved[key]} in the dataset, {now.get(key)} when run again")
@@ -131,6 +138,17 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
     if saved.get("mixed_provenance"):
         changed.append(f"the run itself was put together on different machines: {saved['mixed_provenance']}")
     return Verdict(str(dataset), not problems and not differing, problems, first, differing, changed, samples)
+
+
+def _scratch() -> tempfile.TemporaryDirectory[str]:
+    try:
+        return tempfile.TemporaryDirectory(prefix="rigidsim-verify-")
+    except OSError as error:
+        why = error.strerror or error
+        raise RunFolderError(
+            f"{error.filename or 'the temporary folder'}: can't be written: {why}; set TMPDIR to a folder "
+            "with room for the run again"
+        ) from None
 
 
 def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
@@ -189,12 +207,14 @@ def text_difference(one: str, other: str) -> str:
     return f"{len(first)} lines, it had {len(second)}"
 
 
-def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, int]:
+def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Difference | None, int]:
     """Names of the variables that differ, the earliest difference, and the number of samples."""
     differing: list[str] = []
     earliest: Difference | None = None
     with netcdf.reading(saved) as one, netcdf.reading(again) as other:
-        names = sorted({*_numbers(one), *_numbers(other)})
+        older = version < 3  # nothing put back along time
+        found_again = [n for n in _numbers(other) if not (older and n.endswith("_put_back") and n not in one)]
+        names = sorted({*_numbers(one), *found_again})
         samples = int(one["time"].shape[0])
         for name in names:
             if name not in one or name not in other or one[name].shape != other[name].shape:

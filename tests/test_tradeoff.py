@@ -17,13 +17,15 @@ from hypothesis import strategies as st
 
 import rigidsim
 from rigidsim.bench import child
+from rigidsim.bench.advice import advice
 from rigidsim.bench.child import Task, ask
+from rigidsim.bench.labelled import LEFT_OUT, MEASURED, SHORT, dataset_of, on_front
 from rigidsim.bench.measure import Measurement, measure
 from rigidsim.bench.plan import DEFAULT, Plan, every_setting, grid, make_plan
 from rigidsim.errors import RigidsimError
 from rigidsim.prepare import prepare
 from rigidsim.solve.closed import closed_form_of
-from rigidsim.tradeoff import LEFT_OUT, MEASURED, SHORT, advice, dataset_of, on_front, save
+from rigidsim.tradeoff import save
 from rigidsim.trial import Setting, angles_between, try_setting
 
 FREE = """

@@ -77,7 +77,9 @@ class _Samples:
         self.times: list[Any] = []
         self.rows: list[list[Any]] = []
 
-    def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
+    def take(
+        self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray
+    ) -> None:
         recorded = self._evaluator.evaluate(states, turns)
         for invariant in self._prepared.system.invariants:
             self.watch.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,7 +83,8 @@ def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
             figure.savefig(partial, dpi=160)
             os.replace(partial, target)
         finally:
-            partial.unlink(missing_ok=True)
+            with suppress(OSError):  # of a file system that became read-only
+                partial.unlink(missing_ok=True)
     return target
 
 

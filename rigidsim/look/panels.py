@@ -151,10 +151,18 @@ def _drifts(axes: Any, dataset: xarray.Dataset) -> None:
         shown = np.where(magnitude > 0, magnitude, np.nan)
         label = name.removesuffix("_drift").replace("_", " ")
         axes.plot(time, shown, color=hue, label=label, lw=0.7, alpha=0.85)
-        if np.isfinite(shown).any():
-            top = max(top, float(np.nanmax(shown)))
-            low = min(low, float(np.nanpercentile(shown, 1)))
-    axes.set_title("Drift of invariants")
+        curves = [shown]
+        held = name.removesuffix("_drift") + "_put_back"
+        if held in dataset:  # what the drift would have been
+            magnitude = np.abs(_values(dataset, held)).reshape(-1)
+            curves.append(np.where(magnitude > 0, magnitude, np.nan))
+            axes.plot(time, curves[-1], color=hue, lw=1.0, ls=(0, (4, 2)))
+        for curve in curves:
+            if np.isfinite(curve).any():
+                top = max(top, float(np.nanmax(curve)))
+                low = min(low, float(np.nanpercentile(curve, 1)))
+    dashed = any(name.endswith("_put_back") for name in map(str, dataset.data_vars))
+    axes.set_title("Drift of invariants" + (" (dashed: what was put back)" if dashed else ""))
     axes.set_ylabel("relative drift")
     if top > 0:
         axes.set_yscale("log")

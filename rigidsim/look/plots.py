@@ -80,7 +80,7 @@ def plan_plots(dataset: xarray.Dataset) -> list[Plot]:
         name = str(variable.name)
         unit = str(variable.attrs.get("units", ""))
         vector = variable.ndim > 1
-        if name.endswith("_drift"):
+        if name.endswith(("_drift", "_put_back")):
             key, title, place = "drift", "Drift of invariants, log10", "drift"
         elif vector:
             # The name, not the long name: it is short, and what the user meets in the dataset.
@@ -154,7 +154,7 @@ def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
     name = str(variable.name)
     values = _columns(variable)
     count = values.shape[1]
-    if name.endswith("_drift"):
+    if name.endswith(("_drift", "_put_back")):  # the latter: what the drift would have been
         labels = [name.removesuffix("_drift").replace("_", " ")]
         values = np.log10(np.maximum(np.abs(values), floor))
     elif variable.ndim == 1:

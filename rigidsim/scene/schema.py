@@ -162,7 +162,12 @@ class Integrator(Table):
     """``[integrator]``: how accurately, and in which variables."""
 
     precision: Literal["single", "double", "extended", "quadruple"] | StrictInt = "double"
-    tolerance: Literal["auto"] | Dimensionless = "auto"
+    tolerance: Literal["auto"] | Dimensionless = Field(
+        default="auto",
+        description="of each step, relative to the largest component of the state; auto is the precision's "
+        "epsilon in double precision and an eighth of it in others, whose series would otherwise be just too "
+        "short to keep what is cut off well below rounding",
+    )
     formulation: Literal["auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical"] = (
         "auto"
     )

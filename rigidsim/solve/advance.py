@@ -243,7 +243,7 @@ class Advance:
                 self.rhythm.back_to(place)
             self._note_steps()
             times = times[: len(states)]
-            self.harvest.take(times, states, self.rhythm.rows(times))
+            self.harvest.take(times, states, self.rhythm.rows(times), self.rhythm.put_back)
             if self.harvest.complete:
                 self._finish(place)
                 break
@@ -263,7 +263,7 @@ class Advance:
         self._note_steps()
         times = self.harvest.until(self.stepper.time)
         if len(times):
-            self.harvest.take(times, output(times), self.rhythm.rows(times))
+            self.harvest.take(times, output(times), self.rhythm.rows(times), self.rhythm.put_back)
         if self.harvest.complete:
             self._finish(place)
         else:
@@ -317,7 +317,7 @@ class Advance:
         """The samples within the step just taken."""
         times = self.harvest.until(self.stepper.time)
         states = np.array([self.stepper.dense(t) for t in times])
-        self.harvest.take(times, states, self.rhythm.rows(times))
+        self.harvest.take(times, states, self.rhythm.rows(times), self.rhythm.put_back)
 
     def _find_last_good(self, place: Place) -> bool:
         """After a failure somewhere in many steps: walk to the last state that is finite."""

@@ -31,8 +31,12 @@ class Checkpoint:
 class Keeper(Protocol):
     """Takes samples in order, and is told when what it took can be saved together with a checkpoint."""
 
-    def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
-        """Samples from index ``first`` on: times (n,), states (n, states), rows of turns (n, ...)."""
+    def take(
+        self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray
+    ) -> None:
+        """Samples from index ``first`` on: times (n,), states (n, states), rows of turns (n, ...) and of what
+        was put back of each held scalar before the sample (n, held scalars).
+        """
 
     def due(self) -> bool:
         """Whether it is time to save."""
@@ -53,7 +57,7 @@ class Harvest:
         self._clock = clock
         self._keeper = keeper
         self.handed = self.count = first
-        self._buffer: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._buffer: list[tuple[np.ndarray, ...]] = []
         self._flushed = time.perf_counter()
 
     @property
@@ -79,21 +83,22 @@ class Harvest:
                 break
         return np.concatenate(pieces) if pieces else self._clock.internal(0, 0)
 
-    def take(self, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
-        """The next samples: times (n,), states (n, states), rows of turns (n, ...)."""
+    def take(self, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray) -> None:
+        """The next samples, as in ``Keeper.take``; ``put_back`` (held scalars,) is the same for all."""
         if len(times):
-            self._buffer.append((times, states, turns))
+            held = np.broadcast_to(put_back.copy(), (len(times), len(put_back)))
+            self._buffer.append((times, states, turns, held))
             self.count += len(times)
 
     def drop_after(self, limit: Any) -> None:
         """Forget samples past a time that are not handed over yet (an event that ends the run)."""
         kept = []
-        for times, states, turns in self._buffer:
-            inside = times <= limit
+        for columns in self._buffer:
+            inside = columns[0] <= limit
             if inside.any():
-                kept.append((times[inside], states[inside], turns[inside]))
+                kept.append(tuple(column[inside] for column in columns))
         self._buffer = kept
-        self.count = self.handed + sum(len(times) for times, _, _ in kept)
+        self.count = self.handed + sum(len(columns[0]) for columns in kept)
 
     def hand_over(self, *, patiently: bool = False) -> None:
         """Give what is collected to the keeper; ``patiently``: only where it is much, or old."""
@@ -103,9 +108,9 @@ class Harvest:
         self._flushed = time.perf_counter()
         if not self._buffer:
             return
-        times, states, turns = (np.concatenate(c) for c in zip(*self._buffer, strict=True))
+        times, states, turns, held = (np.concatenate(c) for c in zip(*self._buffer, strict=True))
         self._buffer = []
         for first in range(0, len(times), ROWS_AT_ONCE):
             rows = slice(first, first + ROWS_AT_ONCE)
-            self._keeper.take(self.handed, times[rows], states[rows], turns[rows])
+            self._keeper.take(self.handed, times[rows], states[rows], turns[rows], held[rows])
             self.handed += len(times[rows])

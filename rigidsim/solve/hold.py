@@ -57,6 +57,30 @@ def one_higher(precision: Precision) -> Precision:
     return Precision(f"{bits} bits", bits, hy.real, cheap=False, compact=True)
 
 
+def put_back_by_invariant(names: Sequence[str], rows: np.ndarray) -> dict[str, np.ndarray]:
+    """What was put back, by invariant: of a scalar with its sign, of several components the norm, as the
+    drifts are recorded.
+
+    Args:
+        names: of the invariant that each held scalar belongs to.
+        rows: (n, held scalars), as ``Holder.corrections``.
+
+    Returns:
+        For each invariant (n,) float64; a row's bits depend on that row alone.
+    """
+    columns: dict[str, list[np.ndarray]] = {}
+    for name, column in zip(names, rows.T, strict=True):
+        columns.setdefault(name, []).append(column)
+    return {name: found[0].copy() if len(found) == 1 else _norm(found) for name, found in columns.items()}
+
+
+def _norm(columns: Sequence[np.ndarray]) -> np.ndarray:
+    total = columns[0] * columns[0]
+    for column in columns[1:]:
+        total = total + column * column
+    return np.asarray(np.sqrt(total))
+
+
 def held_system(system: System, precision: Precision, loads: Sequence[LoadModel] = ()) -> System:
     """The system to integrate where invariants are held: its coefficients are in two parts.
 
@@ -165,13 +189,6 @@ class Holder:
     def skipped(self) -> int:
         """How many corrections were left out since they were not small."""
         return int(self._times[2])
-
-    def drifts_put_back(self) -> dict[str, float]:
-        """``corrections`` by invariant; of several components the norm."""
-        squares: dict[str, float] = {}
-        for name, value in zip(self.names, self.corrections, strict=True):
-            squares[name] = squares.get(name, 0.0) + float(value) ** 2
-        return {name: value**0.5 for name, value in squares.items()}
 
     # --- arithmetic -------------------------------------------------------------------------------------
 

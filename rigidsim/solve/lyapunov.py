@@ -3,17 +3,22 @@
 The tangent vectors of all states are integrated along with the motion and orthogonalised at equal intervals;
 the logarithms of their lengths add up to the exponents. In double precision, whatever the run's: exponents
 are known to their statistical error at best.
+
+The spectrum is that of the body's motion. States that a scene carries beside it have no tangent vectors:
+neither those that only feed on the motion (the work of the loads, the pace of narrow functions), nor those
+that drive it without feeling it (the place on an orbit), which stand for an explicit dependence on time.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.rotations import Expression
 from rigidsim.model.system import System
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth
@@ -26,11 +31,13 @@ class LyapunovSpectrum:
 
     Attributes:
         times: since the run's start, seconds, shape (rows,).
-        exponents: 1/s, largest first, shape (rows, states).
+        exponents: 1/s, largest first, shape (rows, states of the motion).
+        states: names of those.
     """
 
     times: np.ndarray
     exponents: np.ndarray
+    states: tuple[str, ...] = ()
 
     @property
     def largest(self) -> float:
@@ -60,7 +67,7 @@ class Convergence:
 
     Attributes:
         number: intervals done.
-        state: of the motion and its tangent vectors, orthogonalised; empty at the start.
+        state: of the system and the motion's tangent vectors, orthogonalised; empty at the start.
         sums: logarithms of lengths so far, in the order of the vectors.
         times, exponents: estimates kept so far.
     """
@@ -111,30 +118,76 @@ def lyapunov_spectrum(
     Returns:
         The spectrum; None where it was ended early or the tangent vectors stopped being finite.
     """
-    count = len(system.states)
-    equations = hy.var_ode_sys(system.equations, hy.var_args.vars)
-    initial = [float(x) for x in system.initial]
+    moving = motion_states(system)
+    states, count = len(system.states), len(moving)
+    initial = [float(x) for x in system.initial] + list(np.eye(count).ravel())
+    equations = tangent_equations(system, moving)
     integrator = hy.taylor_adaptive(equations, initial, time=start, compact_mode=True)
     intervals = max(1, math.ceil((end - start) / _INTERVAL))
     stride = max(1, math.ceil(intervals / _MOST_ROWS))
-    done = done or Convergence(sums=np.zeros(count))
+    if done is None or done.state.shape != (len(initial),):  # none, or one of another version
+        done = Convergence(sums=np.zeros(count))
     if done.number:
         integrator.time = start + (end - start) * done.number / intervals
         integrator.state[:] = done.state
     for number in range(done.number + 1, intervals + 1):
         time = start + (end - start) * number / intervals
         outcome = integrator.propagate_until(time)[0]
-        tangents = np.array(integrator.state[count:]).reshape(count, count)
+        tangents = np.array(integrator.state[states:]).reshape(count, count)
         if outcome != hy.taylor_outcome.time_limit or not np.isfinite(tangents).all():
             return None
         basis, triangle = np.linalg.qr(tangents)
         lengths = np.abs(np.diag(triangle))
         done.sums = done.sums + np.log(np.maximum(lengths, np.finfo(float).tiny))
-        integrator.state[count:] = basis.ravel()
+        integrator.state[states:] = basis.ravel()
         if number % stride == 0 or number == intervals:
             done.times.append(math.ldexp(time - start, system.scaling.time))
             done.exponents.append(np.sort(done.sums)[::-1] / done.times[-1])
         done.number, done.state = number, np.array(integrator.state)
         if not go_on(done):
             return None
-    return LyapunovSpectrum(np.array(done.times), np.array(done.exponents))
+    names = tuple(system.states[i] for i in moving)
+    return LyapunovSpectrum(np.array(done.times), np.array(done.exponents), names)
+
+
+def motion_states(system: System) -> list[int]:
+    """Positions of the states whose offsets are offsets of the motion: the body's own, and those that act on
+    it and feel it as well (such as a load with a memory).
+    """
+    attitude = system.mechanics.attitude
+    own = {*_BODY, *(attitude.names if attitude is not None else ())}
+    reads = {
+        name: set(hy.get_variables(right))
+        for name, (_, right) in zip(system.states, system.equations, strict=True)
+    }
+    acting = _reached(own, reads)
+    read_by = {name: {other for other in reads if name in reads[other]} for name in reads}
+    feeling = _reached(own, read_by)
+    return [i for i, name in enumerate(system.states) if name in own or name in acting & feeling]
+
+
+_BODY = ("wx", "wy", "wz", "gx", "gy", "gz", "x", "y", "z", "vx", "vy", "vz")
+
+
+def _reached(start: set[str], ways: Mapping[str, set[str]]) -> set[str]:
+    """All names that ways lead to, in any number of steps."""
+    found: set[str] = set()
+    ahead = {name for name in start if name in ways}
+    while ahead:
+        ahead = {name for place in ahead for name in ways[place] if name in ways} - found
+        found |= ahead
+    return found
+
+
+def tangent_equations(system: System, moving: Sequence[int]) -> list[tuple[Expression, Expression]]:
+    """The system's equations, then those of the derivatives of moving states by their initial values, row by
+    row. All other states are integrated without: the step control must see what they see.
+    """
+    chosen = [system.variables[i] for i in moving]
+    varied = hy.var_ode_sys(system.equations, chosen).sys
+    states, count = len(system.states), len(moving)
+    rows = [varied[states + i * count : states + (i + 1) * count] for i in range(states)]
+    # what drives the motion doesn't depend on it; what feeds on it is read by nothing
+    none = {variable: hy.expression(0.0) for i in range(states) if i not in moving for variable, _ in rows[i]}
+    tangents = [(variable, hy.subs(right, none)) for i in moving for variable, right in rows[i]]
+    return [*varied[:states], *tangents]

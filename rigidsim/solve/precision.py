@@ -46,7 +46,7 @@ class Precision:
 
     @property
     def epsilon(self) -> Any:
-        """Spacing of numbers just above 1, as mpf; the tolerance that "auto" means."""
+        """Spacing of numbers just above 1, as mpf."""
         return mpmath.mpf(2) ** (1 - self.bits)
 
     @property

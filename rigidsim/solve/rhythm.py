@@ -25,6 +25,8 @@ STRIDE = 1024
 """Natural steps between two corrections where only time is corrected: half a millisecond, so that the calls
 that this takes cost less than a hundredth."""
 
+_NOTHING = np.zeros(0)
+
 
 @dataclass(frozen=True)
 class Place:
@@ -111,6 +113,13 @@ class Rhythm:
         if self.charts is not None:
             return self.charts.rows(times)
         return np.tile(self.winding.turns, (len(times), 1))
+
+    @property
+    def put_back(self) -> np.ndarray:
+        """What was put back of each held scalar so far, (held scalars,); corrections are made after the rows
+        of a call are taken, so that a sample has those of all corrections before its own step.
+        """
+        return _NOTHING if self.holder is None else self.holder.corrections
 
     def correct(self) -> None:
         """Make the corrections if they are due; dense output of the latest step is void then."""

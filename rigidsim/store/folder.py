@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -12,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rigidsim.errors import RunFolderError
-from rigidsim.store import netcdf, segments, summary_file
+from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
+from rigidsim.store import netcdf, provenance, segments, summary_file
 
 _REOPENED = ".segments.reopened"
 
@@ -64,8 +65,21 @@ class RunFolder:
         """Segments that didn't belong, out of the way."""
         return self.path / "set_aside"
 
+    def begin(self, config: str, *, force: bool) -> None:
+        """Make the folder ready for a new run, and leave its config and the mark of a run under way there.
+
+        Raises:
+            RunFolderError: as ``create``.
+        """
+        self.create(force=force)
+        try:
+            netcdf.write_bytes(self.config, config.encode())
+            self.segments.mkdir()
+        except OSError as error:
+            raise self._unwritable(error) from None
+
     def create(self, *, force: bool) -> None:
-        """Make the folder ready for a new run.
+        """Make the folder empty of any run.
 
         Raises:
             RunFolderError: it holds a run and ``force`` is false, or something that is no run, or it can't
@@ -100,9 +114,7 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             netcdf.sync_folder(self.path.parent)
         except OSError as error:
-            raise RunFolderError(
-                f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
-            ) from None
+            raise self._unwritable(error) from None
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -111,15 +123,13 @@ class RunFolder:
         Raises:
             RunFolderError: another process works there, or the folder can't be written.
         """
-        if self.path.exists() and not self.path.is_dir():
-            raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
         try:
+            if self.path.exists() and not self.path.is_dir():
+                raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
             self.path.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(self.path, os.O_RDONLY)  # the folder itself: no file is left behind
         except OSError as error:
-            raise RunFolderError(
-                f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
-            ) from None
+            raise self._unwritable(error) from None
         try:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -131,12 +141,42 @@ class RunFolder:
             try:
                 yield
             except OSError as error:
-                raise RunFolderError(
+                raise StoppedWritingError(
                     f"{self.path}: can't be read or written: {error.filename or 'a file'}: "
-                    f"{error.strerror or error}; what was saved stays, and rigidsim resume goes on from there"
+                    f"{error.strerror or error}; what was saved stays, and {once_mended(error)}, rigidsim "
+                    "resume goes on from there"
                 ) from error
         finally:
             os.close(descriptor)
+
+    def _unwritable(self, error: OSError) -> RunFolderError:
+        return RunFolderError(
+            f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
+        )
+
+    @property
+    def read_only(self) -> OSError | None:
+        """Why nothing can be written here, as far as can be told without trying; None where it can."""
+        for place in (self.path, self.segments):
+            if not place.is_dir() or _may_write(place):
+                continue
+            mounted = os.statvfs(place).f_flag & os.ST_RDONLY
+            number = errno.EROFS if mounted else errno.EACCES
+            return OSError(number, os.strerror(number), str(place))
+        return None
+
+    def refuse_read_only(self) -> None:
+        """Before hours of work whose result could not be saved.
+
+        Raises:
+            RunFolderError: the folder can't be written.
+        """
+        error = self.read_only
+        if error is not None:
+            raise RunFolderError(
+                f"{error.filename}: can't be written: {error.strerror}; {once_mended(error)}, give the "
+                "command again (info, verify, plot --out and export --out need no writing here)"
+            )
 
     def remove_torn(self) -> None:
         """Delete what a killed process was writing, or deleting, when it died."""
@@ -171,6 +211,11 @@ class RunFolder:
         text = json.dumps(summary, indent=2, allow_nan=False, default=str)
         netcdf.write_bytes(self.summary, (text + "\n").encode())
 
+    def note_timeline(self, summary: dict[str, Any], drawn: Path) -> None:
+        """Name the timeline that was drawn again for a complete run in its summary, for ``verify``."""
+        if drawn == self.timeline and "dataset_sha256" in summary and not self.segments.exists():
+            self.write_summary({**summary, "timeline_sha256": provenance.file_sha256(drawn)})
+
     def read_summary(self) -> dict[str, Any]:
         """The summary; a run that was killed has none and reads as "running".
 
@@ -182,6 +227,13 @@ class RunFolder:
         return summary_file.read_summary(self.summary)
 
 
+def _may_write(folder: Path) -> bool:
+    """Root may write everywhere, but not to a file system that is mounted read-only."""
+    return os.access(
+        folder, os.R_OK | os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids
+    )
+
+
 def find_run(path: str | Path) -> RunFolder:
     """The run at ``path``: a run folder, or a file in one.
 
@@ -189,8 +241,12 @@ def find_run(path: str | Path) -> RunFolder:
         RunFolderError: there is none.
     """
     given = Path(path)
-    folder = given if given.is_dir() else given.parent
-    run = RunFolder(folder)
-    if not given.exists() or not (run.dataset.exists() or run.segments.exists() or run.summary.exists()):
+    try:
+        run = RunFolder(given if given.is_dir() else given.parent)
+        found = run.dataset.exists() or run.segments.exists() or run.summary.exists()
+        there = given.exists() and found
+    except OSError as error:  # a folder that may not be entered
+        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
+    if not there:
         raise RunFolderError(f"{path}: no run here; give a run folder (runs/NAME) or its dataset.h5")
     return run

@@ -7,6 +7,7 @@ that it belongs to and the seal of the one before, so that none can be missing, 
 
 from __future__ import annotations
 
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +20,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
 from rigidsim.store import netcdf
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
 from rigidsim.store.sink import sink
@@ -139,10 +140,10 @@ class SegmentWriter:
         try:
             yield
         except OSError as error:
-            raise RunFolderError(
+            raise StoppedWritingError(
                 f"{self._folder.parent}: can't be written: {error.strerror or error}; "
                 f"{self.saved_rows} samples are saved in {self._folder.name}/; "
-                "once there is room, rigidsim resume goes on from there"
+                f"{once_mended(error)}, rigidsim resume goes on from there"
             ) from error
 
     def _collected(self) -> netcdf.Block:
@@ -217,18 +218,29 @@ def segment_paths(folder: Path) -> list[Path]:
     """The segments of a run folder in order.
 
     Raises:
-        RunFolderError: one is missing in the sequence.
+        RunFolderError: one is missing in the sequence, or the folder can't be read.
     """
-    paths = sorted(folder.glob("[0-9]*.h5"))
+    paths = _numbered(folder)
     for number, path in enumerate(paths):
         if path.stem != f"{number:08d}":
             raise RunFolderError(f"{folder}: segment {number:08d}.h5 is missing")
     return paths
 
 
+def _numbered(folder: Path) -> list[Path]:
+    """Files named like segments, in order. A folder that may not be listed isn't an empty one."""
+    try:
+        names = os.listdir(folder)
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except OSError as error:
+        raise RunFolderError(f"{folder}: can't be read: {error.strerror or error}") from None
+    return sorted(folder / name for name in names if name[0].isdigit() and name.endswith(".h5"))
+
+
 def read_chain(folder: Path) -> Chain:
     """The segments that belong together, checked byte by byte, up to the first that doesn't."""
-    paths = sorted(folder.glob("[0-9]*.h5"))
+    paths = _numbered(folder)
     run = last = ""
     rows = 0
     for number, path in enumerate(paths):

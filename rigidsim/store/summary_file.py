@@ -30,6 +30,7 @@ class _Cost(_Shape):
     steps: StrictInt
     seconds: _Seconds
     cpu_seconds: Number
+    cpu_by_phase: dict[Text, Number] = Field(default_factory=dict)
 
 
 class _Invariant(_Shape):
@@ -67,6 +68,7 @@ class _Brief(_Shape):
     description: StrictStr = ""
     exit_code: StrictInt = 0
     dataset_sha256: Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")] | None = None
+    timeline_sha256: Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")] | None = None
 
 
 class _Full(_Brief):

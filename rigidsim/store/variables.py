@@ -16,8 +16,9 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates beside time, with their labels."""
 
-SCHEMA_VERSION = 2
-"""1: without seals. 2: files end with the SHA-256 of their content; checkpoints."""
+SCHEMA_VERSION = 3
+"""1: without seals. 2: files end with the SHA-256 of their content; checkpoints. 3: what was put back of held
+invariants along time (runs that hold none have the same variables as before)."""
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,19 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import heyoka as hy
 import numpy as np
 import pytest
+from equations import prepared
 from support import run_text
 
 import rigidsim
+from rigidsim.model.loads import ExtraStates, LoadModel, Term
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.prepare import prepare
 from rigidsim.solve import lyapunov
 
+BODY = ["wx", "wy", "wz", "qw", "qx", "qy", "qz"]
 SATELLITE = """
 name = "satellite"
 [body]
@@ -46,7 +52,7 @@ def test_hyperion_is_chaotic_and_its_exponents_come_in_pairs(runs: Path) -> None
     # "about 0.1 n" (1984); 0.120 re-computed over 2000 orbits: 640 orbits leave a third of statistical error
     assert 0.08 < chaos["largest_exponent"] < 0.17
     exponents = np.array(chaos["exponents"])
-    # a system with a Hamiltonian: pairs of opposite sign, up to the constraints' and the clock's zeros
+    # a system with a Hamiltonian: pairs of opposite sign, up to the zero of the quaternion's norm
     assert abs(exponents.sum()) < 0.02 * chaos["largest_exponent"] * len(exponents)
     assert exponents[0] == pytest.approx(-exponents[-1], rel=0.05)
     assert chaos["e_folding_seconds"] == pytest.approx(1 / chaos["largest_exponent"])
@@ -60,7 +66,10 @@ def test_convergence_is_in_the_dataset(runs: Path) -> None:
     estimates = run.dataset["lyapunov_exponents"]
     assert estimates.dims == ("lyapunov_time", "lyapunov_index")
     assert estimates.attrs["units"] == "s-1"
-    assert estimates.sizes["lyapunov_index"] == len(run.summary["states"])
+    # the orbit's states drive the motion and don't feel it, as an explicit dependence on time would
+    assert run.summary["lyapunov"]["states"] == BODY
+    assert estimates.attrs["states"] == "wx wy wz qw qx qy qz"
+    assert estimates.sizes["lyapunov_index"] == 7 < len(run.summary["states"])
     assert float(run.dataset["lyapunov_time"][-1]) == pytest.approx(500.0, rel=1e-12)
     assert (np.diff(estimates.values, axis=1) <= 0).all()
     assert float(estimates[-1, 0]) == run.summary["lyapunov"]["largest_exponent"]
@@ -137,7 +146,7 @@ timeline = false
         return spectrum_of(prepared, folder, run_id, interruption)
 
     spectrum_of = spectra.spectrum_of
-    monkeypatch.setattr("rigidsim.runner.spectrum_of", impatient)
+    monkeypatch.setattr("rigidsim.session.spectrum_of", impatient)
     run = run_text(text, runs)
     assert run.status == "interrupted"
     for _ in range(2):
@@ -147,3 +156,119 @@ timeline = false
     with run.dataset as one, whole.dataset as other:
         np.testing.assert_array_equal(one.lyapunov_exponents, other.lyapunov_exponents)
         np.testing.assert_array_equal(one.quaternion, other.quaternion)
+
+
+DRIVEN = """
+name = "driven"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.5, 0.25, 1]
+{loads}
+[time]
+end = 300
+samples = 31
+[output]
+lyapunov = true
+timeline = false
+record = ["angular_velocity", "quaternion", "energy"]
+"""
+SWING = '[[loads]]\nkind = "torque"\ncomponents = ["0", "0", "0.02*sin(t){pulse}"]\n'
+# over in a thousandth of a second; too weak to show in the exponents
+PULSE = " + 1e-9*exp(-((t - 100)/0.001)^2)"
+
+
+def test_what_is_carried_beside_the_motion_adds_no_exponents(runs: Path) -> None:
+    """The work of a torque and the pace of a narrow pulse feed on the motion and don't act on it."""
+    plain = run_text(DRIVEN.format(loads=SWING.format(pulse="")), runs)
+    pulsed = run_text(DRIVEN.format(loads=SWING.format(pulse=PULSE)), runs, 'name="pulsed"')
+    free = run_text(DRIVEN.format(loads=""), runs, 'name="free"')
+    assert "work" in plain.summary["states"]
+    assert "pace" in pulsed.summary["states"]
+    found = [run.summary["lyapunov"] for run in (plain, pulsed, free)]
+    for chaos in found:
+        assert chaos["states"] == BODY
+        assert len(chaos["exponents"]) == 7
+    # each logarithm of a length carries the integration's error: the pulse turns the body by 1e-12 rad, and
+    # steps that fall elsewhere leave rounding of 1e-16 a step; over 300 s offsets of a regular motion grow by
+    # some hundreds
+    assert found[1]["exponents"] == pytest.approx(found[0]["exponents"], abs=1e-9)
+
+
+class Bearing(LoadModel):
+    """A damped wheel inside the body: its state acts on the body and feels it, and so is of the motion."""
+
+    title = "bearing"
+
+    def extra_states(self, m: Mechanics) -> ExtraStates:
+        zero = m.scene.context.zero
+        wheel = hy.make_vars("wheel")
+        slip = 0.1 * (m.rates[2] - wheel)
+        return ExtraStates(["wheel", "counter"], [slip, wheel * wheel], [zero, zero])
+
+    def torque(self, m: Mechanics) -> list[Term]:
+        one, zero = m.scene.context.one, m.scene.context.zero
+        wheel = hy.make_vars("wheel")
+        return [([zero, zero, one], -0.1 * (m.rates[2] - wheel))]
+
+
+ECCENTRIC = "gravitational_parameter = 1\norbit = {semi_major_axis = 2, eccentricity = 0.1}"
+FALLING = "principal_moments = [1, 2, 3]\nmass = 1"
+TOP = "principal_moments = [1, 1, 2]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]"
+SPIN = "angular_velocity = [0.5, 0.25, 1]"
+# body, initial, load, recorded; states of the motion, and those beside them
+SYSTEMS = {
+    "free": (FALLING, SPIN, "", '["quaternion"]', BODY, []),
+    "free, rates": (FALLING, SPIN, "", '["angular_velocity"]', BODY[:3], []),
+    "top, rates": (TOP, SPIN, 'kind = "uniform_gravity"', '["angular_velocity"]',
+                   [*BODY[:3], "gx", "gy", "gz"], []),
+    "thrown": (FALLING, f"{SPIN}\nposition = [0, 0, 0]\nvelocity = [1, 0, 0]", 'kind = "uniform_gravity"',
+               '["quaternion", "position"]', [*BODY, "x", "y", "z", "vx", "vy", "vz"], []),
+    "orbit": (FALLING, SPIN, f'kind = "gravity_gradient"\n{ECCENTRIC}', '["quaternion"]', BODY,
+              ["cos_anomaly1", "sin_anomaly1", "work"]),
+    "damped": (FALLING, SPIN, 'kind = "viscous_torque"\ncoefficients = [1, 1, 1]', '["quaternion", "energy"]',
+               BODY, ["work"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SYSTEMS)
+def test_the_states_of_a_motion(case: str) -> None:
+    body, initial, load, record, motion, beside = SYSTEMS[case]
+    system = prepared(body, initial, load, record).system
+    found = [system.states[i] for i in lyapunov.motion_states(system)]
+    assert found == motion
+    assert [name for name in system.states if name not in found] == beside
+
+
+def test_a_load_with_a_memory_is_of_the_motion() -> None:
+    text = f'name = "s"\n[body]\n{FALLING}\n[initial]\n{SPIN}\n[time]\nend = 1\n'
+    system = prepare(rigidsim.parse(text), loads=[Bearing()]).system
+    assert {"wheel", "counter"} < set(system.states)
+    found = [system.states[i] for i in lyapunov.motion_states(system)]
+    assert found == [*BODY, "wheel"]  # what only counts is not
+
+
+@pytest.mark.parametrize("case", ["orbit", "damped", "free"])
+def test_tangents_are_the_derivatives_of_the_flow(case: str) -> None:
+    body, initial, load, record, *_ = SYSTEMS[case]
+    system = prepared(body, initial, load, record).system
+    moving = lyapunov.motion_states(system)
+    states, count, end, step = len(system.states), len(moving), 3.0, 2.0**-13
+    start = np.array([float(x) for x in system.initial])
+
+    def arrival(state: np.ndarray) -> np.ndarray:
+        plain = hy.taylor_adaptive(system.equations, list(state), compact_mode=True)
+        plain.propagate_until(end)
+        return np.array(plain.state[moving])
+
+    equations = lyapunov.tangent_equations(system, moving)
+    both = hy.taylor_adaptive(equations, [*start, *np.eye(count).ravel()], compact_mode=True)
+    both.propagate_until(end)
+    tangents = both.state[states:].reshape(count, count)
+    for column, place in enumerate(moving):
+        offset = np.zeros(states)
+        offset[place] = step
+        slope = (arrival(start + offset) - arrival(start - offset)) / (2 * step)
+        # central differences: step^2 times third derivatives, which offsets of an order-one motion over three
+        # units of time make some tens, and rounding of 1e-15 over 2 steps
+        assert tangents[:, column] == pytest.approx(slope, abs=100 * step**2)

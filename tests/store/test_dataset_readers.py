@@ -309,7 +309,9 @@ def _states(prepared: Prepared) -> np.ndarray:
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
 
     class Collected:
-        def take(self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray) -> None:
+        def take(
+            self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray
+        ) -> None:
             pieces.append(states)
 
         def due(self) -> bool:

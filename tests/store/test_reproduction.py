@@ -169,6 +169,7 @@ def test_it_is_one_bare_propagation(
         time=prepared.clock.at(0),
         compact_mode=chosen.compact,
         **chosen.options,
+        **({} if prepared.tolerance is None else {"tol": prepared.tolerance}),
     )
     states = bare.propagate_grid(prepared.clock.internal(0, prepared.clock.count))[-1]
     lead = np.array(states).astype(np.float64)

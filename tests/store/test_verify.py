@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -149,3 +151,104 @@ def test_every_ready_scene_is_identical(path: Path, tmp_path: Path) -> None:
     run = rigidsim.run(rigidsim.load(path, overrides=["output.timeline=false"]), out=tmp_path)
     verdict = rigidsim.verify(run.folder.path)
     assert verdict.identical, verdict.as_dict()
+
+
+def edited(folder: Path, change: Callable[[dict[str, Any]], Any]) -> None:
+    path = folder / "summary.json"
+    summary = json.loads(path.read_text())
+    change(summary)
+    path.write_text(json.dumps(summary))
+
+
+@pytest.fixture(scope="module")
+def complete(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a held run with a timeline, long enough for corrections."""
+    text = TEXT.replace("end = 10", "end = 2000").replace("timeline = false", "timeline = true")
+    text += "[integrator]\nhold_invariants = true\n"
+    return rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("runs")).folder.path
+
+
+# what is edited, and how the problem names it
+EDITS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "status": (lambda s: s.update(status="stopped: max_drift"), "status is 'stopped: max_drift', 'finished'"),
+    "steps": (lambda s: s["cost"].update(steps=s["cost"]["steps"] + 1), "cost.steps is "),
+    "largest drift": (lambda s: s["invariants"]["energy"].update(largest_drift=1e-17),
+                      "invariants.energy.largest_drift is 1e-17, "),
+    "final drift": (lambda s: s["invariants"]["energy"].update(final_drift=0.0),
+                    "invariants.energy.final_drift is 0.0, "),
+    "initial value": (lambda s: s["invariants"]["energy"].update(
+        initial=np.nextafter(s["invariants"]["energy"]["initial"], 9)), "invariants.energy.initial is "),
+    "put back": (lambda s: s["invariants"]["energy"].update(put_back=0.0),
+                 "invariants.energy.put_back is 0.0"),
+    "no drift": (lambda s: s["invariants"].pop("energy"), "there is no invariants.energy"),
+    "an invariant more": (lambda s: s["invariants"].update(helicity=s["invariants"]["energy"]),
+                          "invariants.helicity is "),
+    "precision": (lambda s: s.update(precision="quadruple"), "precision is 'quadruple', 'double'"),
+    "not held": (lambda s: s.update(hold_invariants=False), "hold_invariants is False, True"),
+    "events": (lambda s: s["events"].update(flip=3), "events.flip is 3, 0 when run again"),
+    "dataset": (lambda s: s.update(dataset_sha256="0" * 64), "was written for another dataset"),
+    "timeline": (lambda s: s.update(timeline_sha256="0" * 64), "timeline.rrd: was damaged or changed"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", EDITS)
+def test_a_summary_that_was_edited_by_hand(what: str, complete: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(complete, tmp_path / "run")
+    edited(folder, EDITS[what][0])
+    verdict = rigidsim.verify(folder)
+    assert not verdict.identical
+    assert verdict.differing == []
+    assert len(verdict.problems) == 1
+    assert EDITS[what][1] in verdict.problems[0]
+    named = "timeline.rrd" if what == "timeline" else "summary.json"
+    assert verdict.problems[0].startswith(str(folder / named))
+
+
+def test_a_summary_is_true_but_for_times_and_machines(complete: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(complete, tmp_path / "run")
+
+    def elsewhere(summary: dict[str, Any]) -> None:
+        summary["cost"]["seconds"] = {"engine": 1.0}
+        summary["cost"] |= {"cpu_seconds": 7.0, "wall_seconds": 9.0, "sessions": 3, "steps_redone": 12}
+        summary["provenance"]["cpu_model"] = "another"
+
+    edited(folder, elsewhere)
+    verdict = rigidsim.verify(folder)
+    assert verdict.identical, verdict.problems
+
+
+def test_an_older_summary_claims_less(complete: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(complete, tmp_path / "run")
+
+    def older(summary: dict[str, Any]) -> None:
+        for key in ("timeline_sha256", "hold_invariants", "method", "chart_changes"):
+            summary.pop(key)
+        for row in summary["invariants"].values():
+            row.pop("put_back")
+
+    edited(folder, older)
+    assert rigidsim.verify(folder).identical
+
+
+def test_two_edits_are_counted(complete: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(complete, tmp_path / "run")
+    for what in ("steps", "not held", "final drift"):
+        edited(folder, EDITS[what][0])
+    (problem,) = rigidsim.verify(folder).problems
+    assert "hold_invariants is False, True when run again (and 2 more of its claims don't hold)" in problem
+
+
+@pytest.mark.parametrize("how", ["lost", "bit", "link"])
+def test_the_timeline_that_the_summary_names(how: str, complete: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(complete, tmp_path / "run")
+    path = folder / "timeline.rrd"
+    content = bytearray(path.read_bytes())
+    if how == "bit":
+        content[len(content) // 2] ^= 4
+        path.write_bytes(content)
+    else:
+        path.unlink()
+    if how == "link":
+        path.symlink_to(complete / "timeline.rrd")
+    (problem,) = rigidsim.verify(folder).problems
+    assert problem.startswith(f"{path}: {'was damaged' if how == 'bit' else 'is missing'}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import numpy as np
+
 from rigidsim.solve.advance import Check, Progress
 from rigidsim.solve.closed.form import ClosedForm
 from rigidsim.solve.harvest import ROWS_AT_ONCE, Checkpoint, Keeper
@@ -64,7 +66,7 @@ class Direct:
             states = self._form.states(self._system, self._precision, times, self._begin)
             progress.integration_seconds += time.perf_counter() - started
             turns = self._place.turns[None, :].repeat(len(times), axis=0)
-            self._keeper.take(first, times, states, turns)
+            self._keeper.take(first, times, states, turns, np.zeros((len(times), 0)))  # holds nothing
             progress.next_sample += len(times)
             progress.time = float(times[-1]) * 2.0**self._clock.exponent
         progress.status = Status.FINISHED

@@ -1,0 +1,113 @@
+"""Scenes of some tenths of a second of work each, and whether two datasets agree in every bit."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import xarray
+
+import rigidsim
+from rigidsim.solve import advance, harvest
+from rigidsim.store import segments
+
+BODY = """
+[body]
+principal_moments = [1, 2, 2.5]
+mass = 1.5
+center_of_mass = [0.01, 0.02, 0.3]
+[initial]
+angular_velocity = [0.3, 1.0, 0.5]
+euler_angles = [0.2, 1.1, 0.7]
+"""
+EVENT = '[[events]]\nname = "flip"\nexpression = "wy"\n'
+DRIVEN = '[[loads]]\nkind = "torque"\ncomponents = ["0.1*sin(t)", "0", "0.05*wx"]\n'
+GRAVITY = '[[loads]]\nkind = "uniform_gravity"\n'
+
+# end, samples, [integrator], rest, [output]
+SCENES = {
+    "double_dense": (4000, 16001, "", "", ""),
+    "double_sparse": (60000, 13, "", "", ""),
+    "double_driven": (3000, 3001, "", DRIVEN, ""),
+    "double_euler": (1000, 2001, 'formulation = "euler_angles"', GRAVITY, ""),
+    "double_events": (3000, 1501, "", EVENT, ""),
+    "double_held": (8000, 4001, "hold_invariants = true", "", ""),
+    "double_lyapunov": (1500, 301, "", DRIVEN, "lyapunov = true"),
+    "extended_dense": (3000, 3001, 'precision = "extended"', "", ""),
+    "extended_events": (1000, 501, 'precision = "extended"', EVENT + DRIVEN, ""),
+    "quadruple_dense": (80, 321, 'precision = "quadruple"', "", ""),
+    "quadruple_events": (60, 61, 'precision = "quadruple"\nformulation = "rotation_matrix"', EVENT, ""),
+}
+
+
+def text_of(name: str, longer: int = 1) -> str:
+    """The scene's config.
+
+    Args:
+        longer: factor of its end, with as many samples.
+    """
+    end, samples, integrator, rest, output = SCENES[name]
+    end *= longer
+    return (
+        f'name = "{name}"\n{BODY}{rest}[time]\nend = {end}\nsamples = {samples}\n'
+        f"[integrator]\n{integrator}\n[output]\ntimeline = false\n{output}\n"
+    )
+
+
+def frequent() -> None:
+    """Segments some thirty times a second instead of once in thirty seconds, in this process."""
+    segments.SEGMENT_SECONDS = harvest._PATIENCE = 0.03
+    segments.SEGMENT_BYTES = 400_000
+    advance._CHUNK_SECONDS = 0.01
+
+
+class Undisturbed:
+    """Each scene run once with nothing in its way, when it is first asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._found: dict[str, tuple[xarray.Dataset, float, int]] = {}
+
+    def __getitem__(self, name: str) -> xarray.Dataset:
+        return self._of(name)[0]
+
+    def seconds(self, name: str) -> float:
+        """That it takes."""
+        return self._of(name)[1]
+
+    def size(self, name: str) -> int:
+        """Of the disk at its fullest, bytes: all segments, and the dataset beside them."""
+        return self._of(name)[2]
+
+    def _of(self, name: str) -> tuple[xarray.Dataset, float, int]:
+        if name not in self._found:
+            rigidsim.run(rigidsim.parse(text_of(name)), out=self._folder / "warm", force=True)  # compiles
+            started = time.monotonic()
+            run = rigidsim.run(rigidsim.parse(text_of(name)), out=self._folder)
+            seconds = time.monotonic() - started
+            with run.dataset as dataset:
+                whole = dataset.load()
+            size = whole.nbytes + run.folder.dataset.stat().st_size
+            self._found[name] = whole, seconds, size
+            steps = run.summary["cost"]["steps"]
+            print(f"{name}, undisturbed: {seconds:.2f} s, {steps} steps", flush=True)
+        return self._found[name]
+
+
+def same(one: xarray.Dataset, other: xarray.Dataset, rows: int | None = None) -> str:
+    """The first variable in which datasets differ in any bit, over as many rows; empty where none does."""
+    variables = set(one.variables) | set(other.variables)
+    for name in sorted(map(str, variables)):
+        if rows is not None and (name not in one or "time" not in one[name].dims):
+            continue
+        if name not in one or name not in other:
+            return f"{name} is missing"
+        a, b = one[name].values, other[name].values
+        if rows is not None:
+            a, b = a[:rows], b[:rows]
+        if a.dtype == np.float64:
+            a, b = np.ascontiguousarray(a).view(np.int64), np.ascontiguousarray(b).view(np.int64)
+        if not np.array_equal(a, b):
+            return name
+    return ""

@@ -1,0 +1,1 @@
+"""The commands of ``rigidsim``, one function each; ``rigidsim.cli`` puts them together."""

@@ -1,0 +1,299 @@
+"""Folders that can't be written: one clear message, everything saved kept, the same bits once they can."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rigidsim
+from rigidsim.errors import RunFolderError
+from rigidsim.solve import advance, harvest
+from rigidsim.store import segments
+from rigidsim.store.folder import RunFolder
+
+Config = Callable[..., str]
+Command = Callable[..., Any]
+Remount = Callable[[str], None]
+LONG = "end = 3000\nsamples = 3001"
+
+
+@pytest.fixture
+def remount(tmp_path: Path) -> Iterator[Remount]:
+    """A file system of its own at ``disk``, that can be made read-only ("ro") and writable ("rw")."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64m", "tmpfs", place], capture_output=True)
+    if made.returncode:
+        pytest.skip("mounting isn't allowed here")
+
+    def change(mode: str) -> None:
+        subprocess.run(["mount", "-o", f"remount,{mode}", place], check=True, capture_output=True)
+
+    yield change
+    subprocess.run(["umount", "-l", place], check=True)
+
+
+def eager(patch: pytest.MonkeyPatch) -> None:
+    """A segment for each chunk of some milliseconds."""
+    patch.setattr(advance, "_CHUNK_SECONDS", 0.005)
+    patch.setattr(harvest, "_PATIENCE", 0.0)
+    patch.setattr(segments, "SEGMENT_SECONDS", 0.0)
+
+
+def message(result: Any, code: int = 2) -> str:
+    """The one line that a refused command says."""
+    assert result.exit_code == code, result.output
+    assert isinstance(result.exception, SystemExit)
+    lines = [line for line in result.stderr.splitlines() if line.startswith("rigidsim:")]
+    assert len(lines) == 1, result.stderr
+    return lines[0]
+
+
+def same_bits(one: rigidsim.Run, other: rigidsim.Run) -> None:
+    with one.dataset as a, other.dataset as b:
+        assert sorted(map(str, a.variables)) == sorted(map(str, b.variables))
+        for name in a.variables:
+            np.testing.assert_array_equal(a[name].values, b[name].values, err_msg=str(name))
+
+
+def test_a_finished_run_is_read_verified_and_drawn(
+    config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert rigidsim_command("run", config(), "--out", "disk").exit_code == 0
+    remount("ro")
+    before = sorted(p.name for p in Path("disk/free").iterdir())
+    for command in (
+        ["info", "disk/free"],
+        ["verify", "disk/free"],
+        ["plot", "disk/free", "--out", "figure.png"],
+        ["export", "disk/free", "--format", "csv", "--out", "free.csv"],
+        ["run", "--from", "disk/free/dataset.h5", "--out", "again"],
+    ):
+        result = rigidsim_command(*command)
+        assert result.exit_code == 0, result.output
+    same_bits(rigidsim.open_run("disk/free"), rigidsim.open_run("again/free"))
+    shown: list[Path] = []
+
+    def viewer(path: Path, *, web: bool) -> int:
+        assert path.stat().st_size > 10_000
+        shown.append(path)
+        return 0
+
+    monkeypatch.setattr("rigidsim.look.viewer.open_viewer", viewer)
+    assert rigidsim_command("view", "disk/free").exit_code == 0
+    assert not shown[0].exists()  # drawn for the viewer alone
+    assert sorted(p.name for p in Path("disk/free").iterdir()) == before
+
+
+def test_what_has_to_be_written_there_is_refused(
+    config: Config, rigidsim_command: Command, remount: Remount
+) -> None:
+    name = config()
+    assert rigidsim_command("run", name, "--out", "disk").exit_code == 0
+    remount("ro")
+    why = r"can't be written: Read-only file system"
+    for command, place in (
+        (["run", name, "--out", "disk", "--force"], "disk/free"),
+        (["run", name, "--out", "disk", "--set", 'name="other"'], "disk/other"),
+        (["run", "--from", "disk/free/dataset.h5", "--out", "disk/more"], "disk/more/free"),
+        (["plot", "disk/free"], "disk/free/figure.png"),
+        (["export", "disk/free", "--format", "csv", "--out", "disk/free.csv"], "disk/free.csv"),
+        (["export", "disk/free", "--format", "zarr", "--out", "disk/free.zarr"], "disk/free.zarr"),
+    ):
+        assert message(rigidsim_command(*command)) == f"rigidsim: {place}: {why}; choose another --out"
+    later = message(rigidsim_command("resume", "disk/free", "--until", "6"))
+    assert later.startswith(f"rigidsim: disk/free: {why}; once its file system is mounted for writing again")
+    assert "nothing is left to do" in message(rigidsim_command("resume", "disk/free"))
+
+
+def test_a_partial_run_is_read_and_gone_on_with_later(
+    config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = config(time=LONG, rest="[limits]\nmax_steps = 500")
+    assert rigidsim_command("run", name, "--out", "disk").exit_code == 3
+    remount("ro")
+    for command in (["info", "disk/free"], ["plot", "disk/free", "--out", "figure.png"]):
+        assert rigidsim_command(*command).exit_code == 0
+    rows = rigidsim.open_run("disk/free").dataset.sizes["time"]
+    assert 0 < rows < 3001
+    with monkeypatch.context() as patch:  # refused before anything is compiled or integrated
+        patch.setattr("rigidsim.resuming.prepare", lambda *_, **__: pytest.fail("too late"))
+        told = message(rigidsim_command("resume", "disk/free", "--set", "limits.max_steps=100000"))
+    assert "disk/free: can't be written: Read-only file system" in told
+    remount("rw")
+    assert rigidsim_command("resume", "disk/free", "--set", "limits.max_steps=100000").exit_code == 0
+    assert rigidsim_command("run", name, "--set", "limits.max_steps=100000").exit_code == 0
+    same_bits(rigidsim.open_run("disk/free"), rigidsim.open_run("runs/free"))
+
+
+@pytest.mark.parametrize("moment", ["a later segment", "the dataset", "the end of the segments"])
+def test_a_folder_that_becomes_read_only_on_the_way(
+    moment: str,
+    config: Config,
+    rigidsim_command: Command,
+    remount: Remount,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    name = config(time="end = 8000\nsamples = 8001")
+    assert rigidsim_command("run", name).exit_code == 0
+    atomic, remove = segments.netcdf.atomic, segments.remove
+    last = {"a later segment": "00000003.h5", "the dataset": "dataset.h5"}.get(moment)
+
+    def writing(path: Path) -> Any:
+        if path.name == last:
+            remount("ro")
+        return atomic(path)
+
+    def removing(folder: Path) -> None:
+        if moment == "the end of the segments" and folder.is_dir():
+            remount("ro")
+        remove(folder)
+
+    with monkeypatch.context() as patch:
+        eager(patch)
+        patch.setattr(segments.netcdf, "atomic", writing)
+        patch.setattr(segments, "remove", removing)
+        told = message(rigidsim_command("run", name, "--out", "disk"), code=3)
+    assert "Read-only file system" in told
+    assert "once its file system is mounted for writing again, rigidsim resume goes on" in told
+    opened = rigidsim.open_run("disk/free")
+    with opened.dataset as saved, rigidsim.open_run("runs/free").dataset as whole:
+        rows = saved.sizes["time"]
+        assert 0 < rows <= 8001
+        np.testing.assert_array_equal(saved.quaternion.values, whole.quaternion.values[:rows])
+    told = message(rigidsim_command("resume", "disk/free"))
+    assert "disk/free: can't be written: Read-only file system" in told.replace("/segments", "")
+    remount("rw")
+    assert rigidsim_command("resume", "disk/free").exit_code == 0
+    same_bits(rigidsim.open_run("disk/free"), rigidsim.open_run("runs/free"))
+    assert not list(Path("disk/free").glob(".*"))
+
+
+def test_a_timeline_that_cannot_be_written_costs_nothing_else(
+    config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw = "rigidsim.look.timeline.write_timeline"
+    from rigidsim.look.timeline import write_timeline
+
+    def late(*arguments: Any, **options: Any) -> int:
+        remount("ro")
+        return write_timeline(*arguments, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(draw, late)
+        drawn = rigidsim_command("run", config(), "--out", "disk", "--set", "output.timeline=true")
+    told = message(drawn, code=3)
+    assert "disk/free/timeline.rrd: can't be written: " in told
+    assert "Read-only file system" in told
+    assert "the dataset is complete, and rigidsim view draws the timeline" in told
+    assert rigidsim.open_run("disk/free").status == "finished"
+    assert rigidsim_command("verify", "disk/free").exit_code == 0
+
+
+def test_a_timeline_that_has_no_room(
+    config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Told before it is drawn: the viewer's library waits for ever on a full disk."""
+    usage = shutil.disk_usage(".")
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=100_000))
+        drawn = rigidsim_command("run", config(), "--set", "output.timeline=true")
+    told = message(drawn, code=3)
+    assert "runs/free/timeline.rrd: can't be written: it may need 0.6 MB, and 0.1 MB are free" in told
+    assert rigidsim.open_run("runs/free").status == "finished"
+    assert not Path("runs/free/timeline.rrd").exists()
+    assert rigidsim_command("verify", "runs/free").exit_code == 0
+
+
+def test_a_run_that_cannot_even_begin_says_so(
+    config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    create = RunFolder.create
+
+    def then_read_only(folder: RunFolder, *, force: bool) -> None:
+        create(folder, force=force)
+        remount("ro")
+
+    name = config()
+    with monkeypatch.context() as patch:
+        patch.setattr(RunFolder, "create", then_read_only)
+        told = message(rigidsim_command("run", name, "--out", "disk"))
+    assert told == "rigidsim: disk/free: can't be written: Read-only file system; choose another --out"
+    remount("rw")
+    assert rigidsim_command("run", name, "--out", "disk").exit_code == 0
+
+
+def as_somebody(work: Callable[[], None]) -> None:
+    """Do something in a process without root's privileges, to which permission bits apply."""
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            if os.geteuid() == 0:
+                os.setegid(65534)
+                os.seteuid(65534)
+            work()
+            code = 0
+        except BaseException as error:  # the parent's assertion shows it
+            print(repr(error), flush=True)
+        finally:
+            os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+
+
+@pytest.fixture
+def open_to_all(tmp_path: Path) -> Iterator[Path]:
+    """A folder that others may reach: ``tmp_path`` lies in folders that are the user's alone."""
+    ways = [p for p in (tmp_path, *tmp_path.parents) if p.stat().st_uid == os.geteuid() and p != Path("/")]
+    before = {p: p.stat().st_mode for p in ways}
+    for path in ways:
+        path.chmod(before[path] | 0o055)
+    yield tmp_path
+    for path in ways:
+        path.chmod(before[path])
+
+
+@pytest.mark.parametrize(
+    ("bits", "readable"), [(0o555, True), (0o000, False)], ids=["no writing", "no entering"]
+)
+def test_permission_bits(
+    bits: int, readable: bool, config: Config, rigidsim_command: Command, open_to_all: Path
+) -> None:
+    name = config(time=LONG, rest="[limits]\nmax_steps = 500")
+    assert rigidsim_command("run", name).exit_code == 3
+    folder = open_to_all / "runs" / "free"
+    for path in folder.rglob("*"):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    folder.chmod(bits)
+
+    def refused(words: str, work: Callable[[], object]) -> None:
+        with pytest.raises(RunFolderError) as caught:
+            work()
+        assert words in str(caught.value), str(caught.value)
+        assert os.strerror(errno.EACCES) in str(caught.value), str(caught.value)
+
+    def work() -> None:
+        if readable:
+            assert 0 < rigidsim.open_run(folder).dataset.sizes["time"] < 3001
+            refused("once it may be written", lambda: rigidsim.resume(folder))
+        else:
+            refused("runs/free: can't be read", lambda: rigidsim.open_run(folder))
+            refused("runs/free: can't be read", lambda: rigidsim.resume(folder))
+        experiment = rigidsim.load(open_to_all / name, overrides=['name="other"'])
+        refused("other: can't be written", lambda: rigidsim.run(experiment, out=folder))
+
+    try:
+        as_somebody(work)
+    finally:
+        folder.chmod(0o755)
+        for path in folder.rglob("*"):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+    assert rigidsim_command("resume", "runs/free", "--set", "limits.max_steps=100000").exit_code == 0

@@ -1,0 +1,96 @@
+"""The campaign of kills, full disks and damages: it can fail, tells on the way, and finds nothing lost."""
+
+from __future__ import annotations
+
+import random
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2]))  # the studies are no installed package
+
+import rigidsim
+from experiments import kill_campaign
+from experiments.durability import damages
+from experiments.durability.judging import Tally, check_after, check_complete, saved_rows
+from experiments.durability.scenes import SCENES, same, text_of
+from rigidsim.store.folder import RunFolder
+
+SHORT = text_of("double_driven").replace("end = 3000", "end = 30").replace("3001", "31")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    return rigidsim.run(rigidsim.parse(SHORT), out=tmp_path_factory.mktemp("runs")).folder
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_scene_is_a_config(name: str) -> None:
+    assert rigidsim.parse(text_of(name)).config.name == name
+
+
+def test_lost_rows_and_changed_bits_are_failures(finished: RunFolder) -> None:
+    tally = Tally()
+    with rigidsim.open_run(finished.path).dataset as dataset:
+        whole = dataset.load()
+    assert saved_rows(finished.path) == -1
+    check_after(tally, finished.path, whole, 31, "whole")
+    check_complete(tally, finished.path, whole, "whole")
+    assert (tally.failures, tally.counts["completed runs identical"]) == ([], 1)
+    check_after(tally, finished.path, whole, 32, "short")
+    assert tally.failures == ["short: 31 rows, 32 acknowledged"]
+    changed = whole.copy(deep=True)
+    changed["energy"].values[30] = np.nextafter(changed["energy"].values[30], 9)
+    assert same(whole, changed) == "energy"
+    assert same(whole, changed, rows=30) == ""
+    check_after(tally, finished.path, changed, 31, "changed")
+    check_complete(tally, finished.path, changed, "changed")
+    assert tally.failures[1:] == ["changed: energy differs", "changed: energy"]
+
+
+def test_the_sign_of_zero_is_a_bit(finished: RunFolder) -> None:
+    with rigidsim.open_run(finished.path).dataset as dataset:
+        whole = dataset.load()
+    turned = whole.copy(deep=True)
+    turned["time"] = whole.time.copy(data=np.where(whole.time.values == 0, -0.0, whole.time.values))
+    assert same(whole, turned) == "time"
+
+
+def test_damage_changes_the_file(finished: RunFolder, tmp_path: Path) -> None:
+    content = finished.dataset.read_bytes()
+    other = finished.checkpoint
+    for seed in range(60):
+        target = tmp_path / "target.h5"
+        target.write_bytes(content)
+        done = damages.damage(target, random.Random(seed), [other])
+        assert done == "lost" if not target.exists() else target.read_bytes() != content, done
+
+
+def test_totals_are_told_when_time_is_up(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--kills", "5", "--full-disks", "5", "--read-only", "5", "--damages", "0", "--seconds", "0"]
+    assert kill_campaign.main(arguments) == 0
+    told = capsys.readouterr().out
+    assert told.count("==") == 3
+    assert told.splitlines()[-1].split() == ["failures", "0"]
+
+
+@pytest.mark.slow
+def test_a_small_campaign(capfd: pytest.CaptureFixture[str]) -> None:
+    arguments = [
+        "--kills",
+        "12",
+        "--full-disks",
+        "3",
+        "--read-only",
+        "3",
+        "--damages",
+        "20",
+        "--seconds",
+        "60",
+    ]
+    assert kill_campaign.main(arguments) == 0
+    told = capfd.readouterr().out
+    assert "kills: 12 of 12" in told
+    assert "damages: 20 of 20; failures so far: 0" in told
