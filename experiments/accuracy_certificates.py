@@ -160,7 +160,7 @@ def _figure(outcomes: Sequence[Outcome], out: Path) -> None:
     )
     left.legend(frameon=False, loc="upper left")
     ratios = [o.ratio for o in run if math.isfinite(o.ratio)]
-    right.hist(np.clip(ratios, 0.1, 9.9), bins=np.geomspace(0.1, 10, 41), color=common.BLUE)
+    right.hist(np.clip(ratios, 1.0, 19.9), bins=np.geomspace(1, 20, 41), color=common.BLUE)
     right.set_xscale("log")
     right.axvline(_DEAR, color=common.RED, linewidth=1, label="twice the cheapest")
     share = np.mean(np.array(ratios) <= _DEAR)
