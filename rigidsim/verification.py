@@ -123,7 +123,9 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
             raise RunFolderError(f"{dataset}: the run again {again.summary['message']}; nothing was compared")
         differing, first, samples = _compare(dataset, again.folder.dataset, version)
         now = root_attributes(again.folder.dataset)
-    if folder is not None:
+    if folder is not None and not folder.summary.exists():
+        problems.append(f"{folder.summary}: is missing; it was written with the dataset")
+    elif folder is not None:
         claimed = folder.read_summary()
         problems += summary_problems(claimed, again.summary, folder, version)
         problems += timeline_problems(claimed, folder)

@@ -252,3 +252,12 @@ def test_the_timeline_that_the_summary_names(how: str, complete: Path, tmp_path:
         path.symlink_to(complete / "timeline.rrd")
     (problem,) = rigidsim.verify(folder).problems
     assert problem.startswith(f"{path}: {'was damaged' if how == 'bit' else 'is missing'}")
+
+
+def test_a_summary_that_is_gone(complete: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(complete, tmp_path / "v")
+    (copy / "summary.json").unlink()
+    verdict = rigidsim.verify(copy)
+    assert not verdict.identical
+    assert verdict.differing == []
+    assert any("summary.json: is missing" in problem for problem in verdict.problems)
