@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import secrets
-import shutil
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,8 +26,6 @@ from rigidsim.store import provenance
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.opening import open_dataset
 from rigidsim.store.segments import Chain, SegmentWriter
-
-_TIMELINE_BYTES = 600  # for each row shown, at most: some twenty variables
 
 
 @dataclass
@@ -196,13 +193,6 @@ class _Completion:
         from rigidsim.look.timeline import write_timeline
 
         path = self.folder.timeline
-        shown = min(rows, self.advance.progress.next_sample)
-        room, needed = shutil.disk_usage(self.folder.path).free, _TIMELINE_BYTES * (shown + 1024)
-        if room < needed:  # rerun may wait for ever on a full disk
-            raise StoppedWritingError(
-                f"{path}: can't be written: it may need {needed / 1e6:.1f} MB, and {room / 1e6:.1f} MB are "
-                "free; the dataset is complete, and rigidsim view draws the timeline once there is room"
-            )
         try:
             with open_dataset(self.folder.dataset, indexed=False) as dataset:  # memory goes with the rows
                 write_timeline(dataset, path, rows=rows)
@@ -210,5 +200,5 @@ class _Completion:
             why = error.strerror if isinstance(error, OSError) else None
             raise StoppedWritingError(
                 f"{path}: can't be written: {why or error}; the dataset is complete, and rigidsim view draws "
-                "the timeline"
+                "the timeline once that is possible"
             ) from None

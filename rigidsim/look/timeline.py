@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,6 +24,10 @@ if TYPE_CHECKING:
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 
 
+_ROW_BYTES = 600  # at most: some twenty variables
+_FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
+
+
 def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) -> int:
     """Write a dataset as a rerun recording with its own layout.
 
@@ -38,6 +44,7 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     Raises:
         ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
         RuntimeError: the environment variable RERUN switches recording off.
+        OSError: the file can't be written, or there is no room for it.
 
     The viewer draws in float32: the picture is for looking, the dataset for measuring.
     """
@@ -56,6 +63,7 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
         plots.append(Plot("time_seconds", "Time [s]", "more", [series]))
     page = summary_page(dataset, shown, notes)
 
+    _check_room(Path(path), count)
     with _strict(), _replacing(Path(path)) as partial:
         from rigidsim.look.blueprint import build_blueprint
         from rigidsim.look.drawing import draw_plot_styles, draw_rows, draw_static
@@ -71,6 +79,7 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
             draw_static(recording, stages)
             draw_plot_styles(recording, plots)
             for start in range(0, count, CHUNK):
+                _check_room(Path(path), count - start)
                 part = slice(start, min(start + CHUNK, count))
                 ticks = clock.ticks[part]
                 time = (
@@ -118,3 +127,11 @@ def _replacing(path: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # of a file system that became read-only
             partial.unlink(missing_ok=True)
+
+
+def _check_room(path: Path, rows: int) -> None:
+    """Refuse before rerun finds the disk full: then it may wait for ever."""
+    room, needed = shutil.disk_usage(path.parent).free, _FIRST_BYTES + _ROW_BYTES * rows
+    if room < needed:
+        missing = f"it may need {needed / 1e6:.1f} MB, and {room / 1e6:.1f} MB are free"
+        raise OSError(errno.ENOSPC, missing, str(path))
