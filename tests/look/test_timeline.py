@@ -12,6 +12,7 @@ import xarray
 pytest.importorskip("rerun")
 
 from rigidsim.look.stage import plane_view
+from rigidsim.look.thinning import thin
 from rigidsim.look.timeline import CHUNK, write_timeline
 
 Build = Callable[..., xarray.Dataset]
@@ -95,6 +96,16 @@ def test_thinned_run_keeps_its_first_and_last_rows(
     assert (len(steps), steps[0], steps[-1]) == (910, 0, 9997)
     wanted = dataset["quaternion"].values[steps][:, [1, 2, 3, 0]]
     np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
+
+
+@pytest.mark.parametrize("piece", [1, 11, 100, 5000])
+def test_rows_read_in_pieces_are_those_read_at_once(
+    piece: int, symmetric_top: Build, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dataset = symmetric_top(count=9998)
+    at_once = thin(dataset, 1000)
+    monkeypatch.setattr("rigidsim.look.thinning._ROWS_AT_ONCE", piece)
+    xarray.testing.assert_identical(thin(dataset, 1000), at_once)
 
 
 def test_only_the_rows_shown_are_read_from_a_file(symmetric_top: Build, tmp_path: Path) -> None:
