@@ -6,7 +6,7 @@ Question: a free asymmetric body in double precision.
   figure is for information: there writing is what the run is for). Sparse: 1001 samples over 1e6 s and
   more, segments at their usual pace. Dense: a sample every 0.05 s.
   memory: the largest resident set of a process that runs 1e6 to 1e8 samples (with timeline), and 1e6 to 1e9
-  steps (allowed: 10 % more than the shortest of each). Samples are in memory until a segment of 32 MB, and
+  steps (allowed: 10 % more than the shortest of each). Samples are in memory until a segment of 16 MB, and
   of the dataset the timeline reads every n-th row, so that longer runs keep nothing more.
 
 Method: cost: within one process, with and without in turn, medians of CPU seconds (the same compiled code

@@ -26,7 +26,7 @@ from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, seale
 from rigidsim.store.sink import sink
 from rigidsim.store.variables import Extra, Variable
 
-SEGMENT_BYTES = 32_000_000
+SEGMENT_BYTES = 16_000_000  # twice that is in memory while a segment is put together
 SEGMENT_SECONDS = 30.0
 REMOVED = ".segments.removed"
 """Where segments go before they are deleted."""

@@ -21,7 +21,12 @@ from experiments import closed_forms, common, measure  # noqa: E402
 from experiments.common import Check  # noqa: E402
 
 
-@pytest.mark.parametrize("name", everything.STUDIES)
+SLOW = {"hyperion"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in everything.STUDIES]
+)
 def test_study_passes_and_draws(name: str, tmp_path: Path) -> None:
     checks = importlib.import_module(f"experiments.{name}").study(False, tmp_path)
     failed = [check.row for check in checks if not check.passed]

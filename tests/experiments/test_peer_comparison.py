@@ -39,7 +39,9 @@ def short_runs(reports: dict[str, campaign.Measured], peer: str) -> campaign.Mea
     return reports[peer]
 
 
-@pytest.mark.parametrize("peer", list(ADAPTERS))
+@pytest.mark.parametrize(
+    "peer", [pytest.param(p, marks=pytest.mark.slow if p == "rigidsim" else ()) for p in ADAPTERS]
+)
 def test_errors_against_128_bits_vanish_as_the_setting_gets_tighter(
     peer: str, reports: dict[str, campaign.Measured]
 ) -> None:

@@ -58,7 +58,7 @@ def angle_apart(one: xarray.Dataset, other: xarray.Dataset) -> np.ndarray:
     return np.asarray(2 * np.linalg.norm(difference, axis=1))
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     rates=st.lists(ANGLE, min_size=3, max_size=3),
     quaternion=st.lists(ANGLE, min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1),
