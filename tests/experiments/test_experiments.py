@@ -20,7 +20,6 @@ from experiments import all as everything  # noqa: E402
 from experiments import closed_forms, common, measure  # noqa: E402
 from experiments.common import Check  # noqa: E402
 
-
 SLOW = {"hyperion"}
 
 
