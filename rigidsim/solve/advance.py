@@ -191,6 +191,8 @@ class Advance:
             elif spacing <= _BLOCK_SPACING and min(left, self.rhythm.left) >= _WORTH_A_BLOCK:
                 most = max(1, int(ROWS_AT_ONCE * spacing), _WORTH_A_BLOCK)
                 return self._block(min(_BLOCK_STEPS, most, self.rhythm.left, left))
+            elif spacing <= _BLOCK_SPACING:
+                patience = min(patience, self.rhythm.left)  # to where blocks are worth it again
         if expected > _SPARSE:
             steps = _MARGIN * expected - 2
             if self._mean > 0 and gap / self._mean > _LONG_GAP:
@@ -284,6 +286,8 @@ class Advance:
                     self._finish(place)
                     break
             self.rhythm.correct()
+            if self.harvest.count - self.harvest.handed >= _MOST_WAITING:
+                break
             if reached:
                 upcoming = self.harvest.upcoming
                 place = self.rhythm.place()
