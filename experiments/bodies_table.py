@@ -1,7 +1,7 @@
 """Are the principal moments of every shape in the schema those of the textbooks, to the last digit?
 
 Method: every shape is described in a config of 30 digits, with awkward dimensions, and worked out by
-``rigidsim.prepare.prepare`` (no integration); its moments are compared with closed forms typed in here.
+``rigidsim.solve.problem.prepare`` (no integration); its moments are compared with closed forms typed in here.
 Composites, reference points and particles follow; a short run of the square plate gives w and L for Poinsot's
 construction, where the normal of the ellipsoid of inertia is the cross product of two of its tangents.
 
@@ -33,9 +33,9 @@ if not __package__:  # as a script
 import rigidsim
 from experiments.common import BLUE, CONFIGS, EPSILON, GREY, ORANGE, Check, main, new_figure, save, simulate
 from experiments.measure import matrices
-from rigidsim.prepare import prepare
 from rigidsim.scene.body import RigidBody
 from rigidsim.scene.shapes import SHAPES
+from rigidsim.solve.problem import prepare
 
 NAME = "bodies_table"
 DIGITS = 1e-30

@@ -2,7 +2,8 @@
 
 Free asymmetric top: Whittaker, Analytical Dynamics, section 69; Landau & Lifshitz, Mechanics, section 37.
 Heavy symmetric top: Whittaker, section 71; Landau & Lifshitz, section 35, problem 1. The motions themselves
-are rigidsim's (``rigidsim.solve.closed``); here are the numbers that studies hold against published ones.
+are rigidsim's (``rigidsim.solve.closed_form``); here are
+the numbers that studies hold against published ones.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 
 import mpmath
 
-from rigidsim.solve.closed import free, heavy
+from rigidsim.solve.closed_form import free, heavy
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import rigidsim
+from rigidsim.store.variables import parts_in
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 DEFAULT_OUT = Path("runs/experiments")
@@ -147,19 +148,13 @@ class Result:
 
     def exact(self, name: str) -> list[Any]:
         """A scalar variable, or the time, as mpf with every digit of the run's precision."""
-        return exact(self.dataset[name].values, *self._residuals(name))
+        return exact(*(self.dataset[part].values for part in parts_in(self.dataset, name)))
 
     def exact_component(self, name: str, component: str) -> list[Any]:
         """One component of a vector, as mpf with every digit of the run's precision."""
         dimension = self.dataset[name].dims[1]
-        parts = [name, *(n for n in self._residual_names(name))]
-        return exact(*(self.dataset[p].sel({dimension: component}).values for p in parts))
-
-    def _residual_names(self, name: str) -> list[str]:
-        return [name + s for s in ("_lo", "_lo2", "_lo3") if name + s in self.dataset.variables]
-
-    def _residuals(self, name: str) -> list[Any]:
-        return [self.dataset[n].values for n in self._residual_names(name)]
+        parts = (self.dataset[part] for part in parts_in(self.dataset, name))
+        return exact(*(part.sel({dimension: component}).values for part in parts))
 
 
 def exact(*parts: Any) -> list[Any]:

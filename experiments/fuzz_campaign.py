@@ -60,10 +60,10 @@ class TooSlow(BaseException):
 
 def config_case(number: int, seed: int, folder: Path) -> str:
     """Load one hostile config and build its scene; some are prepared and planned as well."""
-    from rigidsim.planner import plan
-    from rigidsim.prepare import prepare
-    from rigidsim.scene.reading import load
+    from rigidsim.scene.config import load
     from rigidsim.scene.scene import build_scene
+    from rigidsim.solve.problem import prepare
+    from rigidsim.workflows.plan import plan
 
     path = folder / "case.toml"
     path.write_bytes(fuzzing.hostile_config(random.Random(f"{seed} config {number}")))
@@ -110,9 +110,9 @@ def file_case(number: int, seed: int, folder: Path, bases: list[Path]) -> str:
     """Damage one file of a copied run folder and read everything in it."""
     from rich.console import Console
 
-    from rigidsim import report
-    from rigidsim.archive import open_run
-    from rigidsim.scene.reading import load
+    from rigidsim.cli import tables as report
+    from rigidsim.scene.config import load
+    from rigidsim.store.run import open_run
 
     rng = random.Random(f"{seed} file {number}")
     target = folder / "run"
@@ -129,7 +129,7 @@ def file_case(number: int, seed: int, folder: Path, bases: list[Path]) -> str:
         _judged(error)
     try:
         opened = open_run(target)
-        report.print_summary(opened.summary, "run", Console(file=io.StringIO(), width=110))
+        report.print_summary(opened.outcome, "run", Console(file=io.StringIO(), width=110))
         json.dumps(opened.summary)
         with opened.dataset as dataset:
             dataset.load()

@@ -9,7 +9,7 @@ Method: each scene is run once undisturbed. Then it is begun in a child process,
 child, killed again, ..., and left to finish after one to six kills. A third of the moments are uniform over
 the scene's duration, a third while a temporary file is being written, a third just after a file got its
 name. What was saved is noted from outside before the kill. Segments are written some hundred times as often
-as usual (``frequent``), to have many moments at which something can go wrong. Then: the same on a small
+as usual (``FREQUENT``), to have many moments at which something can go wrong. Then: the same on a small
 tmpfs (as root; else under a limit of the files' size), enlarged before each resume; on a tmpfs that is
 remounted read-only (as root only) and writable again before each resume; and files of finished and
 unfinished runs damaged at random places.

@@ -38,8 +38,10 @@ import xarray
 
 import rigidsim
 from experiments.common import BLUE, EPSILON, GREY, ORANGE, Check, main, new_figure, save, tidy
-from rigidsim.prepare import auto_tolerance
-from rigidsim.trial import Setting, angles_between, try_setting
+from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import try_setting
+from rigidsim.solve.problem import auto_tolerance
 
 NAME = "long_horizon"
 STARTS = 12

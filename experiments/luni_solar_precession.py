@@ -263,7 +263,7 @@ def cost(years: float, every: float) -> None:
     """Compare CPU seconds with a bare script of the same equations and samples; prints one line."""
     import heyoka as hy
 
-    from rigidsim.prepare import prepare
+    from rigidsim.solve.problem import prepare
 
     samples = round(years * 365.25 / every) + 1
     text = config("both", years * 365.25, samples)

@@ -8,6 +8,8 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from rigidsim.scene.rotations import rotation_matrix
+
 
 def phase_rate(time: np.ndarray, angle: np.ndarray) -> float:
     """Rate (rad/s) of an angle that grows linearly: least squares over all samples, unwrapped.
@@ -145,13 +147,8 @@ def value_at(time: Sequence[Any], values: Sequence[Any], t: Any, points: int = 1
 
 def matrices(quaternion: np.ndarray) -> np.ndarray:
     """Rotation matrices (n, 3, 3), body to space, of quaternions (n, 4), normalised here."""
-    w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1)[:, None]).T
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    unit = (quaternion / np.linalg.norm(quaternion, axis=1)[:, None]).T
+    return np.moveaxis(np.array(rotation_matrix(list(unit))), 2, 0)
 
 
 def tilt(quaternion: np.ndarray) -> np.ndarray:

@@ -28,11 +28,11 @@ from matplotlib.lines import Line2D
 
 import rigidsim
 from experiments.common import CONFIGS, Check, main, new_figure, save, tidy
-from rigidsim.bench.measure import Measurement, Row, measure
-from rigidsim.bench.plan import DEFAULT, Plan
-from rigidsim.prepare import prepare
-from rigidsim.solve.closed import closed_form_of
-from rigidsim.trial import Setting
+from rigidsim.accuracy.bench.measure import Measurement, Row, measure
+from rigidsim.accuracy.bench.plan import DEFAULT, Plan
+from rigidsim.accuracy.error_law import closed_form_if_any
+from rigidsim.accuracy.setting import Setting
+from rigidsim.solve.problem import prepare
 
 NAME = "precision_tradeoff"
 SCENES = {
@@ -83,17 +83,17 @@ def measure_scene(name: str, *, to: float, processes: int) -> Points:
     experiment = rigidsim.load(CONFIGS / f"{name}.toml")
     prepared = prepare(experiment)
     rate, start = float(prepared.system.rate_bound), float(prepared.scene.start)
-    form = closed_form_of(prepared.scene)
-    closed = not isinstance(form, str)
+    form, why = closed_form_if_any(prepared.scene)
+    closed = form is not None
     decades = range(2, round(math.log10(to)) + 1)
     horizons = [10.0**n for n in decades]
     last = len(horizons) if closed else min(len(horizons), 2)  # what a reference in quadruple can do
     wide = max(len(horizons) - 2, 1)
-    first = _plan(horizons[:last], wide, rate, start, "" if closed else str(form))
+    first = _plan(horizons[:last], wide, rate, start, why)
     measured = measure(experiment, budget=3600.0, repeats=processes, plan=first, settings=settings(closed))
     points = _points(measured, horizons[:last])
     if last < len(horizons):
-        longer = _plan(horizons, wide, rate, start, str(form))
+        longer = _plan(horizons, wide, rate, start, why)
         chosen = [s for s in settings(closed) if s.precision in ("double", "extended", "single")]
         further = measure(
             experiment, budget=3600.0, repeats=1, plan=longer, settings=chosen, reference="extended"

@@ -10,13 +10,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rigidsim.archive import Run, open_run
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
-    from rigidsim.planner import plan
-    from rigidsim.resuming import resume
-    from rigidsim.runner import run
-    from rigidsim.scene.reading import Experiment, load, parse
-    from rigidsim.verification import verify
+    from rigidsim.store.run import Run, open_run
+    from rigidsim.workflows.plan import plan
+    from rigidsim.workflows.read import Experiment, load, parse
+    from rigidsim.workflows.resume import resume
+    from rigidsim.workflows.run import run
+    from rigidsim.workflows.verify import verify
 
 __version__ = "0.1.0"
 
@@ -24,15 +24,15 @@ _PLACES = {
     "ConfigError": "rigidsim.errors",
     "RigidsimError": "rigidsim.errors",
     "RunFolderError": "rigidsim.errors",
-    "Experiment": "rigidsim.scene.reading",
-    "load": "rigidsim.scene.reading",
-    "parse": "rigidsim.scene.reading",
-    "Run": "rigidsim.archive",
-    "open_run": "rigidsim.archive",
-    "run": "rigidsim.runner",
-    "resume": "rigidsim.resuming",
-    "verify": "rigidsim.verification",
-    "plan": "rigidsim.planner",
+    "Experiment": "rigidsim.workflows.read",
+    "load": "rigidsim.workflows.read",
+    "parse": "rigidsim.workflows.read",
+    "Run": "rigidsim.store.run",
+    "open_run": "rigidsim.store.run",
+    "run": "rigidsim.workflows.run",
+    "resume": "rigidsim.workflows.resume",
+    "verify": "rigidsim.workflows.verify",
+    "plan": "rigidsim.workflows.plan",
 }
 
 __all__ = [

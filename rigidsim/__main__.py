@@ -1,5 +1,5 @@
 """``python -m rigidsim``."""
 
-from rigidsim.cli import app
+from rigidsim.cli.app import app
 
 app(prog_name="rigidsim")

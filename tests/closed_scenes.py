@@ -7,10 +7,11 @@ from typing import Any
 import mpmath
 import numpy as np
 from hypothesis import strategies as st
+from support import config
 
 import rigidsim
-from rigidsim.prepare import Prepared, prepare
-from rigidsim.solve.closed import ClosedForm, closed_form_of
+from rigidsim.solve.closed_form import ClosedForm, closed_form_of
+from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.stepper import Stepper
 
 DOWN = [0, 0, -1]
@@ -29,17 +30,13 @@ def scene(
     precision: Any = "double",
     end: Any = 10,
     more: str = "",
-) -> Prepared:
+) -> InitialValueProblem:
     """A config of a body (lines of ``[body]``), prepared; three samples."""
-    loads = f'[[loads]]\nkind = "uniform_gravity"\nacceleration = {written(gravity)}' if gravity else ""
+    initial = f"angular_velocity = {written(rates)}\nquaternion = {written(quaternion)}\n{more}"
+    loads = f'kind = "uniform_gravity"\nacceleration = {written(gravity)}' if gravity else ""
     setting = precision if isinstance(precision, int) else f'"{precision}"'
-    return prepare(
-        rigidsim.parse(
-            f'name = "x"\n[body]\n{body}\n[initial]\nangular_velocity = {written(rates)}\n'
-            f"quaternion = {written(quaternion)}\n{more}\n{loads}\n[time]\nend = {end}\nsamples = 3\n"
-            f"[integrator]\nprecision = {setting}\n"
-        )
-    )
+    time, integrator = f"end = {end}\nsamples = 3", f"precision = {setting}"
+    return prepare(rigidsim.parse(config(body, initial, loads, time, integrator)))
 
 
 def written(numbers: Any) -> str:
@@ -57,19 +54,17 @@ def top(across: Any, along: Any, height: Any = 1) -> str:
     return f"{principal([across, across, along])}\nmass = 1\ncenter_of_mass = {written([0, 0, height])}"
 
 
-def scene_over(units: float, **given: Any) -> Prepared:
+def scene_over(units: float, **given: Any) -> InitialValueProblem:
     """A scene that lasts some internal units of time, in which the fastest rate is between 1/2 and 1."""
     return scene(**given, end=repr(units * 2.0 ** scene(**given).system.scaling.time))
 
 
-def closed(prepared: Prepared) -> ClosedForm:
+def closed(prepared: InitialValueProblem) -> ClosedForm:
     """Its closed form, which must exist."""
-    form = closed_form_of(prepared.scene)
-    assert not isinstance(form, str), form
-    return form
+    return closed_form_of(prepared.scene)
 
 
-def against_integration(prepared: Prepared) -> float:
+def against_integration(prepared: InitialValueProblem) -> float:
     """Largest difference of any state at the last sample: rates in the unit of the fastest, the rest O(1)."""
     clock = prepared.clock
     stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, clock.at(0))

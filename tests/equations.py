@@ -7,10 +7,11 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 from scipy.spatial.transform import Rotation
+from support import config
 
 from rigidsim.model.system import System
-from rigidsim.prepare import Prepared, prepare
-from rigidsim.scene.reading import parse
+from rigidsim.scene.config import parse
+from rigidsim.solve.problem import InitialValueProblem, prepare
 
 EPS = np.finfo(float).eps
 # Expressions of at most some tens of operations in double, on numbers of order one.
@@ -33,15 +34,10 @@ def prepared(
     *,
     start: float = 0.0,
     parameters: str = "",
-) -> Prepared:
-    output = f"[output]\nrecord = {record}" if record else ""
-    load = f"[[loads]]\n{loads}" if loads else ""
-    return prepare(
-        parse(
-            f'name = "scene"\n[parameters]\n{parameters}\n[body]\n{body}\n[initial]\n{initial}\n{load}\n'
-            f"[time]\nstart = {start!r}\nend = {end!r}\n[integrator]\n{integrator}\n{output}\n"
-        )
-    )
+) -> InitialValueProblem:
+    output = f"record = {record}" if record else ""
+    time, more = f"start = {start!r}\nend = {end!r}", f"[parameters]\n{parameters}"
+    return prepare(parse(config(body, initial, loads, time, integrator, output, more)))
 
 
 def internal(system: System, state: np.ndarray) -> np.ndarray:

@@ -3,32 +3,67 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import heyoka as hy
 import numpy as np
+import pytest
 import xarray
 
 import rigidsim
-from rigidsim.prepare import prepare
+from rigidsim.accuracy import error_law
+from rigidsim.accuracy.comparison import angles_between  # noqa: F401  (for the tests)
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import Trial, try_setting
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve import precision, problem, projection
+from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.status import Status
+from rigidsim.store.segments import SegmentLimits
+from rigidsim.store.variables import parts_in
 
 CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
+# a look at the guards after every few steps, so that they cut short runs where they say
+IMPATIENT = Tuning(Pacing(chunk_seconds=0.0, patience=0.0, block_steps=16))
+# and a segment for each
+EAGER = Tuning(IMPATIENT.pacing, SegmentLimits(seconds=0.0))
+# for a process of its own, before it calls the command line
+OFTEN = """
+import functools, rigidsim.workflows.run as workflow
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.pacing import Pacing
+from rigidsim.store.segments import SegmentLimits
+tuning = Tuning(Pacing(patience=0.05), SegmentLimits(seconds=0.05))
+workflow.run = functools.partial(workflow.run, tuning=tuning)
+"""
 EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadruple": 2.0**-112}
 
 
-def run_text(text: str, out: Path, *overrides: str, timeline: bool = False) -> rigidsim.Run:
+def run_text(
+    text: str, out: Path, *overrides: str, timeline: bool = False, tuning: Tuning | None = None
+) -> rigidsim.Run:
     """Run a config text, without drawing unless asked for."""
     settings = [f"output.timeline={str(timeline).lower()}", *overrides]
-    return rigidsim.run(rigidsim.parse(text, overrides=settings), out=out, force=True)
+    return rigidsim.run(rigidsim.parse(text, overrides=settings), out=out, force=True, tuning=tuning)
+
+
+def tried(text: str, given: str | int = "double", formulation: str = "quaternion", *overrides: str) -> Trial:
+    """A config text integrated in memory, in compact code: attitudes and drifts alone, nothing written."""
+    setting = Setting(given, formulation=formulation)
+    trial = try_setting(rigidsim.parse(text, overrides=overrides), setting, compact=True)
+    assert trial.status is Status.FINISHED
+    return trial
 
 
 def wide(dataset: xarray.Dataset, name: str) -> np.ndarray:
     """A variable with its residuals added, as 80-bit numbers (exact for extended precision)."""
-    value = dataset[name].values.astype(np.longdouble)
-    for suffix in ("_lo", "_lo2", "_lo3"):
-        if name + suffix in dataset:
-            value = value + dataset[name + suffix].values
-    return value
+    first, *residuals = (dataset[part].values for part in parts_in(dataset, name))
+    return sum(residuals, first.astype(np.longdouble))
 
 
 def angle_between(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -67,3 +102,76 @@ def amplification(experiment: rigidsim.Experiment, points: int = 120) -> float:
         norms = np.linalg.norm(matrices[i:] @ inverse, ord=2, axis=(1, 2))
         largest = max(largest, float(norms.max()))
     return largest
+
+
+@contextmanager
+def compact_code() -> Iterator[None]:
+    """Everything is compiled in heyoka's compact mode, as in trials; see the marker ``compact``."""
+
+    def compactly(name: str | int) -> precision.Precision:
+        return replace(precision.precision_of(name), compact=True)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (problem, projection, error_law):
+            patch.setattr(module, "precision_of", compactly)
+        yield
+
+
+def config(
+    body: str = "principal_moments = [1, 2, 2.5]",
+    initial: str = "angular_velocity = [0.3, 1.0, 0.5]\neuler_angles = [0.2, 1.1, 0.7]",
+    loads: str | Sequence[str] = (),
+    time: str = "end = 3\nsamples = 49",
+    integrator: str = "",
+    output: str = "",
+    more: str = "",
+    *,
+    name: str = "scene",
+) -> str:
+    """The text of a config, without a timeline; by default of an asymmetric free body.
+
+    Args:
+        body: the lines of ``[body]``; ``initial``, ``time``, ``integrator`` and ``output`` likewise.
+        loads: of one load, or of each.
+        more: further tables as they stand.
+    """
+    tables = "".join(
+        f"[[loads]]\n{load}\n" for load in ([loads] if isinstance(loads, str) else loads) if load
+    )
+    return (
+        f'name = "{name}"\n[body]\n{body}\n[initial]\n{initial}\n{tables}[time]\n{time}\n'
+        f"[integrator]\n{integrator}\n[output]\ntimeline = false\n{output}\n{more}\n"
+    )
+
+
+def loaded(run: rigidsim.Run) -> xarray.Dataset:
+    """Its dataset, read into memory and closed."""
+    with run.dataset as dataset:
+        return dataset.load()
+
+
+def same_bits(one: xarray.Dataset | rigidsim.Run, other: xarray.Dataset | rigidsim.Run) -> None:
+    """Two datasets have the same variables and coordinates, with the same bits: -0.0 isn't 0.0, and a nan is
+    itself.
+    """
+    one, other = (given if isinstance(given, xarray.Dataset) else loaded(given) for given in (one, other))
+    assert sorted(map(str, one.variables)) == sorted(map(str, other.variables))
+    for name, variable in one.variables.items():
+        assert variable.dims == other[name].dims, name
+        a, b = variable.values, other[name].values
+        assert (a.dtype, a.shape) == (b.dtype, b.shape), name
+        different = np.argwhere(bits(a) != bits(b))
+        if len(different):
+            first = tuple(map(int, different[0]))
+            shown = f"{a[first]!r} and {b[first]!r}"
+            raise AssertionError(f"{name}{list(first)}: {shown}, the first of {len(different)} differences")
+
+
+def bits(values: Any) -> np.ndarray:
+    """float64 numbers as whole ones with the same bits; others as they are."""
+    found = np.asarray(values)
+    return (
+        np.ascontiguousarray(found).view(np.int64).reshape(found.shape)
+        if found.dtype == np.float64
+        else found
+    )

@@ -89,7 +89,7 @@ def test_every_ready_scene_has_a_fingerprint() -> None:
 
 def test_the_bits_are_those_of_every_process() -> None:
     """Two fresh processes, with other hash seeds and in another order."""
-    chosen = [p for p in CONFIGS if p.stem in ("asymmetric_top", "heavy_top_nutating", "tossed_plate")]
+    chosen = [p for p in CONFIGS if p.stem in ("asymmetric_top", "heavy_top_nutating")]
     outputs = []
     for seed, order in (("1", chosen), ("2", chosen[::-1])):
         command = [sys.executable, __file__, "--digests", *map(str, order)]
@@ -98,7 +98,7 @@ def test_the_bits_are_those_of_every_process() -> None:
         )
         outputs.append(sorted(done.stdout.split("\n")))
     assert outputs[0] == outputs[1]
-    assert len([line for line in outputs[0] if line]) == len(chosen) == 3
+    assert len([line for line in outputs[0] if line]) == len(chosen) == 2
 
 
 if __name__ == "__main__":

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import rigidsim
-from rigidsim.accuracy import cost, taylor_order
-from rigidsim.trial import Setting, Trial, try_setting
+from rigidsim.accuracy.cost import cost
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import Trial, try_setting
 
 _REPEATS = 5
 _OFF = 1.3  # times: counted costs are within that of the measured ones, or want correcting
@@ -31,7 +32,7 @@ class Unit:
     Attributes:
         what: of one step, or of so many samples.
         measured: median.
-        counted: by ``rigidsim.accuracy.cost``.
+        counted: by ``rigidsim.accuracy.cost.cost``.
     """
 
     what: str
@@ -76,7 +77,7 @@ def calibrate() -> list[Unit]:
 def _per_step(setting: Setting) -> float:
     """CPU seconds."""
     trials = _trials(setting, _ENDS[setting.precision], 9)
-    assert trials[0].order == taylor_order(setting)
+    assert trials[0].order == setting.taylor_order
     return float(np.median([t.cpu_seconds / t.steps for t in trials]))
 
 

@@ -13,12 +13,15 @@ import numpy as np
 import rigidsim
 from experiments.certificates.searching import Search, truth_setting
 from experiments.random_scenes import RandomScene
-from rigidsim.accuracy import cost
+from rigidsim.accuracy.comparison import angles_between, exact_times, parts_of
+from rigidsim.accuracy.cost import cost
+from rigidsim.accuracy.motion import motion_of
+from rigidsim.accuracy.reference import references
+from rigidsim.accuracy.setting import Setting, setting_of
+from rigidsim.accuracy.trial import try_setting
 from rigidsim.errors import ConfigError
-from rigidsim.recorded import exact_times, parts_of
-from rigidsim.scene.reading import Experiment, parse_saved
+from rigidsim.scene.config import Experiment, parse_saved
 from rigidsim.scene.scene import build_scene
-from rigidsim.trial import Setting, angles_between, setting_of, try_setting
 
 _MOST_ROWS = 400
 _WIDE_ROWS = 128  # where the truth is a closed form: milliseconds each
@@ -116,7 +119,8 @@ def _judged(scene: RandomScene, experiment: Experiment, run: rigidsim.Run, outco
     with run.dataset as dataset:
         samples = dataset.sizes["time"]
         setting = setting_of(parse_saved(dataset.attrs["config"], source=outcome.kind))
-        reference = truth_setting(experiment, setting, scene, str(accuracy["how"]))
+        kinds = {r.how: r.kind for r in references(setting, motion_of(experiment), scene.accuracy)}
+        reference = truth_setting(experiment, setting, scene, kinds.get(accuracy["how"]))
         most = _WIDE_ROWS if reference.method == "closed_form" else _MOST_ROWS
         rows = np.unique(np.linspace(0, samples - 1, min(samples, most)).astype(int))
         times = exact_times(dataset, rows)

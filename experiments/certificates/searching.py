@@ -1,22 +1,23 @@
 """The truth about a scene, and the cheapest setting that keeps an accuracy.
 
-Costs are counted, since clocks jitter: ``rigidsim.accuracy.cost`` of the steps that were really taken.
+Costs are counted, since clocks jitter: ``rigidsim.accuracy.cost.cost`` of the steps that were really taken.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+
+import mpmath
 
 from experiments.random_scenes import RandomScene
-from rigidsim.accuracy import cost
-from rigidsim.errors import ConfigError
-from rigidsim.scene.context import working_bits
-from rigidsim.scene.reading import Experiment
-from rigidsim.solve.closed import closed_form_of
-from rigidsim.solve.status import Status
-from rigidsim.trial import Setting, Trial, angles_between, trial_scene, try_setting
+from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.cost import cost
+from rigidsim.accuracy.error_law import closed_form_if_any
+from rigidsim.accuracy.reference import Kind
+from rigidsim.accuracy.setting import Setting, epsilon
+from rigidsim.accuracy.trial import Trial, Trials, trial_scene
+from rigidsim.scene.config import Experiment
 
 _LONG = 2000.0  # rad: past it steps take too long to be the truth where there is a closed form
 _TIGHT = 1e-15
@@ -28,21 +29,23 @@ _TOLERANCES: dict[str, tuple[float | None, ...]] = {
 }
 
 
-def truth_setting(experiment: Experiment, setting: Setting, scene: RandomScene, how: str = "") -> Setting:
+def truth_setting(
+    experiment: Experiment, setting: Setting, scene: RandomScene, against: Kind | None = None
+) -> Setting:
     """Twelve digits and more beyond the accuracy, and another precision or method than the certificate's.
 
     Args:
         setting: of the run that is judged.
-        how: what its certificate compared with.
+        against: the kind of reference that its certificate is by.
     """
-    digits = max(60, int(working_bits(setting.precision) * 0.302) + 40)  # and more than the run has
+    digits = max(60, int(setting.bits * 0.302) + 40)  # and more than the run has
     closed = Setting(digits, method="closed_form")
-    if "closed form" not in how or scene.radians > _LONG:
-        if not isinstance(closed_form_of(trial_scene(experiment, Setting()), driven=False), str):
+    if against is not Kind.CLOSED_FORM or scene.radians > _LONG:
+        if closed_form_if_any(trial_scene(experiment, Setting()))[0] is not None:
             return closed
     elif scene.accuracy >= _TIGHT:
         return Setting("quadruple", 1e-30)
-    if working_bits(setting.precision) <= 53 and scene.accuracy >= _TIGHT:
+    if setting.bits <= 53 and scene.accuracy >= _TIGHT:
         return Setting("quadruple", 1e-26)
     return Setting(digits, scene.accuracy * 1e-12)
 
@@ -62,7 +65,7 @@ class Search:
         self,
         experiment: Experiment,
         accuracy: float,
-        times: Sequence[Any],
+        times: Sequence[mpmath.mpf],
         truth: Trial,
         *,
         steps: int = 0,
@@ -76,6 +79,7 @@ class Search:
             below: cost that is known to be enough: only cheaper settings are looked for.
         """
         self._experiment, self._accuracy, self._times, self._truth = experiment, accuracy, times, truth
+        self._trials = Trials(experiment)
         self._given = experiment.config.integrator.model_fields_set
         self._steps = steps
         self.best: Trial | None = None
@@ -89,7 +93,7 @@ class Search:
                 if self._allowed(precision) and self._keeps(Setting(precision, method="closed_form")):
                     break
         for precision, tolerances in _TOLERANCES.items():
-            if self._allowed(precision) and 2.0 ** (1 - working_bits(precision)) < 1e3 * self._accuracy:
+            if self._allowed(precision) and epsilon(precision) < 1e3 * self._accuracy:
                 for held in (False, True):
                     self._bisect([Setting(precision, t, hold_invariants=held) for t in tolerances])
         return self.best
@@ -122,11 +126,8 @@ class Search:
     def _keeps(self, setting: Setting) -> bool:
         if setting.method == "closed_form" and self._cost(setting) >= self.cost:
             return False
-        try:
-            trial = try_setting(self._experiment, setting, self._times, compact=True)
-        except ConfigError:  # nothing to hold, no closed form
-            return False
-        if trial.status is not Status.FINISHED or trial.rows != len(self._times):
+        trial = self._trials.whole(setting, self._times)
+        if trial is None:
             return False
         self._steps = trial.steps or self._steps
         right = float(angles_between(trial.attitudes, self._truth.attitudes).max()) <= self._accuracy

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rigidsim
 from experiments.durability.judging import names
-from experiments.durability.scenes import frequent
+from experiments.durability.scenes import FREQUENT
 from rigidsim.errors import RigidsimError
 
 
@@ -27,7 +27,6 @@ def child(work: Callable[[], object], log: Path) -> int:
         with log.open("a") as file:
             os.dup2(file.fileno(), 2)
         sys.stderr = os.fdopen(2, "w", closefd=False)  # a test's capture has put something else there
-        frequent()
         work()
         code = 0
     except RigidsimError as error:
@@ -49,8 +48,8 @@ def work_on(folder: Path, text: str) -> Callable[[], object]:
     """Begin the run of a folder, or go on with it."""
     begun = (folder / "segments").exists() or (folder / "dataset.h5").exists()
     if begun:
-        return lambda: rigidsim.resume(folder)
-    return lambda: rigidsim.run(rigidsim.parse(text), out=folder.parent, force=True)
+        return lambda: rigidsim.resume(folder, tuning=FREQUENT)
+    return lambda: rigidsim.run(rigidsim.parse(text), out=folder.parent, force=True, tuning=FREQUENT)
 
 
 def await_moment(pid: int, folder: Path, kind: str, delay: float, nth: int) -> bool:

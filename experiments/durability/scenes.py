@@ -9,8 +9,9 @@ import numpy as np
 import xarray
 
 import rigidsim
-from rigidsim.solve import advance, harvest
-from rigidsim.store import segments
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.pacing import Pacing
+from rigidsim.store.segments import SegmentLimits
 
 BODY = """
 [body]
@@ -55,11 +56,8 @@ def text_of(name: str, longer: int = 1) -> str:
     )
 
 
-def frequent() -> None:
-    """Segments some thirty times a second instead of once in thirty seconds, in this process."""
-    segments.SEGMENT_SECONDS = harvest._PATIENCE = 0.03
-    segments.SEGMENT_BYTES = 400_000
-    advance._CHUNK_SECONDS = 0.01
+FREQUENT = Tuning(Pacing(chunk_seconds=0.01, patience=0.03), SegmentLimits(bytes=400_000, seconds=0.03))
+"""Segments some thirty times a second instead of once in thirty seconds."""
 
 
 class Undisturbed:

@@ -16,15 +16,17 @@ import numpy as np
 
 import rigidsim
 from experiments.extremes.scenes import Extreme
-from rigidsim.assembly import assemble
+from rigidsim.accuracy.error_law import motion_growth, round_off_law
 from rigidsim.errors import ConfigError
-from rigidsim.prepare import Prepared, motion_growth, prepare
-from rigidsim.solve.advance import Advance
-from rigidsim.solve.closed import ClosedForm, closed_form_of
-from rigidsim.solve.closed.direct import Direct
-from rigidsim.solve.harvest import Checkpoint
+from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.session.statistics import SampleStatistics
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
-from rigidsim.summary import Watch, estimated_error, round_off_law, warnings
+from rigidsim.store.summary import WarningCode
 
 FACTOR = 3.0
 """Between an error and the law or estimate that covers it."""
@@ -68,36 +70,28 @@ class Verdict:
         )
 
 
-class _Samples:
+class _Samples(SampleReceiver):
     """Keeps everything in memory, and watches it as a run does."""
 
-    def __init__(self, prepared: Prepared, evaluator: Any, name: str) -> None:
+    def __init__(self, prepared: InitialValueProblem, evaluator: Any, name: str) -> None:
         self._prepared, self._evaluator, self._name = prepared, evaluator, name
-        self.watch = Watch()
+        self.statistics = SampleStatistics()
         self.times: list[Any] = []
         self.rows: list[list[Any]] = []
 
-    def take(
-        self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray
-    ) -> None:
-        recorded = self._evaluator.evaluate(states, turns)
+    def take(self, block: SampleBlock) -> None:
+        recorded = self._evaluator.evaluate(block)
         for invariant in self._prepared.system.invariants:
-            self.watch.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
+            self.statistics.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
         exact, exponent = self._prepared.precision.exact, self._prepared.clock.exponent
-        seconds = [mpmath.ldexp(exact(t), exponent) for t in times]
-        factors = self._evaluator.singular_factors(states, turns)
+        seconds = [mpmath.ldexp(exact(t), exponent) for t in block.times]
+        factors = self._evaluator.singular_factors(block.states, block.chart)
         if factors is not None:
-            self.watch.see_singular(factors, np.array([float(t) for t in seconds]))
+            self.statistics.see_singular(factors, np.array([float(t) for t in seconds]))
         self.times += seconds
         with mpmath.workdps(_DIGITS + 20):
             for row in zip(*recorded[self._name], strict=True):
                 self.rows.append([mpmath.fsum(float(x) for x in parts) for parts in zip(*row, strict=True)])
-
-    def due(self) -> bool:
-        return False
-
-    def save(self, checkpoint: Checkpoint) -> None:
-        """Never due."""
 
 
 def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) -> Verdict:
@@ -115,40 +109,30 @@ def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) ->
         return verdict("refused", str(refusal).replace("\n", " "))
     growth = motion_growth(prepared)
     samples = _Samples(prepared, parts.evaluator, "angular_velocity" if column == "rates" else "quaternion")
-    clock, scalar = prepared.clock, prepared.precision
-    advance: Advance | Direct
-    if prepared.closed is not None:
-        advance = Direct(prepared.closed, prepared.system, parts.rhythm, clock, scalar, samples, _never)
-    else:
-        advance = Advance(parts.rhythm, clock, scalar, samples, _never)
-    progress = advance.run()
+    progress = sampler(prepared, parts, samples).run()
     if progress.status is not Status.FINISHED:
         return verdict("refused", f"the run ended: {progress.status.value}")
-    found = warnings(prepared, progress, samples.watch, growth)
-    estimate = estimated_error(prepared, progress, growth, samples.watch)
+    diagnostics = Diagnostics(prepared, progress, samples.statistics, growth)
+    found, estimate = diagnostics.cautions(), diagnostics.estimated_error
     error = _largest_error(scene, column, prepared, samples)
-    epsilon = float(scalar.epsilon)
+    epsilon = float(prepared.precision.epsilon)
     duration = float(samples.times[-1] - samples.times[0])
     tolerance, rate = max(prepared.effective_tolerance, epsilon), float(prepared.system.rate_bound)
     law = round_off_law(tolerance, progress.steps, rate, duration)
     steps = math.sqrt(max(progress.steps, 1))
     last_bits = _CLOSED * epsilon if prepared.closed is not None else epsilon * (_EVALUATION + _WALK * steps)
     bound = last_bits if prepared.closed is not None else FACTOR * law + last_bits
-    doubts = [w for w in found if "joined" not in w and "no effect" not in w]  # the others doubt the digits
-    covered = estimate is not None and error <= FACTOR * estimate + last_bits
+    doubts = [c for c in found if c.code not in (WarningCode.NOT_JOINED, WarningCode.NO_EFFECT)]
+    covered = error <= FACTOR * estimate + last_bits
     kind = "SILENT"
-    if error <= bound and (covered or estimate is None):
+    if error <= bound and covered:
         kind = "right"
     elif doubts or covered:
         kind = "announced"
-    return verdict(kind, "; ".join(found), error, bound, estimate)
+    return verdict(kind, "; ".join(c.text for c in found), error, bound, estimate)
 
 
-def _never(_: object) -> None:
-    return None
-
-
-def _largest_error(scene: Extreme, column: str, prepared: Prepared, samples: _Samples) -> float:
+def _largest_error(scene: Extreme, column: str, prepared: InitialValueProblem, samples: _Samples) -> float:
     form = reference(scene)
     with mpmath.workdps(_DIGITS + 20):
         exact = [form.exactly(time, _DIGITS) for time in samples.times]
@@ -171,10 +155,10 @@ def reference(scene: Extreme) -> ClosedForm:
     """
     text = scene.text("closed_form", _DIGITS)
     if text not in _known:
-        form = closed_form_of(prepare(rigidsim.parse(text)).scene)
-        if isinstance(form, str):
-            raise ValueError(f"{scene.row}, {scene.name}: {form}")
-        _known[text] = form
+        try:
+            _known[text] = closed_form_of(prepare(rigidsim.parse(text)).scene)
+        except NoClosedForm as none:
+            raise ValueError(f"{scene.row}, {scene.name}: {none}") from None
     return _known[text]
 
 

@@ -147,11 +147,9 @@ def reference(name: str, end: float) -> list[Any]:
 
 def closed_form(scene: Scene, end: float) -> list[Any] | None:
     """The final quaternion in closed form to 34 digits; None where there is none."""
-    from rigidsim.prepare import prepare
-    from rigidsim.solve.closed import ClosedForm, closed_form_of
+    from rigidsim.solve.closed_form import find_closed_form
+    from rigidsim.solve.problem import prepare
 
     prepared = prepare(rigidsim.parse(scene.config(end), overrides=["integrator.precision=40"]))
-    form = closed_form_of(prepared.scene)
-    if not isinstance(form, ClosedForm):
-        return None
-    return list(form.exactly(mpmath.mpf(end), 34)[1])
+    form = find_closed_form(prepared.scene)
+    return None if form is None else list(form.exactly(mpmath.mpf(end), 34)[1])

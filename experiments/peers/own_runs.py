@@ -9,7 +9,7 @@ from collections.abc import Callable
 import rigidsim
 from experiments.peers import Answer
 from experiments.peers.scenes import Scene
-from rigidsim.guards import Observer
+from rigidsim.session.guards import Observer
 
 TITLES = {
     "quaternion": "rigidsim, quaternion",

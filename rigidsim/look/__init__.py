@@ -8,12 +8,14 @@ Importing this package loads nothing heavy.
 | `blueprint` | the page that the viewer opens with |
 | `stage` | the three-dimensional scene as numbers: body, arrows, tracks |
 | `drawing` | that scene and the plots as rerun entities |
+| `roles` | residuals, drifts and what was put back, by the variables' attributes |
 | `plots` | which variable goes into which plot |
 | `clock` | seconds to the viewer's integer timelines |
 | `page` | the summary page |
 | `figures` | `save_figure`: dataset to PNG or SVG |
 | `panels` | the single panels of that figure |
+| `work_precision` | the figure of `rigidsim tradeoff`: error against cost |
 | `viewer` | `open_viewer`, `screenshot` |
-| `solids` | triangle meshes of bodies |
+| `solids` | triangle meshes of bodies, from the outlines of their shapes |
 | `thinning` | reading a bounded number of rows of a dataset of any length |
 """

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.look.page import headline, largest_drift
+from rigidsim.look.roles import drifts
 from rigidsim.look.thinning import thin
 
 if TYPE_CHECKING:
@@ -48,13 +47,14 @@ STYLE: dict[str, Any] = {
 }
 
 
-def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
+def save_figure(dataset: xarray.Dataset, path: Path, *, file_format: str | None = None) -> Path:
     """Draw rates, attitude, drifts, polhode and, where it was recorded, position.
 
     Args:
-        dataset: as in interface.md, section 3; what is missing leaves its place to the others. It
-            may be lazy: at most 4000 rows are read.
-        path: `.png` or `.svg`; replaced only when the new file is complete.
+        dataset: of a run; what is missing leaves its place to the others. It may be lazy: at most
+            4000 rows are read.
+        path: the file; it is whole when this returns.
+        file_format: see `figure_format`; by default what the suffix of `path` says.
 
     Returns:
         `path`.
@@ -62,33 +62,34 @@ def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
     Raises:
         ValueError: another suffix, or a dataset without samples.
     """
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        raise ValueError(
-            f"figure {target.name!r}: the suffix must be one of {', '.join(SUFFIXES)}, "
-            f"given {target.suffix!r}"
-        )
+    file_format = file_format or figure_format(path)
     from matplotlib import rc_context
 
     shown = thin(dataset, POINTS).assign_attrs(dataset.attrs)
     # A figure of few points shouldn't understate the drifts, unless reading them all takes long.
     complete = dataset.sizes["time"] <= max(FULL_READ, shown.sizes["time"])
     whole = dataset if complete else shown
-    drifts = {name: largest_drift(whole[name]) for name in map(str, shown) if name.endswith("_drift")}
-    partial = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix.lower()}")
+    largest = {name: largest_drift(drift) for name, drift in drifts(whole).items()}
     # The object-oriented interface: no pyplot, no state that outlives the call.
     with rc_context(STYLE):  # type: ignore[arg-type]
-        figure = _page(shown, drifts=drifts, complete=complete)
-        try:
-            figure.savefig(partial, dpi=160)
-            os.replace(partial, target)
-        finally:
-            with suppress(OSError):  # of a file system that became read-only
-                partial.unlink(missing_ok=True)
-    return target
+        _page(shown, largest=largest, complete=complete).savefig(path, dpi=160, format=file_format)
+    return path
 
 
-def _page(dataset: xarray.Dataset, *, drifts: dict[str, float], complete: bool) -> Figure:
+def figure_format(path: Path) -> str:
+    """What a file's suffix asks for: "png" or "svg".
+
+    Raises:
+        ValueError: another suffix.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise ValueError(
+            f"figure {path.name!r}: the suffix must be one of {', '.join(SUFFIXES)}, given {path.suffix!r}"
+        )
+    return path.suffix.lower()[1:]
+
+
+def _page(dataset: xarray.Dataset, *, largest: dict[str, float], complete: bool) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -117,5 +118,5 @@ def _page(dataset: xarray.Dataset, *, drifts: dict[str, float], complete: bool) 
         grid = outer[-1].subgridspec(len(heights), 1, height_ratios=heights)
         for row, panel in enumerate(spaces):
             panel.draw(figure.add_subplot(grid[row], projection="3d"), dataset)
-        panels.facts(figure.add_subplot(grid[-1]), dataset, drifts=drifts, complete=complete)
+        panels.facts(figure.add_subplot(grid[-1]), dataset, largest=largest, complete=complete)
     return figure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look.plots import pretty_unit
+from rigidsim.look.roles import drifts
 
 if TYPE_CHECKING:
     import xarray
@@ -81,16 +82,13 @@ def largest_drift(variable: xarray.DataArray) -> float:
 
 def _invariants(thinned: xarray.Dataset) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
-    for name in map(str, thinned.data_vars):
-        if not name.endswith("_drift"):
-            continue
-        base = name.removesuffix("_drift")
+    for base, drift in drifts(thinned).items():
         initial = ""
         if base in thinned:
             value = np.asarray(thinned[base].values[0]).ravel()
             unit = pretty_unit(str(thinned[base].attrs.get("units", "")))
             initial = (", ".join(f"{v:.6g}" for v in value) + f" {unit}").rstrip()
-        rows.append((base.replace("_", " "), initial, f"{largest_drift(thinned[name]):.2e}"))
+        rows.append((base.replace("_", " "), initial, f"{largest_drift(drift):.2e}"))
     return rows
 
 

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import cycle, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.page import read_config
+from rigidsim.look.roles import drifts, put_backs
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stage import plane_view
 from rigidsim.look.thinning import thinned_indices
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
+    from mpl_toolkits.mplot3d import Axes3D
 
 Array = NDArray[np.float64]
 
@@ -64,7 +68,7 @@ def si_scale(values: Array, unit: str) -> tuple[float, str]:
     return 10.0**exponent, f"1e{exponent} {unit}"
 
 
-def time_axis(axes: Any, dataset: xarray.Dataset, *, labelled: bool) -> None:
+def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool) -> None:
     """Limits of the run on a panel over time, and the label with its unit on the lowest one."""
     seconds = _seconds(dataset)
     scale, unit = time_scale(seconds)
@@ -83,7 +87,9 @@ def _values(dataset: xarray.Dataset, name: str) -> Array:
     return np.asarray(dataset[name].transpose("time", ...).values, dtype=np.float64)
 
 
-def _curves(axes: Any, dataset: xarray.Dataset, values: Array, labels: list[str], hues: Any) -> None:
+def _curves(
+    axes: Axes, dataset: xarray.Dataset, values: Array, labels: list[str], hues: Sequence[str]
+) -> None:
     seconds = _seconds(dataset)
     time = seconds / time_scale(seconds)[0]
     for column, label, hue in zip(values.T, labels, hues, strict=False):
@@ -99,7 +105,7 @@ def _curves(axes: Any, dataset: xarray.Dataset, values: Array, labels: list[str]
     )
 
 
-def _rates(axes: Any, dataset: xarray.Dataset) -> None:
+def _rates(axes: Axes, dataset: xarray.Dataset) -> None:
     values = _values(dataset, "angular_velocity")
     scale, unit = si_scale(values, "rad/s")
     _curves(axes, dataset, values / scale, ["$ω_x$", "$ω_y$", "$ω_z$"], (X, Y, Z))
@@ -107,7 +113,7 @@ def _rates(axes: Any, dataset: xarray.Dataset) -> None:
     axes.set_ylabel(f"ω [{unit}]")
 
 
-def _attitude(axes: Any, dataset: xarray.Dataset) -> None:
+def _attitude(axes: Axes, dataset: xarray.Dataset) -> None:
     if "euler_angles" in dataset:
         values, labels = _without_growth(dataset, np.rad2deg(_values(dataset, "euler_angles")))
         _curves(axes, dataset, values, labels, PALETTE)
@@ -140,44 +146,37 @@ def _without_growth(dataset: xarray.Dataset, angles: Array) -> tuple[Array, list
     return shown, labels
 
 
-def _drifts(axes: Any, dataset: xarray.Dataset) -> None:
+def _drifts(axes: Axes, dataset: xarray.Dataset) -> None:
     seconds = _seconds(dataset)
     time = seconds / time_scale(seconds)[0]
-    names = _drift_names(dataset)
+    found, projected = drifts(dataset), put_backs(dataset)
     top, low = 0.0, np.inf
-    for name, hue in zip(names, PALETTE * (len(names) // len(PALETTE) + 1), strict=False):
-        magnitude = np.abs(_values(dataset, name)).reshape(len(time), -1).max(axis=1)
+    for (name, drift), hue in zip(found.items(), cycle(PALETTE), strict=False):
+        magnitude = np.abs(_values(dataset, str(drift.name))).reshape(len(time), -1).max(axis=1)
         # Zero has no place on a logarithmic axis: a gap there, not a spike to the frame.
         shown = np.where(magnitude > 0, magnitude, np.nan)
-        label = name.removesuffix("_drift").replace("_", " ")
-        axes.plot(time, shown, color=hue, label=label, lw=0.7, alpha=0.85)
+        axes.plot(time, shown, color=hue, label=name.replace("_", " "), lw=0.7, alpha=0.85)
         curves = [shown]
-        held = name.removesuffix("_drift") + "_put_back"
-        if held in dataset:  # what the drift would have been
-            magnitude = np.abs(_values(dataset, held)).reshape(-1)
+        if name in projected:  # what the drift would have been
+            magnitude = np.abs(_values(dataset, str(projected[name].name))).reshape(-1)
             curves.append(np.where(magnitude > 0, magnitude, np.nan))
             axes.plot(time, curves[-1], color=hue, lw=1.0, ls=(0, (4, 2)))
         for curve in curves:
             if np.isfinite(curve).any():
                 top = max(top, float(np.nanmax(curve)))
                 low = min(low, float(np.nanpercentile(curve, 1)))
-    dashed = any(name.endswith("_put_back") for name in map(str, dataset.data_vars))
-    axes.set_title("Drift of invariants" + (" (dashed: what was put back)" if dashed else ""))
+    axes.set_title("Drift of invariants" + (" (dashed: what was put back)" if projected else ""))
     axes.set_ylabel("relative drift")
     if top > 0:
         axes.set_yscale("log")
         axes.set_ylim(low / 5, top * 8)
     axes.legend(
-        loc="upper left", ncols=2 if len(names) > 3 else 3, borderaxespad=0.2, handlelength=1.2,
+        loc="upper left", ncols=2 if len(found) > 3 else 3, borderaxespad=0.2, handlelength=1.2,
         columnspacing=1.1, labelspacing=0.25,
     )  # fmt: skip
 
 
-def _drift_names(dataset: xarray.Dataset) -> list[str]:
-    return [name for name in map(str, dataset.data_vars) if name.endswith("_drift")]
-
-
-def _polhode(axes: Any, dataset: xarray.Dataset) -> None:
+def _polhode(axes: Axes3D, dataset: xarray.Dataset) -> None:
     values = _values(dataset, "angular_velocity")
     scale, unit = si_scale(values, "rad/s")
     axes.set_title("Polhode: the tip of ω in body axes")
@@ -241,7 +240,7 @@ def _ellipsoid(dataset: xarray.Dataset) -> Array | None:
     return np.asarray(np.sqrt(twice.mean() / moments))
 
 
-def _position(axes: Any, dataset: xarray.Dataset) -> None:
+def _position(axes: Axes3D, dataset: xarray.Dataset) -> None:
     values = _values(dataset, "position")
     scale, unit = si_scale(values, "m")
     axes.set_title("Position in space")
@@ -254,10 +253,10 @@ def _position(axes: Any, dataset: xarray.Dataset) -> None:
     _equal(axes, points, zoom=0.8)
 
 
-def facts(axes: Any, dataset: xarray.Dataset, *, drifts: dict[str, float], complete: bool) -> None:
+def facts(axes: Axes, dataset: xarray.Dataset, *, largest: dict[str, float], complete: bool) -> None:
     """What was run and what was conserved, as a short table.
 
-    `drifts`: largest magnitude by variable; `complete`: whether every sample was read for them.
+    `largest`: magnitude of each invariant's drift; `complete`: whether every sample was read for them.
     """
     config = read_config(dataset)
     integrator = config.get("integrator", {})
@@ -272,11 +271,9 @@ def facts(axes: Any, dataset: xarray.Dataset, *, drifts: dict[str, float], compl
         if value not in (None, "")
     ]
     bound = "" if complete else "≥ "  # of the samples that were read
-    for name in list(drifts)[: max(8 - len(lines), 2)]:
-        label = name.removesuffix("_drift").replace("_", " ")
-        lines.append(
-            (f"largest drift, {label}", f"{bound}{drifts[name]:.1e}" if drifts[name] else f"{bound}0")
-        )
+    for name, drift in islice(largest.items(), max(8 - len(lines), 2)):
+        label = name.replace("_", " ")
+        lines.append((f"largest drift, {label}", f"{bound}{drift:.1e}" if drift else f"{bound}0"))
     axes.set_axis_off()
     for row, (key, value) in enumerate(lines):
         height = 1.0 - row / 8
@@ -284,7 +281,7 @@ def facts(axes: Any, dataset: xarray.Dataset, *, drifts: dict[str, float], compl
         axes.text(0.62, height, value, color="#1b2733", fontsize=9, va="top", clip_on=False)
 
 
-def _frame(axes: Any, labels: list[str], unit: str) -> None:
+def _frame(axes: Axes3D, labels: list[str], unit: str) -> None:
     axes.view_init(*VIEW)
     axes.set_proj_type("ortho")
     for name, label in zip("xyz", labels, strict=True):
@@ -300,7 +297,7 @@ def _eye() -> Array:
     return np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
 
 
-def _ribbon(axes: Any, points: Array) -> None:
+def _ribbon(axes: Axes3D, points: Array) -> None:
     """A curve coloured by time, from dark to light."""
     from matplotlib import colormaps
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
@@ -310,7 +307,7 @@ def _ribbon(axes: Any, points: Array) -> None:
     axes.add_collection3d(Line3DCollection(pieces, colors=hues, linewidths=1.7))
 
 
-def _broken(axes: Any, points: Array, keep: NDArray[np.bool_], **style: Any) -> None:
+def _broken(axes: Axes3D, points: Array, keep: NDArray[np.bool_], **style: Any) -> None:
     axes.plot(*np.where(keep[:, None], points, np.nan).T, **style)
 
 
@@ -319,7 +316,7 @@ def _evenly(points: Array) -> Array:
     return points[thinned_indices(len(points), 2000)]
 
 
-def _equal(axes: Any, points: Array, *, zoom: float) -> None:
+def _equal(axes: Axes3D, points: Array, *, zoom: float) -> None:
     from matplotlib.ticker import MaxNLocator
 
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
@@ -344,6 +341,6 @@ def _has(*names: str) -> Callable[[xarray.Dataset], bool]:
 CURVES = (
     Panel(_has("angular_velocity"), _rates),
     Panel(_has("euler_angles", "quaternion"), _attitude),
-    Panel(lambda dataset: bool(_drift_names(dataset)), _drifts),
+    Panel(lambda dataset: bool(drifts(dataset)), _drifts),
 )
 SPACES = (Panel(_has("angular_velocity"), _polhode), Panel(_has("position"), _position))

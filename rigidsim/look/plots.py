@@ -1,4 +1,4 @@
-"""Which variable goes into which plot: decided from names, dimensions and units alone.
+"""Which variable goes into which plot: decided from dimensions, units and attributes alone.
 
 A new observable or invariant needs no line here: it gets a plot of its own, or joins the plot of
 the scalars that share its unit.
@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rigidsim.look.roles import drift_of, put_back_of
 
 if TYPE_CHECKING:
     import xarray
@@ -75,12 +77,12 @@ def plan_plots(dataset: xarray.Dataset) -> list[Plot]:
     """
     plots: dict[str, Plot] = {}
     variables = list(_variables(dataset))
-    floor = drift_floor([_columns(v) for v in variables if str(v.name).endswith("_drift")])
+    floor = drift_floor([_columns(v) for v in variables if drift_of(v)])
     for variable in variables:
         name = str(variable.name)
         unit = str(variable.attrs.get("units", ""))
         vector = variable.ndim > 1
-        if name.endswith(("_drift", "_put_back")):
+        if drift_of(variable) or put_back_of(variable):
             key, title, place = "drift", "Drift of invariants, log10", "drift"
         elif vector:
             # The name, not the long name: it is short, and what the user meets in the dataset.
@@ -154,8 +156,9 @@ def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
     name = str(variable.name)
     values = _columns(variable)
     count = values.shape[1]
-    if name.endswith(("_drift", "_put_back")):  # the latter: what the drift would have been
-        labels = [name.removesuffix("_drift").replace("_", " ")]
+    drifting, projected = drift_of(variable), put_back_of(variable)
+    if drifting or projected:  # the latter: what the drift would have been
+        labels = [(drifting or f"{projected} put back").replace("_", " ")]
         values = np.log10(np.maximum(np.abs(values), floor))
     elif variable.ndim == 1:
         labels = [name.replace("_", " ")]

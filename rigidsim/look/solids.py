@@ -7,18 +7,23 @@ sharp colours; normals point outwards and are smooth where the solid is.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.scene import rotations
+from rigidsim.scene.outlines import THINNESS, Arc, Box, Ellipsoid, Line, Outline, Revolved
+from rigidsim.scene.shapes import SHAPES
+
 Array = NDArray[np.float64]
 
 SEGMENTS = 64  # around the axis; a multiple of 8, so that colour sectors end on an edge
-MINOR_SEGMENTS = 32  # around a tube or from pole to pole
-THINNESS = 0.02  # thickness of an ideally thin solid, of its largest dimension
+MINOR_SEGMENTS = 32  # along an arc: around a tube or from pole to pole
+POINT = "point"
+"""A point mass, which is no shape: it is drawn as a ball."""
 
 # Faces of a cuboid carry the colour of the body axis that they face; the negative side is darker.
 _AXIS_COLORS = ((214, 84, 76), (92, 172, 98), (78, 128, 205))
@@ -71,24 +76,21 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
     """Mesh of one solid about its own centre of mass, in its own axes.
 
     Args:
-        solid: a name in `SOLIDS`.
-        dimensions: metres; cuboid `size` [3]; plate `size` [2] (normal z); ellipsoid
-            `semi_axes` [3]; sphere, spherical_shell `radius`; cylinder, cone `radius`, `height`
-            (axis z, apex of the cone towards -z); rod `length` (along z); disk, ring `radius`
-            (normal z); torus `major_radius`, `minor_radius` (axis z); tube `inner_radius`,
-            `outer_radius`, `height`; point `radius`.
+        solid: a name in ``rigidsim.scene.shapes.SHAPES``.
+        dimensions: metres, those of the shape.
 
     Raises:
-        ValueError: an unknown solid, a dimension that is missing, negative or not finite, or a solid
-            without any extent.
+        ValueError: an unknown solid, a dimension that is missing, negative, too large or not finite, or a
+            solid without any extent.
 
     A dimension of zero is drawn as a fiftieth of the largest one.
     """
-    if solid not in SOLIDS:
-        raise ValueError(f"drawing: unknown solid {solid!r}; known are {', '.join(sorted(SOLIDS))}")
-    keys, build = SOLIDS[solid]
-    values = []
-    for key, length in keys:
+    if solid not in SHAPES:
+        known = ", ".join(sorted([*SHAPES, POINT]))
+        raise ValueError(f"drawing: unknown solid {solid!r}; known are {known}")
+    shape = SHAPES[solid]
+    given: dict[str, Array] = {}
+    for key, length in shape.dimensions.items():
         if key not in dimensions:
             raise ValueError(f"drawing: {solid} needs dimension {key!r}, given {list(dimensions)}")
         value = np.asarray(dimensions[key], dtype=float)
@@ -96,14 +98,30 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
             raise ValueError(
                 f"drawing: {solid} {key} must be {length} finite number(s) >= 0, given {dimensions[key]!r}"
             )
-        values.append(value.reshape(length))
-    largest = max(value.max() for value in values)
+        given[key] = value.reshape(length)
+    largest = max(value.max() for value in given.values())
     if largest == 0:
         raise ValueError(f"drawing: {solid} has no extent, given {dict(dimensions)}")
+    if shape.at_most is not None:
+        small, large = shape.at_most
+        if given[small] > given[large]:
+            sizes = f"{small} {given[small][0]:g} exceeds {large} {given[large][0]:g}"
+            raise ValueError(f"drawing: {solid} {sizes}")
     # Ideal rods and plates have no thickness; a picture of them needs some.
-    values = [np.maximum(value, THINNESS * largest) for value in values]
-    arguments = [value if value.size > 1 else float(value[0]) for value in values]
-    return build(*arguments)
+    return _mesh(
+        shape.outline({key: np.maximum(value, THINNESS * largest).tolist() for key, value in given.items()})
+    )
+
+
+def _mesh(outline: Outline) -> Mesh:
+    match outline:
+        case Box(x, y, z):
+            return _box(x, y, z)
+        case Ellipsoid(x, y, z):
+            return _ball(x, y, z)
+        case Revolved(pieces):
+            profile, normals = zip(*map(_profile, pieces), strict=True)
+            return _revolve(np.concatenate(profile), np.concatenate(normals))
 
 
 def body_meshes(drawing: str | None) -> list[Mesh]:
@@ -125,7 +143,7 @@ def body_meshes(drawing: str | None) -> list[Mesh]:
     placed = [_placement(entry) for entry in solids]
     extended = [
         None
-        if entry["solid"] == "point"
+        if entry["solid"] == POINT
         else solid_mesh(entry["solid"], entry.get("dimensions", {})).moved(*place)
         for entry, place in zip(solids, placed, strict=True)
     ]
@@ -146,20 +164,15 @@ def body_meshes(drawing: str | None) -> list[Mesh]:
 
 def point_positions(drawing: str | None) -> Array:
     """Positions (P, 3) of the point masses of a `drawing`, body axes, metres; P may be 0."""
-    points = [_placement(e)[1] for e in _parse(drawing) if e["solid"] == "point"]
+    points = [_placement(e)[1] for e in _parse(drawing) if e["solid"] == POINT]
     return np.array(points, dtype=float).reshape(-1, 3)
 
 
 def rotation_matrix(quaternion: Sequence[float] | Array) -> Array:
     """Rotation matrices (..., 3, 3) of quaternions (..., 4) [w, x, y, z] of any norm > 0."""
     q = np.asarray(quaternion, dtype=float)
-    w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    unit = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
+    return np.moveaxis(np.array(rotations.rotation_matrix(list(unit))), (0, 1), (-2, -1))
 
 
 def _parse(drawing: str | None) -> list[dict[str, Any]]:
@@ -250,72 +263,24 @@ def _revolve(profile: Array, normals: Array, segments: int = SEGMENTS) -> Mesh:
     return _soup(corners, split(*quads(normals)), colors)
 
 
-def _polygon(points: Sequence[tuple[float, float]], segments: int = SEGMENTS) -> Mesh:
-    """Revolved polyline with flat pieces, each split at half height for its two colours."""
-    nodes = np.array(points, dtype=float)
-    start, stop = nodes[:-1], nodes[1:]
-    middle = (start + stop) / 2
-    pieces = np.concatenate([np.stack([start, middle], 1), np.stack([middle, stop], 1)])
-    along = pieces[:, 1] - pieces[:, 0]
-    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    return _revolve(pieces, np.repeat(outward[:, None], 2, axis=1), segments)
-
-
-def _round(center: float, radius: float, start: float, stop: float, rings: int) -> Array:
-    """Arc pieces (rings, 2, 2) of a circle about (center, 0), angles from the radial axis."""
-    angle = np.linspace(start, stop, rings + 1)
-    nodes = np.stack([center + radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    nodes[np.abs(nodes) < 1e-15 * (center + radius)] = 0.0
-    return np.stack([nodes[:-1], nodes[1:]], axis=1)
+def _profile(piece: Line | Arc, rings: int = MINOR_SEGMENTS) -> tuple[Array, Array]:
+    """Straight pieces of an outline, and the normals at their ends, as ``_revolve`` takes them."""
+    if isinstance(piece, Line):  # in two, for its two colours
+        nodes = np.linspace(piece.start, piece.stop, 3)
+        along = nodes[-1] - nodes[0]
+        normals = np.tile([along[1], -along[0]] / np.hypot(*along), (3, 1))
+    else:
+        angle = np.linspace(piece.start, piece.stop, rings + 1)
+        outward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        nodes = np.array(piece.center) + piece.radius * outward
+        nodes[np.abs(nodes) < 1e-15 * np.abs(nodes).max()] = 0.0
+        normals = outward * np.sign(piece.stop - piece.start)
+    return np.stack([nodes[:-1], nodes[1:]], axis=1), np.stack([normals[:-1], normals[1:]], axis=1)
 
 
 def _ball(a: float, b: float, c: float, segments: int = SEGMENTS, rings: int = MINOR_SEGMENTS) -> Mesh:
-    arc = _round(0.0, 1.0, -np.pi / 2, np.pi / 2, rings)
-    unit = _revolve(arc, arc, segments)
+    unit = _revolve(*_profile(Arc((0.0, 0.0), 1.0, -np.pi / 2, np.pi / 2), rings), segments)
     axes = np.array([a, b, c])
     normals = unit.normals / axes
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return Mesh(unit.vertices * axes, unit.triangles, normals, unit.colors)
-
-
-def _cylinder(radius: float, height: float) -> Mesh:
-    h = height / 2
-    return _polygon([(0, -h), (radius, -h), (radius, h), (0, h)])
-
-
-def _cone(radius: float, height: float) -> Mesh:
-    # The centre of mass is 3/4 of the height from the apex, which points to -z.
-    apex, base = -0.75 * height, 0.25 * height
-    return _polygon([(0, apex), (radius, base), (0, base)])
-
-
-def _torus(major: float, minor: float) -> Mesh:
-    arc = _round(major, minor, -np.pi, np.pi, MINOR_SEGMENTS)
-    normals = (arc - np.array([major, 0.0])) / minor
-    return _revolve(arc, normals)
-
-
-def _tube(inner: float, outer: float, height: float) -> Mesh:
-    if inner > outer:
-        raise ValueError(f"drawing: tube inner_radius {inner:g} exceeds outer_radius {outer:g}")
-    inner = min(inner, (1 - THINNESS) * outer)  # a wall without thickness is drawn with some
-    h = height / 2
-    return _polygon([(inner, -h), (outer, -h), (outer, h), (inner, h), (inner, -h)])
-
-
-SOLIDS: dict[str, tuple[tuple[tuple[str, int], ...], Callable[..., Mesh]]] = {
-    "cuboid": ((("size", 3),), lambda s: _box(*s)),
-    "plate": ((("size", 2),), lambda s: _box(s[0], s[1], THINNESS * max(s))),
-    "ellipsoid": ((("semi_axes", 3),), lambda s: _ball(*s)),
-    "sphere": ((("radius", 1),), lambda r: _ball(r, r, r)),
-    "spherical_shell": ((("radius", 1),), lambda r: _ball(r, r, r)),
-    "point": ((("radius", 1),), lambda r: _ball(r, r, r, segments=32, rings=16)),
-    "cylinder": ((("radius", 1), ("height", 1)), _cylinder),
-    "cone": ((("radius", 1), ("height", 1)), _cone),
-    "rod": ((("length", 1),), lambda h: _cylinder(THINNESS * h, h)),
-    "disk": ((("radius", 1),), lambda r: _cylinder(r, 2 * THINNESS * r)),
-    "ring": ((("radius", 1),), lambda r: _torus(r, 2 * THINNESS * r)),
-    "torus": ((("major_radius", 1), ("minor_radius", 1)), _torus),
-    "tube": ((("inner_radius", 1), ("outer_radius", 1), ("height", 1)), _tube),
-}

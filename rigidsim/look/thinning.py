@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look.roles import is_residual
+
 if TYPE_CHECKING:
     import xarray
 
-
-_ROWS_AT_ONCE = 1 << 21
+ROWS_AT_ONCE = 1 << 21
 
 
 def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
@@ -32,11 +33,14 @@ def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
     return indices if indices[-1] == count - 1 else np.append(indices, count - 1)
 
 
-def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
-    """The rows of `thinned_indices`, in memory; residuals `<variable>_lo` are left out.
+def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xarray.Dataset:
+    """The rows of `thinned_indices`, in memory; residuals are left out.
 
     Only variables that have a time dimension, and of those only the rows asked for, are read:
     memory goes with `rows`, not with the length of the run.
+
+    Args:
+        at_once: rows of the file that one read spans.
 
     Raises:
         ValueError: no `time` dimension or coordinate, or see `thinned_indices`.
@@ -48,13 +52,13 @@ def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
     names = [
         str(name)
         for name, variable in dataset.data_vars.items()
-        if "time" in variable.dims and variable.dtype.kind in "fiub" and not _is_residual(str(name), dataset)
+        if "time" in variable.dims and variable.dtype.kind in "fiub" and not is_residual(variable)
     ]
     wanted = dataset[names]
     stride = _stride(count, rows)
     # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
     # kilobytes of notes for every chunk that it touches, hence pieces.
-    piece = stride * max(1, _ROWS_AT_ONCE // stride)
+    piece = stride * max(1, at_once // stride)
     slices = [slice(first, min(first + piece, count), stride) for first in range(0, count, piece)]
     if (count - 1) % stride:
         slices.append(slice(count - 1, count))
@@ -71,8 +75,3 @@ def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
 
 def _stride(count: int, rows: int) -> int:
     return max(1, -(-(count - 1) // (rows - 1)))
-
-
-def _is_residual(name: str, dataset: xarray.Dataset) -> bool:
-    base, _, tail = name.rpartition("_")
-    return tail in ("lo", "lo2") and base in dataset

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import errno
-import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
     import xarray
 
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
-
-
 _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
@@ -32,10 +29,9 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     """Write a dataset as a rerun recording with its own layout.
 
     Args:
-        dataset: as in interface.md, section 3, any part of it: what is missing isn't shown, every
-            other numeric variable along time gets a plot. It may be lazy: only the rows shown are
-            read.
-        path: the file, replaced only when the new one is complete.
+        dataset: of a run, or any part of it: what is missing isn't shown, every other numeric
+            variable along time gets a plot. It may be lazy: only the rows shown are read.
+        path: the file; it is whole when this returns.
         rows: at most so many rows are shown, evenly strided, with the first and the last.
 
     Returns:
@@ -63,8 +59,8 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
         plots.append(Plot("time_seconds", "Time [s]", "more", [series]))
     page = summary_page(dataset, shown, notes)
 
-    _check_room(Path(path), count)
-    with _strict(), _replacing(Path(path)) as partial:
+    _check_room(path, count)
+    with _strict():
         from rigidsim.look.blueprint import build_blueprint
         from rigidsim.look.drawing import draw_plot_styles, draw_rows, draw_static
 
@@ -73,13 +69,13 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
         with rr.RecordingStream("rigidsim") as recording:
             if not rr.is_enabled(recording):
                 raise RuntimeError("RERUN is set to off in the environment: unset it")
-            recording.save(partial, default_blueprint=blueprint)
+            recording.save(path, default_blueprint=blueprint)
             recording.send_recording_name(title_of(dataset))
             recording.log("/summary", rr.TextDocument(page, media_type=rr.MediaType.MARKDOWN), static=True)
             draw_static(recording, stages)
             draw_plot_styles(recording, plots)
             for start in range(0, count, CHUNK):
-                _check_room(Path(path), count - start)
+                _check_room(path, count - start)
                 part = slice(start, min(start + CHUNK, count))
                 ticks = clock.ticks[part]
                 time = (
@@ -115,18 +111,6 @@ def _strict() -> Iterator[None]:
         yield
     finally:
         set_strict_mode(before)
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """A temporary name in the same folder that becomes `path` when the block succeeds."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield partial
-        os.replace(partial, path)
-    finally:
-        with suppress(OSError):  # of a file system that became read-only
-            partial.unlink(missing_ok=True)
 
 
 def _check_room(path: Path, rows: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +30,7 @@ def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
     """Draw a tradeoff dataset as a page: the plot, and beside it what its numbered points are.
 
     Args:
-        path: PNG or SVG; replaced only when the new file is complete.
+        path: the file, PNG whatever its suffix; it is whole when this returns.
     """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -48,12 +47,7 @@ def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
         figure.set_layout_engine("none")  # the numbers are placed by what is drawn now
         error, cost, front = _plotted(dataset)
         _number(left, cost[front], error[front])
-        partial = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
-        try:
-            figure.savefig(partial, dpi=130, format=path.suffix[1:])
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
+        figure.savefig(path, dpi=130, format="png")
     return path
 
 

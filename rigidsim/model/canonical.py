@@ -14,13 +14,13 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
-from rigidsim.model.dynamics import Number, ScaledNumbers
 from rigidsim.model.formulations import AttitudeStates, euler_states
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.rotations import Expression
+from rigidsim.model.numbers import Rounder, ScaledNumbers
+from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude as numeric
-from rigidsim.scene.context import apply, dot, multiply
+from rigidsim.scene.arithmetic import apply, dot, multiply, negligible
 from rigidsim.scene.scene import Scene
 
 MOMENTA = ["p_phi", "p_theta", "p_psi"]
@@ -37,12 +37,12 @@ class CanonicalStates:
     """
 
     attitude: AttitudeStates
-    rates: list[Expression]
+    rates: list[Symbolic]
     initial_momenta: list[Any]
 
 
 def canonical_states(
-    scene: Scene, scaling: Scaling, numbers: ScaledNumbers, number: Number
+    scene: Scene, scaling: Scaling, numbers: ScaledNumbers, number: Rounder
 ) -> CanonicalStates:
     """Set the angles and momenta up."""
     context, sequence = scene.context, scene.config.integrator.euler_sequence
@@ -56,7 +56,7 @@ def canonical_states(
     largest = max(abs(x) for row in numbers.inverse_inertia for x in row)
     rates = []
     for row in numbers.inverse_inertia:
-        tiny = largest * context.mpf(2) ** (24 - context.prec)
+        tiny = largest * negligible(context)
         terms = [number(x) * m for x, m in zip(row, body, strict=True) if abs(x) > tiny]
         rates.append(hy.sum(terms) if terms else hy.expression(0.0))
     attitude = euler_states(scene, rates)
@@ -79,7 +79,7 @@ def _initial_momenta(scene: Scene, scaling: Scaling, angles: list[Any]) -> list[
     return projections
 
 
-def hamilton_equations(m: Mechanics) -> list[Expression]:
+def hamilton_equations(m: Mechanics) -> list[Symbolic]:
     """Right-hand sides for the three angles, then the three momenta.
 
     Raises:

@@ -14,14 +14,14 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.rotations import Expression
+from rigidsim.model.rotations import Symbolic
 
 _THRESHOLD = 1e-6
 _DAY = 86400.0
 
 
 @dataclass(frozen=True)
-class Place:
+class SourcePosition:
     """A geocentric direction and distance.
 
     Attributes:
@@ -29,15 +29,15 @@ class Place:
         inverse_distance: mean distance over distance.
     """
 
-    direction: list[Expression]
-    inverse_distance: Expression
+    direction: list[Symbolic]
+    inverse_distance: Symbolic
 
 
 MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}
-"""Metres; the unit of ``Place.inverse_distance``."""
+"""Metres; the unit of ``SourcePosition.inverse_distance``."""
 
 
-def place(body: str, seconds: Expression) -> Place:
+def source_position(body: str, seconds: Symbolic) -> SourcePosition:
     """Where the Sun or the Moon is.
 
     Args:
@@ -53,4 +53,4 @@ def place(body: str, seconds: Expression) -> Place:
         kilometres = hy.model.elp2000_cartesian_e2000(time_expr=centuries, thresh=_THRESHOLD)
         position = [x * (1.0 / 384400.0) for x in kilometres]
     inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in position]))
-    return Place([x * inverse for x in position], inverse)
+    return SourcePosition([x * inverse for x in position], inverse)

@@ -7,22 +7,20 @@ and Euler angles as expressions of its states.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import heyoka as hy
 
 from rigidsim.model import rotations
-from rigidsim.model.rotations import Expression, ExpressionMatrix
+from rigidsim.model.rotations import Symbolic, SymbolicMatrix
+from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene import attitude
 from rigidsim.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from rigidsim.model.loads import ExtraStates
 
 
 @dataclass(frozen=True)
 class OrbitalFrame:
-    """What an attitude gives that is carried relative to a circular orbit (``rigidsim.model.orbital``).
+    """What an attitude gives that is carried relative to a circular orbit (``rigidsim.model.orbital_frame``).
 
     Attributes:
         direction: unit vector towards the attracting body, body axes.
@@ -30,9 +28,9 @@ class OrbitalFrame:
         states: the orbit's own, from which attitudes in space follow.
     """
 
-    direction: list[Expression]
-    normal: list[Expression]
-    states: ExtraStates
+    direction: list[Symbolic]
+    normal: list[Symbolic]
+    states: StateBlock
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class AttitudeStates:
         initial: mpf values.
         matrix: R, body to space, as expressions of the states.
         quaternion: [w, x, y, z] as expressions; see ``quaternion_sign``.
-        quaternion_sign: how it is made continuous: "state" (it is one), "winding" (it changes sign with
+        quaternion_sign: how it is made continuous: "state" (it is one), "wrapping" (it changes sign with
             each full turn of an angle) or "nearest" (the sign nearest to the sample before).
         angles: positions within ``names`` of states that are angles and grow without bound.
         defect: name, long name and expression of what should stay constant by construction, or None.
@@ -56,24 +54,24 @@ class AttitudeStates:
 
     kind: str
     names: list[str]
-    derivatives: list[Expression]
+    derivatives: list[Symbolic]
     initial: list[Any]
-    matrix: ExpressionMatrix
-    quaternion: list[Expression]
+    matrix: SymbolicMatrix
+    quaternion: list[Symbolic]
     quaternion_sign: str
     angles: tuple[int, ...] = ()
-    defect: tuple[str, str, Expression] | None = None
-    singular_factor: Expression | None = None
+    defect: tuple[str, str, Symbolic] | None = None
+    singular_factor: Symbolic | None = None
     sequence: str = field(default="")
     orbital: OrbitalFrame | None = None
 
     @property
-    def variables(self) -> list[Expression]:
+    def variables(self) -> list[Symbolic]:
         """The states as heyoka variables."""
         return list(hy.make_vars(*self.names))
 
 
-def quaternion_kinematics(q: list[Expression], rates: list[Expression]) -> list[Expression]:
+def quaternion_kinematics(q: list[Symbolic], rates: list[Symbolic]) -> list[Symbolic]:
     """q (0, w) / 2 for a quaternion [w, x, y, z] and rates in body axes."""
     w, x, y, z = q
     p, r, s = rates
@@ -85,7 +83,7 @@ def quaternion_kinematics(q: list[Expression], rates: list[Expression]) -> list[
     ]
 
 
-def quaternion_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
+def quaternion_states(scene: Scene, rates: list[Symbolic]) -> AttitudeStates:
     """Four states, no singularity: q' = q (0, w) / 2 (the cheapest and the default)."""
     names = ["qw", "qx", "qy", "qz"]
     q = list(hy.make_vars(*names))
@@ -103,11 +101,11 @@ def quaternion_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
     )
 
 
-def euler_states(scene: Scene, rates: list[Expression], sequence: str | None = None) -> AttitudeStates:
+def euler_states(scene: Scene, rates: list[Symbolic], sequence: str | None = None) -> AttitudeStates:
     """Three angles; singular where the middle one makes the outer axes parallel.
 
     Args:
-        sequence: another than the scene's (its partner, see ``rigidsim.model.charts``).
+        sequence: another than the scene's (its partner, see ``rigidsim.model.euler_charts``).
     """
     asked = scene.config.integrator.euler_sequence
     sequence = sequence or asked
@@ -125,14 +123,14 @@ def euler_states(scene: Scene, rates: list[Expression], sequence: str | None = N
         list(initial),
         rotations.euler_matrix(sequence, angles),
         rotations.quaternion_from_euler(sequence, angles),
-        "winding",
+        "wrapping",
         angles=(0, 1, 2),
         singular_factor=factor,
         sequence=sequence,
     )
 
 
-def matrix_states(scene: Scene, rates: list[Expression]) -> AttitudeStates:
+def matrix_states(scene: Scene, rates: list[Symbolic]) -> AttitudeStates:
     """Nine direction cosines: R' = R [w]x."""
     names = [f"r{i}{j}" for i in "123" for j in "123"]
     flat = list(hy.make_vars(*names))

@@ -1,6 +1,6 @@
-"""The registry of observables and invariants: everything that can be recorded, as expressions.
+"""Observables and invariants: everything that can be recorded, as expressions of the state.
 
-A new observable is one ``Observable`` in ``OBSERVABLES``; a new invariant one whose ``conserved`` says when
+A new observable is one ``Observable`` in the list below; a new invariant one whose ``conserved`` says when
 and why it holds. It then shows up in the dataset, the summary, the plots and the timeline.
 """
 
@@ -12,12 +12,19 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model import integrable, rotations
-from rigidsim.model.loads import CentralGravityModel
+from rigidsim.model import first_integrals, rotations
+from rigidsim.model.drift_scales import (
+    attracting_point,
+    energy_scale,
+    linear_momentum_scale,
+    momentum_scale,
+    rotational_scale,
+    total_momentum_scale,
+)
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.rotations import Expression
-from rigidsim.model.scaling import orbital_rate, potential_amplitude, tidal_amplitude
-from rigidsim.scene.context import apply, cross, dot, norm
+from rigidsim.model.needs import NEEDS
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.registry import register_observable
 
 Dims = tuple[str, ...]
 BODY: Dims = ("body_axis",)
@@ -28,9 +35,23 @@ def _never(_: Mechanics) -> str | None:
     return None
 
 
+def _as_it_is(_: Mechanics) -> str:
+    return ""
+
+
+def always(_: Mechanics) -> bool:
+    """Recorded wherever a scene has it, unless the config names what to record."""
+    return True
+
+
+def only_when_named(_: Mechanics) -> bool:
+    """Recorded only where ``[output] record`` names it."""
+    return False
+
+
 @dataclass(frozen=True)
 class Observable:
-    """One recordable quantity.
+    """One recordable quantity; one of your own enters by ``rigidsim.scene.registry.register_observable``.
 
     Attributes:
         name: of the dataset's variable.
@@ -38,88 +59,38 @@ class Observable:
         units: SI.
         long_name: for readers.
         frame: "body axes", "space axes" or "".
-        needs: what must be carried: "attitude", "vertical", "flight", "gravity", "symmetry", ...
-        expressions: components as expressions of the state, in internal units.
-        exponents: binary exponents of the components' internal units.
+        expressions: components as expressions of the state, in internal units (see ``Kinematics``).
+        exponents: binary exponents of the components' internal units; None where they are in SI.
+        needs: what the scene must have, names of ``rigidsim.model.needs.NEEDS``.
         conserved: why it is an invariant of this scene, or None where it isn't.
         drift_scale: scale of its drift in SI (mpf), with a name for it.
+        by_default: whether it is recorded where the config names nothing.
+        continuity: how samples are joined, see ``rigidsim.model.outputs.Recorded``.
     """
 
     name: str
     dims: Dims
     units: str
     long_name: str
-    expressions: Callable[[Mechanics], list[Expression]]
-    exponents: Callable[[Mechanics], list[int]]
+    expressions: Callable[[Mechanics], list[Symbolic]]
+    exponents: Callable[[Mechanics], list[int]] | None = None
     frame: str = ""
     needs: tuple[str, ...] = ()
     conserved: Callable[[Mechanics], str | None] = _never
     drift_scale: Callable[[Mechanics], tuple[Any, str]] | None = None
+    by_default: Callable[[Mechanics], bool] = always
+    continuity: Callable[[Mechanics], str] = _as_it_is
 
+    def available(self, m: Mechanics) -> bool:
+        """Whether the scene has all that it needs."""
+        return all(NEEDS[need].met(m) for need in self.needs)
 
-def _driven(m: Mechanics) -> Any:
-    """Energy that loads of unknown size are estimated to add, J."""
-    return m.scene.context.zero if m.scaling.drive is None else m.scaling.drive.energy
-
-
-def momentum_scale(m: Mechanics) -> tuple[Any, str]:
-    """abs(L) at the start, or the momentum that gravity can build up, if that is larger."""
-    scene, context = m.scene, m.scene.context
-    initial = norm(context, apply(scene.body.inertia, scene.angular_velocity))
-    fed = potential_amplitude(scene) + tidal_amplitude(scene) + _driven(m)
-    swing = context.sqrt(2 * max(scene.body.principal_moments) * fed)
-    swing = max(swing, max(scene.body.principal_moments) * orbital_rate(scene))
-    if initial == 0 and swing == 0:
-        return context.one, "1 kg m^2/s (the body is at rest)"
-    if initial >= swing:
-        return initial, "initial norm of the angular momentum"
-    return swing, "angular momentum that the loads can build up"
-
-
-def rotational_scale(m: Mechanics) -> tuple[Any, str]:
-    """Initial rotational energy, plus M g l about a fixed point."""
-    scene, context = m.scene, m.scene.context
-    momentum = apply(scene.body.inertia, scene.angular_velocity)
-    kinetic = dot(scene.angular_velocity, momentum) / 2
-    carried = max(scene.body.principal_moments) * orbital_rate(scene) ** 2 / 2
-    amplitude = potential_amplitude(scene) + tidal_amplitude(scene) + carried + _driven(m)
-    if kinetic + amplitude == 0:
-        return context.one, "1 J (the body is at rest)"
-    name = "initial rotational energy" + (" plus that of the loads" if amplitude else "")
-    return kinetic + amplitude, name
-
-
-def energy_scale(m: Mechanics) -> tuple[Any, str]:
-    """As ``rotational_scale``, plus the largest kinetic energy of the flight."""
-    scene, context = m.scene, m.scene.context
-    scale, name = rotational_scale(m)
-    if m.velocity is None or scene.velocity is None:
-        return scale, name
-    pull = norm(context, scene.gravity) if scene.gravity else context.zero
-    swiftest = norm(context, scene.velocity) + pull * (scene.end - scene.start)
-    if m.scaling.drive is not None:
-        swiftest += m.scaling.drive.speed
-    flight = scene.body.mass * swiftest**2 / 2
-    return (scale + flight if flight else scale), name + " plus the flight's largest kinetic energy"
-
-
-def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
-    """M abs(v) at the start."""
-    assert m.scene.velocity is not None
-    value = m.scene.body.mass * norm(m.scene.context, m.scene.velocity)
-    return (value, "initial norm of the linear momentum") if value else (m.scene.context.one, "1 kg m/s")
+    def unit_exponents(self, m: Mechanics, count: int) -> list[int]:
+        """One for each of ``count`` components."""
+        return [0] * count if self.exponents is None else self.exponents(m)
 
 
 WORK = "work"
-
-
-def work_is_needed(m: Mechanics) -> bool:
-    """Whether the energy balance is checked by integrating power: where energy isn't conserved and Jacobi's
-    constant doesn't stand in for it.
-    """
-    has_energy = m.velocity is not None or not m.scene.free_flight
-    has_jacobi = m.attitude is not None and m.jacobi is not None
-    return has_energy and not m.conserves_energy and not has_jacobi and m.power is not None
 
 
 def _torque_free(m: Mechanics) -> str | None:
@@ -133,21 +104,20 @@ def _conservative(m: Mechanics) -> str | None:
 
 
 def _vertical_only(m: Mechanics) -> str | None:
-    others = [load for load in m.loads if load.title != "uniform_gravity" and load.torque(m)]
+    others = [load for load in m.loads if load.about_vertical and load.torque(m)]
     return None if others else "gravity has no torque about the vertical"
 
 
 def _central(m: Mechanics) -> str | None:
-    centers = [load for load in m.loads if isinstance(load, CentralGravityModel)]
-    return "the only load is a central force" if len(m.loads) == len(centers) == 1 else None
+    alone = len(m.loads) == 1 and m.loads[0].attracting_point is not None
+    return "the only load is a central force" if alone else None
 
 
-def _total_momentum(m: Mechanics) -> list[Expression]:
+def _total_momentum(m: Mechanics) -> list[Symbolic]:
     """M r x v + R I w about the (first) attracting point."""
     context, scaling = m.scene.context, m.scaling
-    center = next(load for load in m.loads if isinstance(load, CentralGravityModel))
     offset = []
-    for x, a in zip(m.carried(m.position), center.spec.position, strict=True):
+    for x, a in zip(m.carried(m.position), attracting_point(m), strict=True):
         shift = context.ldexp(a, -scaling.length)
         offset.append(x - m.number(shift) if shift != 0 else x)
     scale = m.number(context.ldexp(m.scene.body.mass, scaling.length + scaling.speed - scaling.momentum))
@@ -155,18 +125,6 @@ def _total_momentum(m: Mechanics) -> list[Expression]:
     u, v, w = m.carried(m.velocity)
     orbital = [y * w - z * v, z * u - x * w, x * v - y * u]
     return [scale * a + b for a, b in zip(orbital, m.momentum_space, strict=True)]
-
-
-def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:
-    """abs of the orbital plus the spin angular momentum at the start."""
-    scene, context = m.scene, m.scene.context
-    assert scene.position is not None
-    assert scene.velocity is not None
-    center = next(load for load in m.loads if isinstance(load, CentralGravityModel))
-    offset = [x - a for x, a in zip(scene.position, center.spec.position, strict=True)]
-    orbital = scene.body.mass * norm(context, cross(offset, scene.velocity))
-    spin, _ = momentum_scale(m)
-    return orbital + spin, "initial orbital plus spin angular momentum"
 
 
 def _axial(m: Mechanics) -> str | None:
@@ -186,18 +144,18 @@ def _linear(m: Mechanics) -> str | None:
     return "no force acts" if m.velocity is not None and not _pulled(m) else None
 
 
-def _along_symmetry_axis(m: Mechanics) -> list[Expression]:
+def _along_symmetry_axis(m: Mechanics) -> list[Symbolic]:
     assert m.symmetry_direction is not None
     pairs = zip(m.symmetry_direction, m.momentum_body, strict=True)
     return [hy.sum([m.number(e) * x for e, x in pairs if e != 0])]
 
 
-def _along_vertical(m: Mechanics) -> list[Expression]:
+def _along_vertical(m: Mechanics) -> list[Symbolic]:
     assert m.vertical is not None
     return [hy.sum([v * x for v, x in zip(m.vertical, m.momentum_body, strict=True)])]
 
 
-def _euler(m: Mechanics) -> list[Expression]:
+def _euler(m: Mechanics) -> list[Symbolic]:
     assert m.attitude is not None
     sequence = m.scene.config.integrator.euler_sequence
     if m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
@@ -205,7 +163,7 @@ def _euler(m: Mechanics) -> list[Expression]:
     return rotations.euler_from_matrix(sequence, m.matrix)
 
 
-def _linear_momentum(m: Mechanics) -> list[Expression]:
+def _linear_momentum(m: Mechanics) -> list[Symbolic]:
     assert m.velocity is not None
     context = m.scene.context
     mass = context.ldexp(m.scene.body.mass, -_mass_exponent(m))
@@ -224,7 +182,12 @@ _MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
 _ENERGY = lambda m: m.scaling.energy  # noqa: E731
 _NONE = lambda m: 0  # noqa: E731
 
-OBSERVABLES: tuple[Observable, ...] = (
+
+def _carried_as(kind: str) -> Callable[[Mechanics], bool]:
+    return lambda m: m.attitude is not None and m.attitude.kind == kind
+
+
+_BUILT_IN: tuple[Observable, ...] = (
     Observable(
         "angular_velocity", BODY, "rad s-1", "angular velocity", lambda m: m.rate_states,
         lambda m: [e - m.scaling.time for e in m.scaling.rates], "body axes",
@@ -232,14 +195,19 @@ OBSERVABLES: tuple[Observable, ...] = (
     Observable(
         "quaternion", ("quaternion_component",), "1", "attitude quaternion, body to space",
         lambda m: m.carried(m.attitude).quaternion, _same(_NONE, 4), "body to space", ("attitude",),
+        continuity=lambda m: {"state": "", "wrapping": "parity", "nearest": "nearest"}[
+            m.carried(m.attitude).quaternion_sign
+        ],
     ),
     Observable(
         "euler_angles", ("euler_angle",), "rad", "intrinsic Euler angles, body to space",
-        _euler, _same(_NONE, 3), "body to space", ("attitude",),
+        _euler, _same(_NONE, 3), "body to space", ("attitude",), by_default=_carried_as("euler_angles"),
+        continuity=lambda m: "wrapped" if _carried_as("euler_angles")(m) else "unwrap",
     ),
     Observable(
         "rotation_matrix", ("space_axis", "body_axis"), "1", "rotation matrix, body to space",
         lambda m: [x for row in m.matrix for x in row], _same(_NONE, 9), "body to space", ("attitude",),
+        by_default=_carried_as("rotation_matrix"),
     ),
     Observable(
         "angular_momentum", SPACE, "kg m2 s-1", "angular momentum",
@@ -276,18 +244,19 @@ OBSERVABLES: tuple[Observable, ...] = (
     ),
     Observable(
         "kovalevskaya_constant", (), "rad4 s-4", "Kovalevskaya's constant",
-        lambda m: [integrable.kovalevskaya_constant(m)], _same(lambda m: -4 * m.scaling.time, 1), "",
+        lambda m: [first_integrals.kovalevskaya_constant(m)], _same(lambda m: -4 * m.scaling.time, 1), "",
         ("kovalevskaya",),
         lambda m: "A = B = 2 C, and the centre of mass lies in the equatorial plane (Kovalevskaya)",
-        integrable.kovalevskaya_scale,
+        first_integrals.kovalevskaya_scale,
     ),
     Observable(
         "goryachev_chaplygin_constant", (), "rad3 s-3", "Goryachev's and Chaplygin's constant",
-        lambda m: [integrable.goryachev_chaplygin_constant(m)], _same(lambda m: -3 * m.scaling.time, 1), "",
+        lambda m: [first_integrals.goryachev_chaplygin_constant(m)],
+        _same(lambda m: -3 * m.scaling.time, 1), "",
         ("goryachev_chaplygin",),
         lambda m: "A = B = 4 C, the centre of mass lies in the equatorial plane, and L_z = 0 (Goryachev, "
         "Chaplygin)",
-        integrable.goryachev_chaplygin_scale,
+        first_integrals.goryachev_chaplygin_scale,
     ),
     Observable(
         "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],
@@ -301,10 +270,11 @@ OBSERVABLES: tuple[Observable, ...] = (
         "rotational_energy", (), "J", "kinetic energy of rotation",
         lambda m: [m.rotational_energy], _same(_ENERGY, 1), "", (),
         lambda m: _torque_free(m) if m.scene.free_flight else None, rotational_scale,
+        by_default=lambda m: m.scene.free_flight,
     ),
     Observable(
         "potential_energy", (), "J", "potential energy",
-        lambda m: [m.potential_energy], _same(_ENERGY, 1), "", ("gravity",),
+        lambda m: [m.potential_energy], _same(_ENERGY, 1), "", ("potential",),
     ),
     Observable(
         "position", SPACE, "m", "position of the centre of mass", lambda m: m.carried(m.position),
@@ -320,4 +290,6 @@ OBSERVABLES: tuple[Observable, ...] = (
         _linear, linear_momentum_scale,
     ),
 )  # fmt: skip
-"""All observables, in the order in which a dataset holds them."""
+
+for _observable in _BUILT_IN:
+    register_observable(_observable)

@@ -7,18 +7,17 @@ are therefore measured in a unit of their own; results are multiplied back, exac
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, cast
 
-from rigidsim.model.ephemeris import MEAN_DISTANCE
-from rigidsim.scene.context import cross, dot, norm
-from rigidsim.scene.loads import CentralGravity, GravityGradient
+from rigidsim.scene.arithmetic import dot, norm
 from rigidsim.scene.scene import Scene
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What loads of unknown size are estimated to add to the motion (see ``rigidsim.model.drive``), mpf.
+    """What loads of unknown size are estimated to add (see ``rigidsim.model.load_estimate``), mpf.
 
     Attributes:
         energy: of rotation, J.
@@ -87,8 +86,8 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
     twice_energy = dot(w, weighted)
     swing = 4 * potential_amplitude(scene)
     if scene.loads or drive is not None:  # an orbit feeds it: a bound for the body carried along with it
-        carried = orbital_rate(scene)
-        fed = context.sqrt(max(twice_energy, zero) + swing + 4 * tidal_amplitude(scene))
+        carried = source_rate(scene)
+        fed = context.sqrt(max(twice_energy, zero) + swing + 4 * loads_amplitude(scene))
         if drive is not None:
             fed += context.sqrt(2 * drive.energy)
         return [fed * context.sqrt(inverse[i][i]) + carried for i in range(3)]
@@ -130,63 +129,32 @@ def potential_amplitude(scene: Scene) -> Any:
     return norm(scene.context, arm) * norm(scene.context, scene.gravity)
 
 
-def tidal_amplitude(scene: Scene) -> Any:
-    """(3/2) (G M / R^3) (I_max - I_min) summed over the attracting bodies at their nearest, J."""
-    context, moments = scene.context, scene.body.principal_moments
-    spread = max(moments) - min(moments)
-    total = context.zero
-    for load in scene.loads:
-        if isinstance(load, GravityGradient):
-            if load.ephemeris is not None:
-                distance = context.mpf(MEAN_DISTANCE[load.ephemeris])
-            elif load.orbit is None:
-                distance = norm(context, load.position or [])
-            else:
-                distance = load.orbit.semi_major_axis * (1 - load.orbit.eccentricity)
-        elif isinstance(load, CentralGravity):
-            distance = nearest_approach(scene, load)
-        else:
-            continue
-        total += 3 * load.gravitational_parameter / distance**3 * spread / 2
-    return total
+class Estimated(Protocol):
+    """What is asked of a load here; see ``rigidsim.model.load.Load``."""
+
+    def amplitude(self, scene: Scene) -> Any | None:
+        """By how much it may change the energy of rotation, J; None where nobody knows."""
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        """Fastest angular rate of its source, rad/s."""
+
+    def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
+        """Largest distance (m) and speed (m/s) under it alone, where it bounds the flight."""
 
 
-def orbital_rate(scene: Scene) -> Any:
-    """Fastest angular rate of any attracting body seen from the body, rad/s; zero without one."""
-    context = scene.context
-    fastest = context.zero
-    for load in scene.loads:
-        if isinstance(load, GravityGradient) and load.orbit is not None:
-            e = load.orbit.eccentricity
-            fastest = max(fastest, abs(load.orbit.mean_motion) * context.sqrt(1 - e * e) / (1 - e) ** 2)
-        elif isinstance(load, CentralGravity):
-            nearest = nearest_approach(scene, load)
-            offset, _speed = _relative(scene, load)
-            momentum = norm(context, cross(offset, scene.velocity)) if scene.velocity else context.zero
-            fastest = max(fastest, momentum / nearest**2)
-    return fastest
+def _loads(scene: Scene) -> Sequence[Estimated]:
+    return cast(Sequence[Estimated], scene.loads)
 
 
-def _relative(scene: Scene, load: CentralGravity) -> tuple[list[Any], Any]:
-    assert scene.position is not None
-    assert scene.velocity is not None
-    offset = [x - a for x, a in zip(scene.position, load.position, strict=True)]
-    return offset, norm(scene.context, scene.velocity)
+def loads_amplitude(scene: Scene) -> Any:
+    """By how much all loads of known size, but for uniform gravity, may change the energy of rotation, J."""
+    known = [load.amplitude(scene) for load in _loads(scene)]
+    return sum((size for size in known if size is not None), scene.context.zero)
 
 
-def nearest_approach(scene: Scene, load: CentralGravity) -> Any:
-    """Pericentre distance of the Kepler orbit through the initial state, m (at least a thousandth of the
-    initial distance, since a scale must not vanish for a plunging orbit).
-    """
-    context = scene.context
-    offset, speed = _relative(scene, load)
-    distance = norm(context, offset)
-    momentum = norm(context, cross(offset, scene.velocity or offset))
-    energy = speed**2 / 2 - load.gravitational_parameter / distance
-    strength = load.gravitational_parameter
-    e = context.sqrt(max(1 + 2 * energy * momentum**2 / strength**2, context.zero))
-    pericentre = momentum**2 / strength / (1 + e)
-    return max(min(pericentre, distance), distance / 1000)
+def source_rate(scene: Scene) -> Any:
+    """Fastest angular rate of any source seen from the body, rad/s; zero without one."""
+    return max((load.fastest_rate(scene) for load in _loads(scene)), default=scene.context.zero)
 
 
 def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
@@ -194,21 +162,11 @@ def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
     context = scene.context
     assert scene.position is not None
     assert scene.velocity is not None
-    horizon = scene.end - scene.start
     fed = context.zero if drive is None else drive.speed
-    central = [load for load in scene.loads if isinstance(load, CentralGravity)]
-    if len(central) == 1 and scene.gravity is None:
-        load = central[0]
-        offset, speed = _relative(scene, load)
-        distance = norm(context, offset)
-        energy = speed**2 / 2 - load.gravitational_parameter / distance
-        nearest = nearest_approach(scene, load)
-        swiftest = context.sqrt(2 * abs(energy + load.gravitational_parameter / nearest))
-        if energy < 0:
-            farthest = load.gravitational_parameter / -energy  # twice the semi-major axis
-            reach = min(farthest, distance + swiftest * horizon) + fed * horizon
-            return norm(context, load.position) + reach, swiftest + fed
-        return norm(context, scene.position) + (swiftest + fed) * horizon, swiftest + fed
+    bounds = [found for load in _loads(scene) if (found := load.flight_bounds(scene, fed)) is not None]
+    if len(bounds) == 1 and scene.gravity is None:
+        return bounds[0]
+    horizon = scene.end - scene.start
     pull = norm(context, scene.gravity) if scene.gravity is not None else context.zero
     swiftest = norm(context, scene.velocity) + pull * horizon + fed
     return norm(context, scene.position) + swiftest * horizon, swiftest
@@ -227,7 +185,7 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         if axial is not None and all(body.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j):
             swing_moment = body.inertia[(axial + 1) % 3][(axial + 1) % 3]
         fastest = max(fastest, context.sqrt(potential / swing_moment))
-    fastest = max(fastest, orbital_rate(scene))
+    fastest = max(fastest, source_rate(scene))
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
         time = exponent(context, scene.end - scene.start)

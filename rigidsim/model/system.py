@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.applied import AppliedModel, state_names
-from rigidsim.model.canonical import MOMENTA, canonical_states, hamilton_equations
-from rigidsim.model.catalogue import load_models
-from rigidsim.model.charts import across, partner_sequence
-from rigidsim.model.drive import estimate_drive
-from rigidsim.model.dynamics import (
-    Number,
-    flight_equations,
-    rate_equations,
-    scaled_numbers,
-    vertical_equations,
-    vertical_from_attitude,
-)
-from rigidsim.model.formula import to_heyoka
-from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
-from rigidsim.model.loads import LoadModel
-from rigidsim.model.mechanics import Mechanics, in_common_unit
-from rigidsim.model.observables import WORK, work_is_needed
-from rigidsim.model.orbital import note_orbital_frame, orbital_load, orbital_states
-from rigidsim.model.pace import PACE, arguments, pace_derivative
-from rigidsim.model.recording import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
-from rigidsim.model.requirements import Requirements, choose_requirements
-from rigidsim.model.rotations import Expression
-from rigidsim.model.scaling import Scaling, choose_scaling, largest_rates
-from rigidsim.scene import attitude as numeric
-from rigidsim.scene.context import apply, transpose
+from rigidsim.model.assembly import assemble_states
+from rigidsim.model.euler_charts import across, partner_sequence
+from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.load import Load
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.model_plan import ModelPlan, plan_model
+from rigidsim.model.numbers import Rounder
+from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Scaling, largest_rates
+from rigidsim.model.state_blocks import StateBlock, joined
+from rigidsim.model.state_names import state_names
+from rigidsim.model.state_selection import Requirements
 from rigidsim.scene.scene import Scene
 
 _LARGEST_EXPONENT = 1000
@@ -46,208 +36,226 @@ class Crossing:
     """An event as an expression of the states; ``direction`` is -1, 0 (any) or 1."""
 
     name: str
-    expression: Expression
+    expression: Symbolic
     direction: int
     stop: bool
 
 
-@dataclass(frozen=True)
 class System:
     """First-order equations with scaled states, and everything recorded as expressions of them.
 
+    Each part is worked out when it is first asked for, and once: a projection reads the invariants alone,
+    coefficients in two parts change the equations alone, and a partner chart is built where it is entered.
+
     Attributes:
-        states: names.
-        equations: (variable, right-hand side).
-        initial: mpf, in internal units.
-        state_exponents: binary exponents that bring the states to SI.
-        outputs: components of all recorded variables, then one drift per invariant, whose initial values
-            are ``par[..]`` in the order of the invariants' components.
-        angle_states: positions of states that are angles growing without bound.
-        singular_factor: expression that vanishes where the formulation breaks down, or None.
-        crossings: events to be found along the way.
-        wide: whether the equations are too long to be compiled unrolled.
-        mechanics: the quantities that outputs and invariants are written in.
-        rate_bound: upper bound of the absolute angular velocity, rad/s (mpf).
+        plan: what was decided before anything was rounded.
+        number: from an mpf to the working precision's scalar, rounded once.
         sequence: of the Euler angles that are states, or that are recorded.
-        partner: the same in the chart that a run changes to near the singularity: the same states but for
-            the angles. Its recorded Euler angles are those of this system's sequence, on the branch that
-            the parameter after the invariants' gives (see ``rigidsim.model.charts``). None without a chart.
     """
 
-    scene: Scene
-    scaling: Scaling
-    requirements: Requirements
-    states: list[str]
-    equations: list[tuple[Expression, Expression]]
-    initial: list[Any]
-    state_exponents: list[int]
-    recorded: list[Recorded]
-    invariants: list[Invariant]
-    outputs: list[Expression]
-    angle_states: tuple[int, ...]
-    singular_factor: Expression | None
-    sequence: str
-    rate_bound: Any
-    crossings: list[Crossing]
-    wide: bool
-    mechanics: Mechanics
-    partner: System | None = None
+    def __init__(
+        self,
+        plan: ModelPlan,
+        number: Rounder,
+        *,
+        sequence: str | None = None,
+        coefficients: Rounder | None = None,
+    ) -> None:
+        self.plan = plan
+        self.number = number
+        self.sequence = sequence or plan.scene.config.integrator.euler_sequence
+        self._asked_sequence = sequence
+        self._coefficients = coefficients
+
+    # --- the same motion, rounded otherwise -----------------------------------------------------------------
+
+    def rounded(self, number: Rounder) -> System:
+        """The same system in another precision."""
+        return System(self.plan, number, sequence=self._asked_sequence)
+
+    def with_coefficients(self, coefficients: Rounder) -> System:
+        """The same system with the coefficients of its equations rounded otherwise, say in two parts."""
+        other = copy.copy(self)  # with all that is worked out already, but what the coefficients change
+        other._coefficients = coefficients
+        other.__dict__.pop("equations", None)
+        if other.__dict__.get("partner") is not None:
+            other.__dict__["partner"] = other.__dict__["partner"].with_coefficients(coefficients)
+        return other
+
+    @cached_property
+    def partner(self) -> System | None:
+        """The same in the chart that a run changes to near the singularity: the same states but the angles.
+
+        Its recorded Euler angles are those of this system's sequence, on the branch that the parameter after
+        the invariants' gives (see ``rigidsim.model.euler_charts``). None without a chart.
+        """
+        if self.requirements.formulation != "euler_angles" or self._asked_sequence is not None:
+            return None
+        partner = partner_sequence(self.sequence)
+        return System(self.plan, self.number, sequence=partner, coefficients=self._coefficients)
+
+    # --- what was decided -----------------------------------------------------------------------------------
 
     @property
-    def variables(self) -> list[Expression]:
+    def scene(self) -> Scene:
+        """With the loads that were given from Python among its own."""
+        return self.plan.scene
+
+    @property
+    def scaling(self) -> Scaling:
+        """Internal units."""
+        return self.plan.scaling
+
+    @property
+    def requirements(self) -> Requirements:
+        """Which states are carried, and why."""
+        return self.plan.requirements
+
+    @property
+    def wide(self) -> bool:
+        """Whether the equations are too long to be compiled unrolled."""
+        return self.plan.wide
+
+    @cached_property
+    def rate_bound(self) -> Any:
+        """Upper bound of the absolute angular velocity, rad/s (mpf)."""
+        return max(largest_rates(self.scene, self.scaling.drive))
+
+    # --- states ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _assembled(self) -> tuple[Mechanics, list[StateBlock]]:
+        return assemble_states(self.plan, self.number, self._asked_sequence)
+
+    @property
+    def mechanics(self) -> Mechanics:
+        """The quantities that outputs and invariants are written in."""
+        return self._assembled[0]
+
+    @property
+    def blocks(self) -> list[StateBlock]:
+        """The states, block by block."""
+        return self._assembled[1]
+
+    @cached_property
+    def _joined(self) -> StateBlock:
+        return joined(self.blocks)
+
+    @property
+    def states(self) -> list[str]:
+        """Their names."""
+        return list(self._joined.names)
+
+    @property
+    def initial(self) -> list[Any]:
+        """mpf, in internal units."""
+        return list(self._joined.initial)
+
+    @property
+    def state_exponents(self) -> list[int]:
+        """Binary exponents that bring the states to SI."""
+        return self._joined.unit_exponents
+
+    @property
+    def variables(self) -> list[Symbolic]:
         """The states as heyoka variables."""
-        return [variable for variable, _ in self.equations]
+        return self._joined.variables
+
+    @cached_property
+    def equations(self) -> list[tuple[Symbolic, Symbolic]]:
+        """(variable, right-hand side)."""
+        if self._coefficients is not None:
+            return System(self.plan, self._coefficients, sequence=self._asked_sequence).equations
+        return list(zip(self.variables, self._joined.derivatives, strict=True))
+
+    @property
+    def reasons(self) -> list[tuple[str, str]]:
+        """(states, why) for each block, and the chart that is changed to."""
+        found = [(_label(block), block.why) for block in self.blocks]
+        if self.partner is not None:
+            angles = " ".join(self.mechanics.carried(self.mechanics.attitude).names)
+            regular = self.partner.sequence
+            why = f"near the singularity of {self.sequence}: angles of {regular}, which is regular there"
+            found.append((angles, why))
+        return found
+
+    @property
+    def angle_states(self) -> tuple[int, ...]:
+        """Positions of states that are angles growing without bound."""
+        attitude = self.mechanics.attitude
+        if attitude is None:
+            return ()
+        first = self.states.index(attitude.names[0])
+        return tuple(first + i for i in attitude.angles)
+
+    @property
+    def singular_factor(self) -> Symbolic | None:
+        """Expression that vanishes where the formulation breaks down, or None."""
+        attitude = self.mechanics.attitude
+        return None if attitude is None else attitude.singular_factor
+
+    # --- what is recorded -----------------------------------------------------------------------------------
+
+    @cached_property
+    def _recorded(self) -> tuple[list[Recorded], list[Symbolic]]:
+        recorded, outputs = recorded_variables(self.mechanics, self.requirements.record)
+        drifts = drift_outputs(self.invariants, self.scene.context, self.number)
+        attitude = self.mechanics.attitude
+        if attitude is not None and self._asked_sequence is not None:
+            # in the partner chart the asked sequence's angles stand in the place of its own
+            branch = hy.par[sum(len(invariant.expressions) for invariant in self.invariants)]
+            angles = list(hy.make_vars(*attitude.names))
+            for variable in recorded:
+                if variable.continuity == "wrapped":
+                    own = slice(variable.first, variable.first + variable.count)
+                    outputs[own] = across(attitude.sequence, angles, hy, branch)
+        return recorded, outputs + drifts
+
+    @property
+    def recorded(self) -> list[Recorded]:
+        """Variables of the dataset."""
+        return self._recorded[0]
+
+    @property
+    def outputs(self) -> list[Symbolic]:
+        """Components of all recorded variables, then one drift per invariant, whose initial values are
+        ``par[..]`` in the order of the invariants' components.
+        """
+        return self._recorded[1]
+
+    @cached_property
+    def invariants(self) -> list[Invariant]:
+        """All that the scene conserves."""
+        return find_invariants(self.mechanics, list(self._joined.norms))
+
+    @cached_property
+    def crossings(self) -> list[Crossing]:
+        """Events to be found along the way."""
+        return _crossings(self.mechanics)
 
 
-def build_system(
-    scene: Scene, number: Number, extra_loads: Sequence[LoadModel] = (), *, sequence: str | None = None
-) -> System:
+def build_system(scene: Scene, number: Rounder, extra_loads: Sequence[Load] = ()) -> System:
     """Build the least system that the scene needs.
 
     Args:
         number: from an mpf to the working precision's scalar, rounded once.
         extra_loads: beside those of the config.
-        sequence: of the Euler angles that are states, where it is not the scene's.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.
+        OverflowError: numbers that neither the states nor the dataset can hold.
     """
-    loads = [*load_models(scene), *extra_loads]
-    requirements = choose_requirements(scene, loads)
-    unknown = [load for load in loads if isinstance(load, AppliedModel)] + list(extra_loads)
-    scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
-    numbers = scaled_numbers(scene, scaling)
-    context = scene.context
-
-    attitude: AttitudeStates | None = None
-    vertical: list[Expression] | None = None
-    canonical = requirements.formulation == "canonical"
-    names: list[str] = []
-    derivatives: list[Expression] = []
-    if canonical:
-        scaling = replace(scaling, rates=(0, 0, 0))
-        numbers = scaled_numbers(scene, scaling)
-        states = canonical_states(scene, scaling, numbers, number)
-        attitude, rate_states = states.attitude, states.rates
-        names += [*attitude.names, *MOMENTA]
-        initial = [*attitude.initial, *states.initial_momenta]
-        exponents = [0] * 3 + [scaling.momentum] * 3
-    else:
-        names += ["wx", "wy", "wz"]
-        rate_states = list(hy.make_vars(*names))
-        initial = [
-            context.ldexp(w, scaling.time - e)
-            for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
-        ]
-        exponents = [e - scaling.time for e in scaling.rates]
-    rates = in_common_unit(rate_states, numbers.rate_units, number)
-    if not canonical and requirements.formulation != "rates":
-        if requirements.formulation == "euler_angles":
-            attitude = euler_states(scene, rates, sequence)
-        elif (orbiting := orbital_load(scene, loads, requirements.formulation)) is not None:
-            unit = context.ldexp(context.one, scaling.time)
-            attitude = orbital_states(scene, rates, orbiting, unit, number)
-            note_orbital_frame(requirements.reasons)
-        else:
-            attitude = BUILDERS[requirements.formulation](scene, rates)
-        names += attitude.names
-        derivatives += attitude.derivatives
-        initial += attitude.initial
-        exponents += [0] * len(attitude.names)
-    if attitude is not None:
-        if numbers.arm is not None:
-            vertical = vertical_from_attitude(attitude.matrix, numbers, number)
-    elif requirements.vertical:
-        vertical_names = ["gx", "gy", "gz"]
-        vertical = list(hy.make_vars(*vertical_names))
-        names += vertical_names
-        derivatives += vertical_equations(vertical, rates)
-        assert numbers.up is not None
-        initial += apply(transpose(numeric.rotation_matrix(scene.quaternion)), numbers.up)
-        exponents += [0] * 3
-    position = velocity = None
-    if requirements.flight:
-        assert scene.position is not None
-        assert scene.velocity is not None
-        position = list(hy.make_vars("x", "y", "z"))
-        velocity = list(hy.make_vars("vx", "vy", "vz"))
-        names += ["x", "y", "z", "vx", "vy", "vz"]
-        initial += [context.ldexp(x, -scaling.length) for x in scene.position]
-        initial += [context.ldexp(v, -scaling.speed) for v in scene.velocity]
-        exponents += [scaling.length] * 3 + [scaling.speed] * 3
-    mechanics = Mechanics(
-        scene, scaling, numbers, rate_states, attitude, vertical, position, velocity, number, loads
-    )
-    turning = hamilton_equations(mechanics) if canonical else rate_equations(mechanics, mechanics.torque)
-    derivatives = turning + derivatives
-    if requirements.flight:
-        x_rates, v_rates = flight_equations(mechanics, mechanics.force)
-        derivatives += x_rates + v_rates
-    norms: list[Expression] = []
-    for load in loads:
-        extra = load.extra_states(mechanics)
-        if extra is not None:
-            names += extra.names
-            derivatives += extra.derivatives
-            initial += extra.initial
-            exponents += [0] * len(extra.names)
-            norms += extra.norms
-            requirements.reasons.append((" ".join(extra.names), f"{load.title}: where its source is"))
-    if work_is_needed(mechanics):
-        names.append(WORK)
-        assert mechanics.power is not None
-        derivatives.append(mechanics.power)
-        initial.append(context.zero)
-        exponents.append(scaling.energy)
-        requirements.reasons.append((WORK, "work of the loads without a potential, to check the energy"))
-    watched = arguments(mechanics)
-    if watched:
-        carried = dict(zip(names, derivatives, strict=True))
-        names.append(PACE)
-        derivatives.append(pace_derivative([u for _, u in watched], carried))
-        initial.append(context.zero)
-        exponents.append(0)
-        titles = ", ".join(dict.fromkeys(title for title, _ in watched))
-        requirements.reasons.append((PACE, f"{titles}: no step may pass over what is narrow in it"))
-    if canonical:
+    system = System(plan_model(scene, extra_loads), number)
+    attitude = system.mechanics.attitude
+    if system.requirements.canonical:
         _refuse_singular_start(scene, attitude)
-    recorded, outputs = recorded_variables(mechanics, requirements)
-    invariants = find_invariants(mechanics, norms)
-    outputs += drift_outputs(invariants, context, number)
-    asked = scene.config.integrator.euler_sequence
-    partner = None
-    if requirements.formulation == "euler_angles":
-        assert attitude is not None
-        if attitude.sequence != asked:
-            branch = hy.par[sum(len(invariant.expressions) for invariant in invariants)]
-            _ask_of_partner(recorded, outputs, attitude, branch)
-        elif sequence is None:
-            partner = build_system(scene, number, extra_loads, sequence=partner_sequence(asked))
-            why = f"near the singularity of {asked}: angles of {partner.sequence}, which is regular there"
-            requirements.reasons.append((" ".join(attitude.names), why))
-    first_angle = 0 if canonical else 3
-    angle_states = tuple(first_angle + i for i in attitude.angles) if attitude else ()
-    _refuse_out_of_range(initial, [*recorded, *invariants], number)
-    return System(
-        scene=scene,
-        scaling=scaling,
-        requirements=requirements,
-        states=names,
-        equations=list(zip(hy.make_vars(*names), derivatives, strict=True)),
-        initial=initial,
-        state_exponents=exponents,
-        recorded=recorded,
-        invariants=invariants,
-        outputs=outputs,
-        angle_states=angle_states,
-        singular_factor=attitude.singular_factor if attitude else None,
-        sequence=sequence or asked,
-        rate_bound=max(largest_rates(scene, scaling.drive)),
-        crossings=_crossings(mechanics),
-        wide=any(load.wide for load in loads),
-        mechanics=mechanics,
-        partner=partner,
-    )
+    _refuse_out_of_range(system.initial, [*system.recorded, *system.invariants], number)
+    return system
+
+
+def _label(block: StateBlock) -> str:
+    names = list(block.names)
+    return f"{names[0]} ... {names[-1]}" if len(names) > 6 else " ".join(names)
 
 
 def _crossings(m: Mechanics) -> list[Crossing]:
@@ -261,17 +269,6 @@ def _crossings(m: Mechanics) -> list[Crossing]:
         )
         for event in m.scene.events
     ]
-
-
-def _ask_of_partner(
-    recorded: list[Recorded], outputs: list[Expression], attitude: AttitudeStates, branch: Expression
-) -> None:
-    """Put the asked sequence's angles in the place of the partner's own among the outputs."""
-    angles = list(hy.make_vars(*attitude.names))
-    for variable in recorded:
-        if variable.name == "euler_angles":
-            place = slice(variable.first, variable.first + variable.count)
-            outputs[place] = across(attitude.sequence, angles, hy, branch)
 
 
 def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
@@ -294,7 +291,7 @@ def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> Non
 
 
 def _refuse_out_of_range(
-    initial: list[Any], variables: Sequence[Recorded | Invariant], number: Number
+    initial: list[Any], variables: Sequence[Recorded | Invariant], number: Rounder
 ) -> None:
     """Raise OverflowError for what neither the states nor the dataset's float64 numbers can hold."""
     for value in initial:

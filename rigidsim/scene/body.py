@@ -11,7 +11,7 @@ from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import attitude, schema
-from rigidsim.scene.context import (
+from rigidsim.scene.arithmetic import (
     Matrix,
     Vector,
     apply,
@@ -22,9 +22,9 @@ from rigidsim.scene.context import (
     transpose,
 )
 from rigidsim.scene.exact import ExactNumber, parse_number
-from rigidsim.scene.messages import nearest, shown
 from rigidsim.scene.presets import PRESETS
-from rigidsim.scene.shapes import DIMENSION_KEYS, SHAPES
+from rigidsim.scene.shapes import DIMENSIONS, SHAPES
+from rigidsim.scene.validation_messages import nearest, shown
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
 # A tensor that was printed by a double-precision program obeys the triangle inequality to about this.
@@ -95,7 +95,7 @@ def build_body(table: schema.Body, context: Any) -> RigidBody:
 
 
 def _refuse_foreign(table: schema.Solid, allowed: tuple[str, ...], why: str, place: str) -> None:
-    for key in DIMENSION_KEYS:
+    for key in DIMENSIONS:
         if getattr(table, key) is not None and key not in allowed:
             suffix = f"; allowed: {', '.join(allowed)}" if allowed else ""
             raise _fail(f"{place}{key}", f"given a dimension {why}{suffix}; remove it")
@@ -225,9 +225,10 @@ def _solid(
         dimensions[key] = [
             _positive(v, where, "length", context) for v, where in zip(values, places, strict=True)
         ]
-    for small, large in (("inner_radius", "outer_radius"), ("minor_radius", "major_radius")):
-        if small in dimensions and dimensions[small][0] > dimensions[large][0]:
-            given, limit = (context.nstr(dimensions[key][0], 12) for key in (small, large))
+    if shape.at_most is not None:
+        small, large = shape.at_most
+        if dimensions[small][0] > dimensions[large][0]:
+            given, limit = (context.nstr(dimensions[key][0], 12) for key in shape.at_most)
             raise _fail(f"{place}{small}", f"given {given} m; at most {large} ({limit} m) is allowed")
     heavy = _positive(mass, f"{place}mass", "mass", context)
     inertia = diagonal([heavy * m for m in shape.moments(context, dimensions)])

@@ -5,9 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.expressions import Expression, ExpressionError, names_used
-from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
-from rigidsim.scene.parser import parse_expression
+from rigidsim.scene.expression_parser import parse_expression
+from rigidsim.scene.expressions import (
+    ATTITUDE_NAMES,
+    FLIGHT_NAMES,
+    RATE_NAMES,
+    Expression,
+    ExpressionError,
+    names_used,
+)
 from rigidsim.scene.schema import Config
 
 

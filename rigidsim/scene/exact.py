@@ -14,7 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from rigidsim.scene import units
-from rigidsim.scene.messages import shown
+from rigidsim.scene.validation_messages import shown
 
 # Far past any physical quantity and any precision, and still quick to expand into integers.
 _LARGEST_DECIMAL_EXPONENT = 5000

@@ -25,6 +25,11 @@ RESERVED = frozenset({*FUNCTIONS, "pi", "e"})
 """Names that no parameter may have."""
 ONE = ExactNumber(Fraction(1))
 
+RATE_NAMES = ("wx", "wy", "wz")
+ATTITUDE_NAMES = ("qw", "qx", "qy", "qz", "phi", "theta", "psi")
+FLIGHT_NAMES = ("x", "y", "z", "vx", "vy", "vz")
+"""Names of the state in expressions, beside t."""
+
 
 class ExpressionError(ValueError):
     """An expression that can't be read or has no value; the text shows the place.
@@ -43,7 +48,7 @@ class ExpressionError(ValueError):
 
 
 @dataclass(frozen=True)
-class Number:
+class Constant:
     """A number, exact; ``span`` is its place in the text, as for every node."""
 
     value: ExactNumber
@@ -67,7 +72,7 @@ class Operation:
     span: tuple[int, int] = field(compare=False)
 
 
-Node = Number | Name | Operation
+Node = Constant | Name | Operation
 
 
 @dataclass(frozen=True)
@@ -110,20 +115,20 @@ def _bits(x: Fraction) -> int:
 
 def operation(operator: str, operands: tuple[Node, ...], span: tuple[int, int]) -> Node:
     """The operation, or the number that it exactly is; chains are one sum, or one product after a number."""
-    numbers = [operand.value for operand in operands if isinstance(operand, Number)]
+    numbers = [operand.value for operand in operands if isinstance(operand, Constant)]
     exact = _exact(operator, numbers) if len(numbers) == len(operands) else None
     if exact is not None:
-        return Number(exact, span)
+        return Constant(exact, span)
     first, last = operands[0], operands[-1]
-    inverse = _exact("quotient", [ONE, last.value]) if isinstance(last, Number) else None
+    inverse = _exact("quotient", [ONE, last.value]) if isinstance(last, Constant) else None
     if operator == "quotient" and inverse is not None:
-        return operation("product", (Number(inverse, last.span), first), span)
-    if operator == "product" and isinstance(last, Number):
+        return operation("product", (Constant(inverse, last.span), first), span)
+    if operator == "product" and isinstance(last, Constant):
         first, last = last, first
-    if operator == "product" and isinstance(first, Number):
+    if operator == "product" and isinstance(first, Constant):
         head, *tail = _chain(operator, last)
-        front = _exact(operator, [first.value, head.value]) if isinstance(head, Number) else None
-        operands = (first, head, *tail) if front is None else (Number(front, span), *tail)
+        front = _exact(operator, [first.value, head.value]) if isinstance(head, Constant) else None
+        operands = (first, head, *tail) if front is None else (Constant(front, span), *tail)
     elif operator in ("sum", "product"):
         operands = (*_chain(operator, first), last)
     return Operation(operator, operands, span)
@@ -173,7 +178,7 @@ def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) ->
     """
 
     def combine(node: Node, operands: list[Any]) -> Any:
-        if isinstance(node, Number):
+        if isinstance(node, Constant):
             return node.value.at(context)
         if isinstance(node, Name):
             value = values[node.name]

@@ -8,12 +8,13 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import attitude, loads, schema
+from rigidsim.scene import attitude, schema
+from rigidsim.scene.arithmetic import Matrix, Vector, apply, context_for, dot, transpose
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
-from rigidsim.scene.context import Matrix, Vector, apply, context_for, dot, transpose
+from rigidsim.scene.config import Experiment
 from rigidsim.scene.events import Event, resolve_events
-from rigidsim.scene.messages import shown
-from rigidsim.scene.reading import Experiment
+from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
+from rigidsim.scene.validation_messages import shown
 
 _MOST_SAMPLES = 10**12
 T = TypeVar("T")
@@ -53,8 +54,8 @@ class Scene:
         quaternion: initial, unit, body to space.
         euler_angles: as given in ``euler_sequence`` (radians), or None where another attitude was given.
         position, velocity: of the centre of mass, space axes; None unless the body moves freely.
-        gravity: uniform acceleration in space axes, m/s^2, or None without such a load.
-        loads: the others.
+        gravity: sum of all uniform fields, space axes, m/s^2; None without such a load.
+        loads: the others, without those that are zero whatever happens.
         events: crossings that are recorded, or end the run.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
     """
@@ -70,7 +71,7 @@ class Scene:
     position: Vector | None
     velocity: Vector | None
     gravity: Vector | None
-    loads: tuple[loads.Load, ...]
+    loads: tuple[SceneLoad, ...]
     events: tuple[Event, ...]
     start: Any
     end: Any
@@ -120,14 +121,10 @@ def build_scene(experiment: Experiment) -> Scene:
     try:
         inverse = inverse_inertia(context, body)
         position, velocity = _translation(config, body, context)
-        resolved = [
-            loads.resolve_load(
-                table, i, context, parameters=config.parameters, free_flight=position is not None
-            )
-            for i, table in enumerate(config.loads)
-        ]
+        resolved = _resolve_loads(config, body, context, free_flight=position is not None)
         gravity = _gravity(resolved, context)
-        _check_loads(resolved, position)
+        for number, load in enumerate(resolved):
+            load.check(number, position)
         if gravity is not None and body.mass is None:
             off_center = any(x != 0 for x in body.center_of_mass)
             if position is not None or off_center:
@@ -144,9 +141,7 @@ def build_scene(experiment: Experiment) -> Scene:
             position=position,
             velocity=velocity,
             gravity=gravity,
-            loads=tuple(
-                load for load in resolved if loads.acts(load) and not isinstance(load, loads.UniformGravity)
-            ),
+            loads=tuple(load for load in resolved if load.acts() and load.uniform_field is None),
             events=resolve_events(config, free_flight=position is not None),
             start=start,
             end=end,
@@ -221,27 +216,22 @@ def _initial_rates(
     return rates
 
 
-def _gravity(resolved: list[loads.Load], context: Any) -> Vector | None:
-    fields = [load.acceleration for load in resolved if isinstance(load, loads.UniformGravity)]
+def _resolve_loads(
+    config: schema.Config, body: RigidBody, context: Any, *, free_flight: bool
+) -> list[SceneLoad]:
+    found = []
+    for number, fields in enumerate(config.loads):
+        around = Surroundings(number, context, config.parameters, body.center_of_mass, free_flight)
+        kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
+        found.append(kind.resolve(fields, around))
+    return found
+
+
+def _gravity(resolved: list[SceneLoad], context: Any) -> Vector | None:
+    fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
     if not fields:
         return None
     return [sum(components, context.zero) for components in zip(*fields, strict=True)]
-
-
-def _check_loads(resolved: list[loads.Load], position: Vector | None) -> None:
-    for number, load in enumerate(resolved):
-        if not isinstance(load, loads.CentralGravity):
-            continue
-        where = f"number {number + 1} kind"
-        if position is None:
-            raise _fail(
-                "[loads]",
-                where,
-                'given "central_gravity" for a body without a position; give [initial] position and '
-                'velocity, or use "gravity_gradient" for a prescribed orbit',
-            )
-        if position == load.position:
-            raise _fail("[loads]", where, "the body starts at the attracting point; start it elsewhere")
 
 
 def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:

@@ -7,17 +7,25 @@ axis without inertia, ...) is checked where the scene is built.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
-from pydantic import Discriminator, Field, StrictBool, StrictInt, StrictStr, Tag, field_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    Tag,
+    create_model,
+    field_validator,
+)
 
 from rigidsim.scene.exact import ZERO, parse_number
-from rigidsim.scene.expressions import RESERVED
-from rigidsim.scene.load_tables import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, LoadTable
-from rigidsim.scene.messages import nearest, shown
-from rigidsim.scene.shapes import SHAPES
-from rigidsim.scene.tables import (
+from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
+from rigidsim.scene.fields import (
     Angle,
+    ConfigTable,
     Dimensionless,
     Four,
     Kilogram,
@@ -27,38 +35,18 @@ from rigidsim.scene.tables import (
     Rate,
     Second,
     Speed,
-    Table,
     Triple,
     refuse,
 )
+from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
+from rigidsim.scene.shapes import DIMENSIONS, SHAPES
+from rigidsim.scene.validation_messages import nearest, shown
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
 # room for numbers down to 1e-70.
 LARGEST_DIGITS = 250
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
 FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical")
-RECORDABLE = (
-    "angular_velocity",
-    "quaternion",
-    "euler_angles",
-    "rotation_matrix",
-    "angular_momentum",
-    "angular_momentum_norm",
-    "energy",
-    "potential_energy",
-    "rotational_energy",
-    "angular_momentum_vertical",
-    "angular_momentum_axial",
-    "position",
-    "velocity",
-    "linear_momentum",
-    "total_angular_momentum",
-    "jacobi_constant",
-    "kovalevskaya_constant",
-    "goryachev_chaplygin_constant",
-    "work",
-    "energy_balance",
-)
 STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
 EULER_SEQUENCES = tuple(
     first + second + third
@@ -69,32 +57,25 @@ EULER_SEQUENCES = tuple(
 )
 
 
+POINT_OR_NAME = ("as a name", "as a point")
+"""Names of the alternatives of ``[body] reference``."""
+
+
 def _kind_of_reference(value: Any) -> str | None:
     if isinstance(value, str):
-        return "as a name"
-    return "as a point" if isinstance(value, list) else None
+        return POINT_OR_NAME[0]
+    return POINT_OR_NAME[1] if isinstance(value, list) else None
 
 
-class PointMass(Table):
+class PointMass(ConfigTable):
     """One particle of a body of particles."""
 
     mass: Kilogram
     position: Triple[Metre]
 
 
-class Solid(Table):
-    """A homogeneous shape with its dimensions (metres); which ones it takes is in ``shapes.SHAPES``."""
-
+class _Shaped(ConfigTable):
     shape: StrictStr | None = None
-    size: list[Metre] | None = None
-    semi_axes: list[Metre] | None = None
-    radius: Metre | None = None
-    height: Metre | None = None
-    length: Metre | None = None
-    major_radius: Metre | None = None
-    minor_radius: Metre | None = None
-    inner_radius: Metre | None = None
-    outer_radius: Metre | None = None
 
     @field_validator("shape")
     @classmethod
@@ -102,6 +83,17 @@ class Solid(Table):
         if value is not None and value not in SHAPES:
             raise refuse(f"given {shown(value)}{nearest(value, SHAPES)}; allowed: {', '.join(SHAPES)}")
         return value
+
+
+if TYPE_CHECKING:
+    Solid = _Shaped
+else:
+    Solid = create_model(
+        "Solid",
+        __base__=_Shaped,
+        __doc__="A homogeneous shape with its dimensions (metres); see ``shapes.SHAPES`` for which it takes.",
+        **{key: ((list[Metre] if count > 1 else Metre) | None, None) for key, count in DIMENSIONS.items()},
+    )
 
 
 class Part(Solid):
@@ -125,7 +117,7 @@ class Body(Solid):
     center_of_mass: Triple[Metre] | None = None
     reference: (
         Annotated[
-            Annotated[StrictStr, Tag("as a name")] | Annotated[Triple[Metre], Tag("as a point")],
+            Annotated[StrictStr, Tag(POINT_OR_NAME[0])] | Annotated[Triple[Metre], Tag(POINT_OR_NAME[1])],
             Discriminator(
                 _kind_of_reference,
                 custom_error_type="kind_of_value",
@@ -137,7 +129,7 @@ class Body(Solid):
     ) = None
 
 
-class Initial(Table):
+class Initial(ConfigTable):
     """``[initial]``: the state at ``time.start``."""
 
     angular_velocity: Triple[Rate] | None = None
@@ -148,7 +140,7 @@ class Initial(Table):
     velocity: Triple[Speed] | None = None
 
 
-class Time(Table):
+class Time(ConfigTable):
     """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``."""
 
     start: Second = ZERO
@@ -158,7 +150,7 @@ class Time(Table):
     times: list[Second] | None = None
 
 
-class Integrator(Table):
+class Integrator(ConfigTable):
     """``[integrator]``: how accurately, and in which variables."""
 
     precision: Literal["single", "double", "extended", "quadruple"] | StrictInt = "double"
@@ -222,7 +214,7 @@ class Integrator(Table):
         return number
 
 
-class Output(Table):
+class Output(ConfigTable):
     """``[output]``: what is kept and how it is shown."""
 
     record: list[StrictStr] | None = None
@@ -234,9 +226,9 @@ class Output(Table):
     @classmethod
     def _recordable(cls, value: list[str] | None) -> list[str] | None:
         for name in value or []:
-            if name not in RECORDABLE:
-                near = nearest(name, RECORDABLE)
-                raise refuse(f"given {shown(name)}{near}; allowed: {', '.join(RECORDABLE)}")
+            if name not in OBSERVABLES:
+                near = nearest(name, OBSERVABLES)
+                raise refuse(f"given {shown(name)}{near}; allowed: {', '.join(OBSERVABLES)}")
         if value is not None and not value:
             raise refuse("given an empty array; name at least one variable, or leave the key out")
         if value is not None and len(set(value)) < len(value):
@@ -244,7 +236,7 @@ class Output(Table):
         return value
 
 
-class EventTable(Table):
+class EventTable(ConfigTable):
     """``[[events]]``: where an expression of time and the state crosses zero."""
 
     name: StrictStr
@@ -262,7 +254,7 @@ class EventTable(Table):
         return value
 
 
-class Limits(Table):
+class Limits(ConfigTable):
     """``[limits]``: guards that stop the run, resumable, with the reason named."""
 
     wall_time: Second | None = None
@@ -270,15 +262,15 @@ class Limits(Table):
     max_drift: Dimensionless | None = None
 
 
-class Config(Table):
-    """One experiment."""
+class Config(ConfigTable):
+    """One experiment; ``config_model`` knows the kinds of loads beside."""
 
     name: StrictStr
     description: StrictStr = ""
     parameters: dict[StrictStr, Dimensionless] = Field(default_factory=dict)
     body: Body
     initial: Initial
-    loads: list[LoadTable] = Field(default_factory=list)
+    loads: list[LoadFields] = Field(default_factory=list)
     events: list[EventTable] = Field(default_factory=list)
     time: Time
     integrator: Integrator = Field(default_factory=Integrator)
@@ -313,3 +305,26 @@ class Config(Table):
                 "hyphens, not dots alone, since it names the run folder"
             )
         return value
+
+
+def config_model() -> type[Config]:
+    """The schema with every kind of load that is registered: what texts are validated with, and shown by.
+
+    Raises:
+        RuntimeError: none is; ``rigidsim.model.loads`` enters rigidsim's own.
+    """
+    if not LOAD_KINDS:
+        raise RuntimeError("no kinds of loads are registered; import rigidsim.model.loads first")
+    kinds = [LOAD_KINDS[name].Fields for name in sorted(LOAD_KINDS)]
+    return _with_loads(tuple(fields for fields in kinds if fields is not None))
+
+
+@lru_cache
+def _with_loads(fields: tuple[type[LoadFields], ...]) -> type[Config]:
+    union = Annotated[Union[fields], Field(discriminator="kind")]  # type: ignore[valid-type]  # noqa: UP007
+    return create_model(
+        "Config",
+        __base__=Config,
+        __doc__="One experiment.",
+        loads=(list[union], Field(default_factory=list)),
+    )

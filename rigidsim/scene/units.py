@@ -52,6 +52,14 @@ tonne = 1000 * kilogram = t
 dalton = 1.66053906892e-27 * kilogram = Da = u
 newton = kilogram * meter / second ** 2 = N
 joule = newton * meter = J
+watt = joule / second = W
+hertz = 1 / second = Hz
+ampere = [current] = A
+coulomb = ampere * second = C
+volt = watt / ampere = V
+weber = volt * second = Wb
+tesla = weber / meter ** 2 = T
+gauss = 1e-4 * tesla
 standard_gravity = 9.80665 * meter / second ** 2 = g0
 """.strip().splitlines()
 

@@ -1,1 +1,1 @@
-"""Numbers: precisions, the advance loop, sampling, evaluation."""
+"""Numbers: precisions, the loop over steps, sampling, evaluation."""

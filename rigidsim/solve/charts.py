@@ -1,8 +1,8 @@
-"""Changes of chart: a run in Euler angles goes on in a partner sequence where its own comes near its end.
+"""Changes of chart: a run in Euler angles continues in a partner sequence near its own singularity.
 
 The chart is changed at the first natural step boundary where its singular factor is below ``NEAR``: a
 function of the state alone, so that bits don't depend on how a run is driven. The other chart's factor is at
-least sqrt(1 - NEAR^2) there (see ``rigidsim.model.charts``), far from a change back.
+least sqrt(1 - NEAR^2) there (see ``rigidsim.model.euler_charts``), far from a change back.
 
 What is recorded stays in the asked sequence: in the partner chart the asked angles are followed from natural
 step to natural step (where they swing fast: in parts of steps), and each sample is joined to what was found
@@ -16,17 +16,18 @@ keeps the value it had.
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import heyoka as hy
 import mpmath
 import numpy as np
 
-from rigidsim.model.charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
+from rigidsim.model.euler_charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
 from rigidsim.model.system import System
 from rigidsim.scene.attitude import quaternion_from_euler
-from rigidsim.solve.precision import Precision
-from rigidsim.solve.winding import ANGLES, CHART, TURNS
+from rigidsim.solve.angle_wrapping import Angles, AngleState, AngleWrapping
+from rigidsim.solve.engine import CompiledFunction, Integrator
+from rigidsim.solve.precision import Precision, Scalar
 
 NEAR = 0.5
 """Singular factor from which a chart is left."""
@@ -36,8 +37,6 @@ _HALVINGS = 10  # of a step at most; what remains is a straight line but for 1e-
 _STRAIGHT = math.pi - 2.0**-7  # swing in such a part from which it went straight through
 _NEAR_POLE = 2.0**-20  # singular factor below which a reference doesn't tell its branch
 _TURN = 2 * math.pi
-
-Angles = tuple[float, float, float]
 
 
 class Lift:
@@ -52,7 +51,7 @@ class Lift:
         """+1 or -1: which of the two triples a middle angle belongs to."""
         return math.copysign(1.0, singular_factor(self._sequence, middle, math))
 
-    def __call__(self, before: Angles, angles: Angles) -> tuple[Angles, int, float]:
+    def __call__(self, before: Sequence[float], angles: Angles) -> tuple[Angles, int, float]:
         """The asked angles next to some shortly before.
 
         Args:
@@ -93,26 +92,26 @@ class Lift:
 class Charts:
     """The chart that a run is in, and the way from one to the other.
 
-    Called by the engine after each natural step; what it remembers stands in ``turns`` (see
-    ``rigidsim.solve.winding``) and ``changes``, arrays of whole numbers that checkpoints carry.
+    Called by the engine after each natural step; what it remembers stands in the wrapping's ``angles`` and in
+    ``changes``, both part of a checkpoint.
 
     Attributes:
-        changes: shape (1,), changes of chart so far.
+        changes: changes of chart so far.
     """
 
-    def __init__(self, asked: System, partner: System, precision: Precision, turns: np.ndarray) -> None:
+    def __init__(self, asked: System, partner: System, precision: Precision, wrapping: AngleWrapping) -> None:
         self._sequences = asked.sequence, partner.sequence
         self._positions = list(asked.angle_states)
         self._middle = self._positions[1]
         self._precision = precision
         self._half = precision.number(mpmath.mpf(0.5))
         self._lift = Lift(asked.sequence, precision)
-        self._turns = turns
-        self.changes = np.zeros(1, dtype=np.int64)
-        self._passed: list[tuple[Any, np.ndarray]] = []
+        self._wrapping = wrapping
+        self.changes = 0
+        self._passed: list[tuple[Scalar, tuple[float, ...]]] = []  # times and asked angles since ``begin``
         self._conversions = [self._compile(sequence) for sequence in self._sequences]
 
-    def _compile(self, sequence: str) -> Any:
+    def _compile(self, sequence: str) -> CompiledFunction:
         angles, branch = list(hy.make_vars("phi", "theta", "psi")), hy.make_vars("branch")
         precision = self._precision
         return hy.cfunc(
@@ -125,7 +124,7 @@ class Charts:
     @property
     def chart(self) -> int:
         """0 in the asked sequence, 1 in its partner."""
-        return int(self._turns[CHART])
+        return self._wrapping.angles.chart
 
     def near(self, state: np.ndarray) -> bool:
         """Whether the chart in use is to be left here."""
@@ -133,20 +132,21 @@ class Charts:
 
     # --- following the asked angles ---------------------------------------------------------------------
 
-    def begin(self, time: Any) -> None:
+    def begin(self, time: Scalar) -> None:
         """Steps follow; the latest ones' boundaries may be forgotten."""
-        self._passed = [(time, self._turns[ANGLES].copy())]
+        self._passed = [(time, self._wrapping.angles.reference)]
 
-    def __call__(self, integrator: Any) -> bool:
+    def __call__(self, integrator: Integrator) -> bool:
         """After a natural step: follow it; False where the chart is to be left."""
         state = integrator.state
         if self.chart:
             self._follow(integrator, integrator.time, state, _HALVINGS)
         return not self.near(state)
 
-    def _follow(self, integrator: Any, time: Any, state: np.ndarray, halvings: int) -> None:
+    def _follow(self, integrator: Integrator, time: Scalar, state: np.ndarray, halvings: int) -> None:
         """The asked angles from the latest known up to a state within the latest step."""
-        joined, _, swing = self._lift(angles_before(self._turns), self._angles(state))
+        known = self._wrapping.angles
+        joined, _, swing = self._lift(known.reference, self._angles(state))
         if swing > _SWING and halvings:
             before = self._passed[-1][0]
             middle = before + self._half * (time - before)
@@ -154,34 +154,35 @@ class Charts:
             self._follow(integrator, middle, between, halvings - 1)
             self._follow(integrator, time, state, halvings - 1)
             return
-        self._turns[ANGLES] = _as_bits(joined)
-        self._passed.append((time, self._turns[ANGLES].copy()))
+        self._wrapping.angles = known._replace(reference=joined)
+        self._passed.append((time, joined))
 
     def _angles(self, state: np.ndarray) -> Angles:
         a, b, c = (float(state[p]) for p in self._positions)
         return a, b, c
 
-    def rows(self, times: np.ndarray) -> np.ndarray:
-        """What each sample within the steps since ``begin`` is joined to: as ``turns``, shape (n, 7)."""
-        rows = np.tile(self._turns, (len(times), 1))
-        if self.chart:
-            boundary = np.zeros(len(times), dtype=np.int64)
-            for time, _ in self._passed[1:]:
-                boundary += np.asarray(times > time, dtype=bool)
-            rows[:, ANGLES] = np.array([angles for _, angles in self._passed])[boundary]
-        return rows
+    def references(self, times: np.ndarray) -> np.ndarray | None:
+        """The asked angles (n, 3), rad, before each of the times within the steps since ``begin``; None in
+        the asked chart.
+        """
+        if not self.chart:
+            return None
+        passed = np.zeros(len(times), dtype=np.int64)
+        for time, _ in self._passed[1:]:
+            passed += np.asarray(times > time, dtype=bool)
+        return np.array([angles for _, angles in self._passed])[passed]
 
     # --- changing ---------------------------------------------------------------------------------------
 
     def change(self, state: np.ndarray) -> np.ndarray:
         """Enter the other chart; returns the same state there, and counts."""
-        angles, turns = self._angles(state), self._turns[TURNS]
-        sign = self._quaternion(angles)
+        known, angles = self._wrapping.angles, self._angles(state)
+        sign = self._quaternion(angles, known)
         if self.chart:
-            before = angles_before(self._turns)
-            branch = self._lift.branch(before[1])
+            continuous = known.reference
+            branch = self._lift.branch(continuous[1])
         else:
-            before = tuple(a + _TURN * int(n) for a, n in zip(angles, turns, strict=True))  # type: ignore[assignment]
+            continuous = tuple(a + _TURN * n for a, n in zip(angles, known.turns, strict=True))
             branch = 1.0
         scalars = self._precision.zeros((4,))
         scalars[:3] = state[self._positions]
@@ -189,28 +190,18 @@ class Charts:
         result = np.array(state)
         result[self._positions] = self._conversions[self.chart](scalars)
         angles = self._angles(result)
-        self._turns[CHART] = 1 - self.chart
         if self.chart:
-            turns[:] = 0
-            self._turns[ANGLES] = _as_bits(before)
+            turns = [round((b - a) / _TURN) for a, b in zip(angles, continuous, strict=True)]
+            entered = AngleState(tuple(turns), 0, (0.0, 0.0, 0.0))
         else:
-            turns[:] = [round((b - a) / _TURN) for a, b in zip(angles, before, strict=True)]
-            self._turns[ANGLES] = 0
-        if float(np.dot(sign, self._quaternion(angles))) < 0:  # a full turn changes the quaternion's sign
-            turns[2] += 1
+            entered = AngleState((0, 0, 0), 1, continuous)
+        if float(np.dot(sign, self._quaternion(angles, entered))) < 0:  # a full turn changes its sign
+            a, b, c = entered.turns
+            entered = entered._replace(turns=(a, b, c + 1))
+        self._wrapping.angles = entered
         self.changes += 1
         return result
 
-    def _quaternion(self, angles: Angles) -> np.ndarray:
-        sign = -1.0 if self._turns[TURNS].sum() % 2 else 1.0
-        return sign * np.array(quaternion_from_euler(mpmath.fp, list(angles), self._sequences[self.chart]))
-
-
-def angles_before(row: np.ndarray) -> Angles:
-    """The asked angles that a row of ``turns`` remembers, rad."""
-    a, b, c = row[ANGLES].view(np.float64).tolist()
-    return a, b, c
-
-
-def _as_bits(angles: Angles) -> np.ndarray:
-    return np.array(angles, dtype=np.float64).view(np.int64)
+    def _quaternion(self, angles: Angles, of: AngleState) -> np.ndarray:
+        sign = -1.0 if sum(of.turns) % 2 else 1.0
+        return sign * np.array(quaternion_from_euler(mpmath.fp, list(angles), self._sequences[of.chart]))

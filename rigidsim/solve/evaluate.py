@@ -3,62 +3,106 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
 
 import heyoka as hy
 import mpmath
 import numpy as np
 
-from rigidsim.model.recording import Recorded
+from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.solve.charts import Lift, angles_before
+from rigidsim.solve.angle_wrapping import AngleWrapping
+from rigidsim.solve.charts import Lift
+from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
-from rigidsim.solve.winding import CHART, TURNS, Winding
+from rigidsim.solve.sample_block import SampleBlock
 
 _GROUP = 64  # rows; a multiple of every SIMD width
 
+RecordedParts = dict[str, list[np.ndarray]]
+"""By variable: float64 parts (n, components), whose sum is the value in SI (``Precision.parts``)."""
 
-class _Away:
-    """Recorded variables of samples in the partner chart."""
 
-    def __init__(self, system: System, compiled: Any, rowwise: Any, precision: Precision) -> None:
+def evaluate_rows(
+    function: CompiledFunction, states: np.ndarray, constants: np.ndarray | None = None
+) -> np.ndarray:
+    """Evaluate a compiled function at each row of states.
+
+    heyoka takes rows several at a time and the rest one by one, which differs in the last bit. Rows are
+    padded to whole groups, so that a row's bits don't depend on the block that it came in.
+
+    Args:
+        states: (n, states).
+        constants: the function's parameters, (k,) for all rows or (k, n).
+
+    Returns:
+        (outputs, n).
+    """
+    count = len(states)
+    padded = -(-count // _GROUP) * _GROUP
+    if padded > count:
+        states = np.concatenate([states, np.repeat(states[-1:], padded - count, axis=0)])
+    # compiled code for expressions without parameters refuses an array of them
+    arguments = {}
+    if constants is not None:
+        table = np.repeat(constants[:, None], padded, axis=1) if constants.ndim == 1 else constants
+        if table.shape[1] < padded:
+            table = np.concatenate([table, np.repeat(table[:, -1:], padded - count, axis=1)], axis=1)
+        arguments = {"pars": np.ascontiguousarray(table)}
+    return np.asarray(function(np.ascontiguousarray(states.T), **arguments))[:, :count]
+
+
+class _PartnerChart:
+    """Recorded variables of samples whose states are of the partner sequence."""
+
+    def __init__(
+        self,
+        system: System,
+        compiled: Callable[[list[hy.expression]], CompiledFunction],
+        precision: Precision,
+    ) -> None:
         partner = system.partner
         assert partner is not None
-        self._precision, self._rowwise = precision, rowwise
+        self._precision = precision
         self._lift = Lift(system.sequence, precision)
         self._positions = list(system.angle_states)
-        found = [r.first for r in partner.recorded if r.continuity == "winding"]
+        found = [r.first for r in partner.recorded if r.continuity == "wrapped"]
         self._angles = slice(found[0], found[0] + 3) if found else None
         self._outputs = compiled(partner.outputs)
         self._singular = compiled([partner.singular_factor])
 
-    def factors(self, states: np.ndarray) -> np.ndarray:
-        """Singular factors of the partner chart."""
-        return np.asarray(self._rowwise(self._singular, states)[0])
+    def singular_factors(self, states: np.ndarray) -> np.ndarray:
+        """Of the partner chart, (n,)."""
+        return np.asarray(evaluate_rows(self._singular, states)[0])
 
     def values(
-        self, states: np.ndarray, turns: np.ndarray, initial: np.ndarray, winding: Winding
+        self, states: np.ndarray, reference: np.ndarray, initial: np.ndarray, wrapping: AngleWrapping
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """All outputs (outputs, n), and the recorded Euler angles of the asked sequence (n, 3), if any.
 
         Args:
+            states, reference: as of ``SampleBlock``.
             initial: invariants' components.
         """
         if self._angles is None:
-            return self._rowwise(self._outputs, states, initial if len(initial) else None), None
+            return evaluate_rows(self._outputs, states, initial if len(initial) else None), None
         plain = states[:, self._positions].astype(np.float64)
-        lifted = [self._lift(angles_before(t), tuple(a)) for t, a in zip(turns, plain.tolist(), strict=True)]
+        lifted = [
+            self._lift(before, tuple(angles))
+            for before, angles in zip(reference.tolist(), plain.tolist(), strict=True)
+        ]
         near = np.array([angles for angles, *_ in lifted])
         either = {x: self._precision.number(mpmath.mpf(x)) for x in (1.0, -1.0)}
         branches = np.array(
             [either[self._lift.branch(angles[1])] for angles, *_ in lifted], dtype=self._precision.scalar
         )
         constants = np.concatenate([np.repeat(initial[:, None], len(states), axis=1), [branches]])
-        values = np.asarray(self._rowwise(self._outputs, states, constants))
+        values = evaluate_rows(self._outputs, states, constants)
         angles = values[self._angles].T
         full = np.rint((near - angles.astype(np.float64)) / (2 * np.pi))
-        angles = winding.unwrapped(angles, full)
+        angles = wrapping.unwrapped(angles, full)
         for row, (_, side, _) in enumerate(lifted):
             if side:  # in the singularity the first angle is kept, and the sum (difference) is the state's
                 moved = self._precision.number(mpmath.mpf(near[row, 0])) - angles[row, 0]
@@ -68,12 +112,13 @@ class _Away:
 
 
 @dataclass
-class Memory:
-    """What joins a block of samples to the one before (part of a checkpoint).
+class Continuity:
+    """What joins the variables of a block of samples to those of the block before.
 
     Attributes:
-        turns: of derived Euler angles, shape (3,), and the last raw angles.
-        last_angles, last_quaternion: float64 copies; None before the first block.
+        turns: full turns added to derived Euler angles, (3,).
+        last_angles, last_quaternion: of the latest sample, float64, the angles before those turns; None
+            before the first block.
     """
 
     turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
@@ -86,73 +131,43 @@ class Evaluator:
 
     Attributes:
         initial: initial values of the invariants' components, in internal units.
-        memory: see ``Memory``.
+        continuity: to the next block.
     """
 
-    def __init__(self, system: System, precision: Precision, winding: Winding) -> None:
+    def __init__(self, system: System, precision: Precision, wrapping: AngleWrapping) -> None:
         self._system = system
         self._precision = precision
-        self._winding = winding
-        self.memory = Memory()
+        self._wrapping = wrapping
+        self.continuity = Continuity()
         self._outputs = self._compile(system.outputs) if system.outputs else None
         components = [x for invariant in system.invariants for x in invariant.expressions]
         self._invariants = self._compile(components)
         initial = precision.array(system.initial)
-        self.initial = self._rowwise(self._invariants, initial[None, :])[:, 0] if components else initial[:0]
+        self.initial = evaluate_rows(self._invariants, initial[None, :])[:, 0] if components else initial[:0]
         self._parameters = len(components)
-        self._away: _Away | None = None
         factor = system.singular_factor
         self._singular = None if factor is None else self._compile([factor])
 
-    def singular_factors(self, states: np.ndarray, turns: np.ndarray) -> np.ndarray | None:
-        """What vanishes in the singularity of the chart in use; None without one.
+    def singular_factors(self, states: np.ndarray, chart: np.ndarray) -> np.ndarray | None:
+        """What vanishes in the singularity of the chart in use, (n,); None in formulations without one.
 
         Args:
-            states, turns: as of ``evaluate``.
+            states, chart: as of ``SampleBlock``.
         """
         if self._singular is None:
             return None
-        factors = self._rowwise(self._singular, states)[0]
-        partner = self._in_partner(turns)
-        if partner.any():
-            factors[partner] = self._partner.factors(states[partner])
+        factors = evaluate_rows(self._singular, states)[0]
+        in_partner = chart != 0
+        if in_partner.any():
+            factors[in_partner] = self._partner.singular_factors(states[in_partner])
         return factors
 
-    @property
-    def _partner(self) -> _Away:
-        """For samples in the partner chart; compiled when there are any."""
-        if self._away is None:
-            self._away = _Away(self._system, self._compile, self._rowwise, self._precision)
-        return self._away
+    @cached_property
+    def _partner(self) -> _PartnerChart:
+        """Compiled when there are samples in the partner chart."""
+        return _PartnerChart(self._system, self._compile, self._precision)
 
-    @staticmethod
-    def _in_partner(turns: np.ndarray) -> np.ndarray:
-        if turns.shape[1] <= CHART:
-            return np.zeros(len(turns), dtype=bool)
-        return np.asarray(turns[:, CHART] != 0, dtype=bool)
-
-    @staticmethod
-    def _rowwise(function: Any, states: np.ndarray, constants: np.ndarray | None = None) -> np.ndarray:
-        """Evaluate at each row of states (n, states), with constants for all (k,) or for each (k, n); returns
-        (outputs, n).
-
-        heyoka takes rows several at a time and the rest one by one, which differs in the last bit. Rows
-        are padded to whole groups, so that a row's bits don't depend on the block that it came in.
-        """
-        count = len(states)
-        padded = -(-count // _GROUP) * _GROUP
-        if padded > count:
-            states = np.concatenate([states, np.repeat(states[-1:], padded - count, axis=0)])
-        # compiled code for expressions without parameters refuses an array of them
-        arguments = {}
-        if constants is not None:
-            table = np.repeat(constants[:, None], padded, axis=1) if constants.ndim == 1 else constants
-            if table.shape[1] < padded:
-                table = np.concatenate([table, np.repeat(table[:, -1:], padded - count, axis=1)], axis=1)
-            arguments = {"pars": np.ascontiguousarray(table)}
-        return np.asarray(function(np.ascontiguousarray(states.T), **arguments))[:, :count]
-
-    def _compile(self, expressions: list[Any]) -> Any:
+    def _compile(self, expressions: list[hy.expression]) -> CompiledFunction:
         return hy.cfunc(
             expressions,
             self._system.variables,
@@ -160,32 +175,27 @@ class Evaluator:
             **self._precision.options,
         )
 
-    def evaluate(self, states: np.ndarray, turns: np.ndarray) -> dict[str, list[np.ndarray]]:
-        """All variables of a block.
-
-        Args:
-            states: (n, states), internal units, angles wrapped.
-            turns: (n, ...) full turns of the angle states, and their chart (see ``Winding``).
+    def evaluate(self, block: SampleBlock) -> RecordedParts:
+        """All variables of a block, which follows the one evaluated before.
 
         Returns:
-            For each recorded variable float64 parts of shape (n, components) in SI (see
-            ``Precision.parts``), and for each invariant its drift, (n, 1), one part.
+            The recorded variables, and of each invariant its drift, (n, 1), one part.
         """
         assert self._outputs is not None
-        values = self._rowwise(self._outputs, states, self.initial if self._parameters else None)
-        partner = self._in_partner(turns)
+        values = evaluate_rows(self._outputs, block.states, self.initial if self._parameters else None)
+        in_partner = block.chart != 0
         angles: np.ndarray | None = None
-        if partner.any():
-            there, angles = self._partner.values(states[partner], turns[partner], self.initial, self._winding)
-            values[:, partner] = there
-        turns = turns[:, TURNS]
-        result: dict[str, list[np.ndarray]] = {}
+        if in_partner.any():
+            states, reference = block.states[in_partner], block.reference[in_partner]
+            there, angles = self._partner.values(states, reference, self.initial, self._wrapping)
+            values[:, in_partner] = there
+        result: RecordedParts = {}
         for variable in self._system.recorded:
-            block = values[variable.first : variable.first + variable.count].T
-            block = self._joined(variable, block, turns)
-            if angles is not None and variable.continuity == "winding":
-                block[partner] = angles
-            parts = self._precision.parts(block)
+            columns = values[variable.first : variable.first + variable.count].T
+            columns = self._joined(variable, columns, block.turns)
+            if angles is not None and variable.continuity == "wrapped":
+                columns[in_partner] = angles
+            parts = self._precision.parts(columns)
             exponents = np.array(variable.exponents, dtype=np.int32)
             if exponents.any():
                 parts = [np.ldexp(part, exponents) for part in parts]
@@ -196,17 +206,17 @@ class Evaluator:
             result[f"{invariant.name}_drift"] = [drift[:, None]]
         return result
 
-    def evaluate_apart(self, states: np.ndarray, turns: np.ndarray) -> dict[str, list[np.ndarray]]:
+    def evaluate_apart(self, block: SampleBlock) -> RecordedParts:
         """As ``evaluate``, for states that aren't among the samples: nothing is joined to them later."""
-        memory = copy.deepcopy(self.memory)
+        before = copy.deepcopy(self.continuity)
         try:
-            return self.evaluate(states, turns)
+            return self.evaluate(block)
         finally:
-            self.memory = memory
+            self.continuity = before
 
     def _joined(self, variable: Recorded, block: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        if variable.continuity == "winding":
-            return self._winding.unwrapped(block, turns)
+        if variable.continuity == "wrapped":
+            return self._wrapping.unwrapped(block, turns)
         if variable.continuity == "parity":
             odd = turns.sum(axis=1) % 2 == 1
             block = block.copy()
@@ -221,24 +231,24 @@ class Evaluator:
     def _nearest(self, block: np.ndarray) -> np.ndarray:
         """Give each quaternion the sign nearest to the one before."""
         plain = block.astype(np.float64)
-        before = self.memory.last_quaternion
+        before = self.continuity.last_quaternion
         if before is None:
             before = np.array([float(x) for x in self._system.scene.quaternion])
         products = np.einsum("ij,ij->i", plain, np.vstack([before, plain[:-1]]))
         signs = np.cumprod(np.where(products < 0, -1, 1))
         block = block.copy()
         block[signs < 0] = -block[signs < 0]
-        self.memory.last_quaternion = plain[-1] * signs[-1]
+        self.continuity.last_quaternion = plain[-1] * signs[-1]
         return block
 
     def _unwrapped(self, block: np.ndarray) -> np.ndarray:
         """Add the full turns that make each angle nearest to the sample before."""
         plain = block.astype(np.float64)
-        before = plain[0] if self.memory.last_angles is None else self.memory.last_angles
+        before = plain[0] if self.continuity.last_angles is None else self.continuity.last_angles
         jumps = np.diff(np.vstack([before, plain]), axis=0)
-        turns = self.memory.turns - np.cumsum(np.rint(jumps / (2 * np.pi)), axis=0).astype(np.int64)
-        self.memory.turns, self.memory.last_angles = turns[-1], plain[-1]
-        return self._winding.unwrapped(block, turns)
+        turns = self.continuity.turns - np.cumsum(np.rint(jumps / (2 * np.pi)), axis=0).astype(np.int64)
+        self.continuity.turns, self.continuity.last_angles = turns[-1], plain[-1]
+        return self._wrapping.unwrapped(block, turns)
 
     def initial_invariants(self) -> dict[str, list[float]]:
         """Initial values of the invariants' components in SI, nearest doubles, by name."""

@@ -7,15 +7,18 @@ with it.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import StoppedError
 from rigidsim.model.system import System
-from rigidsim.solve.precision import Precision
+from rigidsim.solve.angle_wrapping import AngleState, AngleWrapping
+from rigidsim.solve.engine import Integrator
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.sample_block import SampleBlock
 
 MOST_EVENTS = 1_000_000
 _DIRECTIONS = {
@@ -26,13 +29,19 @@ _DIRECTIONS = {
 
 
 @dataclass(frozen=True)
-class Found:
-    """One crossing: which, when (internal units), the state there, full turns of the angle states."""
+class FoundEvent:
+    """One crossing.
+
+    Attributes:
+        index: of the event among the system's.
+        time, state: internal units, in the run's precision; the state is of shape (states,).
+        angles: what the angle states stood for at the beginning of the step that it lies in.
+    """
 
     index: int
-    time: Any
+    time: Scalar
     state: np.ndarray
-    turns: np.ndarray
+    angles: AngleState
 
 
 @dataclass
@@ -40,26 +49,37 @@ class EventLog:
     """All crossings so far, in the order of time.
 
     Attributes:
-        turns: full turns of the angle states, kept up to date by the winding that owns the array.
+        stops: for each of the system's events whether it ends the run.
+        wrapping: knows what the angle states stand for; None where there are none.
         stop: time of the first crossing that ends the run, or None.
     """
 
-    stops: list[bool]
-    turns: np.ndarray
-    found: list[Found] = field(default_factory=list)
-    stop: Any | None = None
+    stops: list[bool] = field(default_factory=list)
+    wrapping: AngleWrapping | None = None
+    found: list[FoundEvent] = field(default_factory=list)
+    stop: Scalar | None = None
 
-    def note(self, index: int, time: Any, state: np.ndarray) -> None:
-        """Take a crossing from the engine."""
+    def note(self, index: int, time: Scalar, state: np.ndarray) -> None:
+        """Take a crossing from the engine.
+
+        Raises:
+            StoppedError: there are too many.
+        """
         if len(self.found) >= MOST_EVENTS:
             raise StoppedError(
-                f"more than {MOST_EVENTS} events; give them a direction, or an expression that crosses less"
+                f"more than {MOST_EVENTS} events; give them a direction, or an expression that crosses zero "
+                "less often"
             )
         if self.stop is not None and time > self.stop:
             return
-        self.found.append(Found(index, time, np.array(state), self.turns.copy()))
+        angles = AngleState() if self.wrapping is None else self.wrapping.angles
+        self.found.append(FoundEvent(index, time, np.array(state), angles))
         if self.stops[index] and self.stop is None:
             self.stop = time
+
+    def occurrences(self, index: int, last: float) -> list[FoundEvent]:
+        """The crossings of one event up to a time, internal units."""
+        return [f for f in self.found if f.index == index and float(f.time) <= last]
 
     def back_to(self, count: int) -> None:
         """Forget all but the first ``count``.
@@ -73,11 +93,25 @@ class EventLog:
         self.stop = next((f.time for f in self.found if self.stops[f.index]), None)
 
 
-def engine_events(system: System, precision: Precision, log: EventLog) -> list[Any]:
+def samples_at(found: Sequence[FoundEvent], precision: Precision) -> SampleBlock:
+    """Crossings, at least one, as samples that can be evaluated."""
+    n = len(found)
+    return SampleBlock(
+        first=0,
+        times=np.array([f.time for f in found], dtype=precision.scalar),
+        states=np.array([f.state for f in found], dtype=precision.scalar),
+        turns=np.array([f.angles.turns for f in found], dtype=np.int64).reshape(n, -1),
+        chart=np.array([f.angles.chart for f in found], dtype=np.int64),
+        reference=np.array([f.angles.reference for f in found], dtype=np.float64).reshape(n, -1),
+        put_back=np.zeros((n, 0)),
+    )
+
+
+def engine_events(system: System, precision: Precision, log: EventLog) -> list[hy.nt_event]:
     """heyoka's events for a system's crossings."""
 
-    def callback(index: int) -> Any:
-        def called(integrator: Any, time: Any, _: int) -> None:
+    def callback(index: int) -> Callable[[Integrator, Scalar, int], None]:
+        def called(integrator: Integrator, time: Scalar, _: int) -> None:
             log.note(index, time, integrator.update_d_output(time))
 
         return called

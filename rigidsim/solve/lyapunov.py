@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.rotations import Expression
+from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth
@@ -63,7 +63,7 @@ class LyapunovSpectrum:
 
 @dataclass
 class Convergence:
-    """How far a spectrum is: plain float64 arrays, all that is needed to go on with the same bits.
+    """How far a spectrum is: plain float64 arrays, all that is needed to resume with the same bits.
 
     Attributes:
         number: intervals done.
@@ -179,7 +179,7 @@ def _reached(start: set[str], ways: Mapping[str, set[str]]) -> set[str]:
     return found
 
 
-def tangent_equations(system: System, moving: Sequence[int]) -> list[tuple[Expression, Expression]]:
+def tangent_equations(system: System, moving: Sequence[int]) -> list[tuple[Symbolic, Symbolic]]:
     """The system's equations, then those of the derivatives of moving states by their initial values, row by
     row. All other states are integrated without: the step control must see what they see.
     """

@@ -11,8 +11,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 import heyoka as hy
 import mpmath
@@ -20,9 +21,18 @@ import numpy as np
 from mpmath.libmp import mpf_pos, round_nearest
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.context import working_bits
+from rigidsim.scene.arithmetic import working_bits
 
 _CHUNK_BITS = 24  # exact in every type
+
+Scalar: TypeAlias = "float | np.floating[Any] | hy.real128 | hy.real"
+"""A number of a run's own precision (``Precision.scalar``)."""
+
+
+class Mpf(Protocol):
+    """A number of any mpmath context."""
+
+    _mpf_: tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
@@ -40,12 +50,12 @@ class Precision:
 
     name: str
     bits: int
-    scalar: Any
+    scalar: Any  # a constructor, numpy's dtype and heyoka's fp_type in one
     cheap: bool
     compact: bool
 
     @property
-    def epsilon(self) -> Any:
+    def epsilon(self) -> mpmath.mpf:
         """Spacing of numbers just above 1, as mpf."""
         return mpmath.mpf(2) ** (1 - self.bits)
 
@@ -57,7 +67,7 @@ class Precision:
             options["prec"] = self.bits
         return options
 
-    def number(self, value: Any) -> Any:
+    def number(self, value: Mpf) -> Scalar:
         """The scalar nearest to an mpf (ties to even), with no double in between.
 
         Raises:
@@ -84,14 +94,14 @@ class Precision:
             raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the range of single precision")
         return -total if sign else total
 
-    def _scalar(self, value: float) -> Any:
+    def _scalar(self, value: float) -> Scalar:
         return hy.real(value, self.bits) if self.scalar is hy.real else self.scalar(value)
 
-    def array(self, values: list[Any]) -> np.ndarray:
+    def array(self, values: Sequence[Mpf]) -> np.ndarray:
         """A list of mpf as an array of this precision."""
         return np.array([self.number(v) for v in values], dtype=self.scalar)
 
-    def exact(self, value: Any) -> Any:
+    def exact(self, value: Scalar) -> mpmath.mpf:
         """A scalar of this precision as an mpf with the same value."""
         total = mpmath.mpf(0)
         with mpmath.workprec(self.bits + 64):

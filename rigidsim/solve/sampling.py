@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.scene import SampleTimes
-from rigidsim.solve.precision import Precision
+from rigidsim.solve.precision import Mpf, Precision, Scalar, precision_of
 
 
 class SampleClock:
@@ -54,7 +54,7 @@ class SampleClock:
             times[self._last_index - first] = self._end
         return times.astype(self._precision.scalar) if self._precision.narrow else times
 
-    def at(self, index: int) -> Any:
+    def at(self, index: int) -> Scalar:
         """One sample's time in internal units, a scalar of the precision."""
         return self.internal(index, index + 1)[0]
 
@@ -78,14 +78,9 @@ class SampleClock:
                     )
 
 
-def _double_or(precision: Precision) -> Any:
+def _double_or(precision: Precision) -> Callable[[Mpf], Scalar]:
     """Conversion for grids: single precision computes them in double, since i alone may not fit 24 bits."""
     if not precision.narrow:
         return precision.number
 
-    def to_double(value: Any) -> np.float64:
-        from rigidsim.solve.precision import precision_of
-
-        return np.float64(precision_of("double").number(value))
-
-    return to_double
+    return lambda value: np.float64(precision_of("double").number(value))

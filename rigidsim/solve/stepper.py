@@ -8,15 +8,17 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.solve.engine import Integrator
 from rigidsim.solve.events import EventLog, engine_events
-from rigidsim.solve.precision import Precision
+from rigidsim.solve.precision import Precision, Scalar
 
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
@@ -27,9 +29,15 @@ _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles 
 
 @dataclass(frozen=True)
 class Mark:
-    """A natural step boundary: all that is needed to go on with the same bits."""
+    """A natural step boundary of the engine.
 
-    time: tuple[Any, Any]
+    Attributes:
+        time: two numbers whose sum it is, internal units.
+        state: (states,), internal units.
+        events, steps: how many were found and taken so far.
+    """
+
+    time: tuple[Scalar, Scalar]
     state: np.ndarray
     events: int = 0
     steps: int = 0
@@ -38,10 +46,10 @@ class Mark:
 class Watcher(Protocol):
     """Looks at each natural step, whose dense output it may use."""
 
-    def begin(self, time: Any) -> None:
+    def begin(self, time: Scalar) -> None:
         """Steps follow, from this time on."""
 
-    def __call__(self, integrator: Any) -> bool:
+    def __call__(self, integrator: Integrator) -> bool:
         """After each step; False ends the call that took it."""
 
 
@@ -62,14 +70,14 @@ class Stepper:
         self,
         system: System,
         precision: Precision,
-        tolerance: Any,
-        start: Any,
+        tolerance: Scalar | None,
+        start: Scalar,
         log: EventLog | None = None,
     ) -> None:
         self.system = system
         self.watcher: Watcher | None = None
         self.precision, self._tolerance, self._start = precision, tolerance, start
-        self.log = log or EventLog([], np.zeros(0, dtype=np.int64))
+        self.log = log or EventLog()
         self.has_events = log is not None and bool(system.crossings)
         self._integrator = self._compiled(system)
         self._charts = {0: self._integrator}
@@ -81,7 +89,7 @@ class Stepper:
         self.steps = 0
         self.smallest = self.largest = 0.0
 
-    def _compiled(self, system: System) -> Any:
+    def _compiled(self, system: System) -> Integrator:
         options = dict(self.precision.options)
         if self.has_events:
             options["nt_events"] = engine_events(system, self.precision, self.log)
@@ -111,12 +119,12 @@ class Stepper:
         return self.watcher
 
     @property
-    def integrator(self) -> Any:
+    def integrator(self) -> Integrator:
         """The heyoka object in use (for provenance)."""
         return self._integrator
 
     @property
-    def time(self) -> Any:
+    def time(self) -> Scalar:
         """Current time (high part), internal units."""
         return self._integrator.time
 
@@ -171,7 +179,7 @@ class Stepper:
             self.watcher(self._integrator)
         return True
 
-    def dense(self, time: Any) -> np.ndarray:
+    def dense(self, time: Scalar) -> np.ndarray:
         """State at a time within the step just taken by ``step``, shape (states,)."""
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
@@ -193,7 +201,7 @@ class Stepper:
         outcome = self._integrator.propagate_until(time, max_steps=100_000, max_delta_t=self._longest)[0]
         return bool(outcome == hy.taylor_outcome.time_limit)
 
-    def block(self, count: int) -> tuple[bool, Any]:
+    def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
         """``count`` steps with dense output: whether all went well, and a function of times (n,) that
         returns states (n, states).
         """
@@ -207,7 +215,7 @@ class Stepper:
         )
         return self._account(outcome, smallest, largest, taken), output
 
-    def _account(self, outcome: Any, smallest: Any, largest: Any, taken: int) -> bool:
+    def _account(self, outcome: hy.taylor_outcome, smallest: Scalar, largest: Scalar, taken: int) -> bool:
         self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
         if taken and self.largest == 0.0:  # heyoka leaves out steps of the greatest size allowed
             self.smallest = self.largest = float(self._longest)

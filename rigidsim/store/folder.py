@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
-from rigidsim.store import netcdf, provenance, segments, summary_file
+from rigidsim.store import atomic, provenance, segments
+from rigidsim.store.summary import Brief, read_summary
 
 _REOPENED = ".segments.reopened"
 
@@ -73,7 +73,7 @@ class RunFolder:
         """
         self.create(force=force)
         try:
-            netcdf.write_bytes(self.config, config.encode())
+            atomic.write_bytes(self.config, config.encode())
             self.segments.mkdir()
         except OSError as error:
             raise self._unwritable(error) from None
@@ -112,7 +112,7 @@ class RunFolder:
             for path in folders:
                 segments.remove(path)
             self.path.mkdir(parents=True, exist_ok=True)
-            netcdf.sync_folder(self.path.parent)
+            atomic.sync_folder(self.path.parent)
         except OSError as error:
             raise self._unwritable(error) from None
 
@@ -144,7 +144,7 @@ class RunFolder:
                 raise StoppedWritingError(
                     f"{self.path}: can't be read or written: {error.filename or 'a file'}: "
                     f"{error.strerror or error}; what was saved stays, and {once_mended(error)}, rigidsim "
-                    "resume goes on from there"
+                    "resume continues from there"
                 ) from error
         finally:
             os.close(descriptor)
@@ -198,33 +198,33 @@ class RunFolder:
         try:
             os.link(self.dataset, prepared / "00000000.h5")
         except OSError:  # a file system without hard links
-            with netcdf.atomic(prepared / "00000000.h5") as temporary:
+            with atomic.replacing(prepared / "00000000.h5") as temporary:
                 shutil.copyfile(self.dataset, temporary)
-        netcdf.write_bytes(prepared / "00000001.h5", self.checkpoint.read_bytes())
+        atomic.write_bytes(prepared / "00000001.h5", self.checkpoint.read_bytes())
         prepared.replace(self.segments)
-        netcdf.sync_folder(self.path)
+        atomic.sync_folder(self.path)
         for path in (self.summary, self.timeline, self.dataset, self.checkpoint):
             path.unlink(missing_ok=True)
 
-    def write_summary(self, summary: dict[str, Any]) -> None:
+    def write_summary(self, summary: Brief) -> None:
         """Write ``summary.json`` atomically."""
-        text = json.dumps(summary, indent=2, allow_nan=False, default=str)
-        netcdf.write_bytes(self.summary, (text + "\n").encode())
+        text = json.dumps(summary.as_dict(), indent=2, allow_nan=False)
+        atomic.write_bytes(self.summary, (text + "\n").encode())
 
-    def note_timeline(self, summary: dict[str, Any], drawn: Path) -> None:
+    def note_timeline(self, summary: Brief, drawn: Path) -> None:
         """Name the timeline that was drawn again for a complete run in its summary, for ``verify``."""
-        if drawn == self.timeline and "dataset_sha256" in summary and not self.segments.exists():
-            self.write_summary({**summary, "timeline_sha256": provenance.file_sha256(drawn)})
+        if drawn == self.timeline and summary.dataset_digest is not None and not self.segments.exists():
+            self.write_summary(summary.having(timeline_sha256=provenance.file_sha256(drawn)))
 
-    def read_summary(self) -> dict[str, Any]:
+    def read_summary(self) -> Brief:
         """The summary; a run that was killed has none and reads as "running".
 
         Raises:
             RunFolderError: damaged.
         """
         if not self.summary.exists():
-            return {"status": "running", "message": "the run is under way, or was killed"}
-        return summary_file.read_summary(self.summary)
+            return Brief(status="running", message="the run is under way, or was killed")
+        return read_summary(self.summary)
 
 
 def _may_write(folder: Path) -> bool:

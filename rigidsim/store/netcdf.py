@@ -1,15 +1,10 @@
-"""Writing netCDF-4 files that xarray, netCDF4, h5py and ncdump all read, never visible half-written.
-
-A file comes into being under a temporary name, is synced to disk, and then takes its name in one atomic
-step; so a file with a final name is whole, whatever kills the process or fills the disk.
-"""
+"""Writing netCDF-4 files that xarray, netCDF4, h5py and ncdump all read."""
 
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,40 +19,6 @@ CHUNK_ROWS = 8192
 GZIP_LEVEL = 4  # with shuffle: every reader opens it (other filters fail in some)
 Block = Mapping[str, Sequence[np.ndarray]]
 """Variable name to float64 parts, each of shape (rows, components)."""
-
-
-@contextmanager
-def atomic(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` that replaces it when the block ends without an error."""
-    temporary = path.with_name(f".{path.name}.partial")
-    try:
-        yield temporary
-        descriptor = os.open(temporary, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-        os.replace(temporary, path)
-        sync_folder(path.parent)
-    except BaseException:
-        with suppress(OSError):  # of a file system that became read-only; what matters is the first error
-            temporary.unlink(missing_ok=True)
-        raise
-
-
-def sync_folder(folder: Path) -> None:
-    """Make new names in a folder outlast a loss of power."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def write_bytes(path: Path, content: bytes | memoryview) -> None:
-    """Write a small file atomically."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(content)
 
 
 def declare(

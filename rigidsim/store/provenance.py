@@ -12,9 +12,6 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-BITS = ("version_", "code_")
-"""Prefixes of the attributes that bits can depend on, beside the run's own settings."""
-
 
 def cpu_model() -> str:
     """The processor's name, from the kernel where it tells."""

@@ -21,17 +21,28 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
-from rigidsim.store import netcdf
+from rigidsim.store import atomic, netcdf
+from rigidsim.store.hdf5_sink import sink
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
-from rigidsim.store.sink import sink
 from rigidsim.store.variables import Extra, Variable
 
-SEGMENT_BYTES = 16_000_000  # twice that is in memory while a segment is put together
-SEGMENT_SECONDS = 30.0
 REMOVED = ".segments.removed"
 """Where segments go before they are deleted."""
 _CHUNKS_AT_ONCE = 16
 Arrays = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class SegmentLimits:
+    """When a segment is due.
+
+    Attributes:
+        bytes: of what is collected; twice that is in memory while a segment is put together.
+        seconds: since the latest one, which is what a crash can cost. A segment takes some 20 ms.
+    """
+
+    bytes: int = 16_000_000
+    seconds: float = 30.0
 
 
 @dataclass(frozen=True)
@@ -67,6 +78,7 @@ class SegmentWriter:
         variables: of the dataset, time first.
         attributes: root attributes that make a segment readable on its own; ``run_id`` among them.
         chain: segments written before, to go on from.
+        limits: when a segment is due.
     """
 
     def __init__(
@@ -75,8 +87,10 @@ class SegmentWriter:
         variables: Sequence[Variable],
         attributes: Mapping[str, Any],
         chain: Chain | None = None,
+        limits: SegmentLimits | None = None,
     ) -> None:
         chain = chain or Chain()
+        self._limits = limits or SegmentLimits()
         self._folder = folder
         self._variables = variables
         self._attributes = dict(attributes)
@@ -90,7 +104,7 @@ class SegmentWriter:
         self.dataset_sha256 = ""
         with self._writing():
             folder.mkdir(parents=True, exist_ok=True)
-            netcdf.sync_folder(folder.parent)
+            atomic.sync_folder(folder.parent)
 
     def add(self, block: netcdf.Block) -> None:
         """Take a block of samples."""
@@ -102,8 +116,8 @@ class SegmentWriter:
     @property
     def due(self) -> bool:
         """Whether what is collected is large, or the last segment so old that losing the time would hurt."""
-        large = self._rows * self._row_bytes >= SEGMENT_BYTES
-        return large or time.monotonic() - self._saved >= SEGMENT_SECONDS
+        large = self._rows * self._row_bytes >= self._limits.bytes
+        return large or time.monotonic() - self._saved >= self._limits.seconds
 
     def flush(self, checkpoint: Arrays, events: Arrays) -> None:
         """Write what is collected, which may be nothing but the checkpoint; on return it is saved.
@@ -118,7 +132,7 @@ class SegmentWriter:
         content = self._image(self._collected(), self._rows, checkpoint, events, self._place())
         path = self._folder / f"{self.count:08d}.h5"
         with self._writing():
-            netcdf.write_bytes(path, content)
+            atomic.write_bytes(path, content)
         self._seal = seal_of(content)
         self.count += 1
         self.saved_rows += self._rows
@@ -143,7 +157,7 @@ class SegmentWriter:
             raise StoppedWritingError(
                 f"{self._folder.parent}: can't be written: {error.strerror or error}; "
                 f"{self.saved_rows} samples are saved in {self._folder.name}/; "
-                f"{once_mended(error)}, rigidsim resume goes on from there"
+                f"{once_mended(error)}, rigidsim resume continues from there"
             ) from error
 
     def _collected(self) -> netcdf.Block:
@@ -174,7 +188,7 @@ class SegmentWriter:
         if len(paths) < self.count:  # rows that nothing fills would read as zeros
             raise RunFolderError(f"{self._folder}: segment {len(paths):08d}.h5 is missing")
         rows = self.saved_rows + self._rows
-        with self._writing(), netcdf.atomic(target) as temporary:
+        with self._writing(), atomic.replacing(target) as temporary:
             with sink(temporary) as target_file, h5netcdf.File(target_file, "w") as file:
                 netcdf.declare(file, self._variables, rows, attributes, compressed=True)
                 first = 0
@@ -189,7 +203,7 @@ class SegmentWriter:
             if checkpoint is not None:
                 path, last, events = checkpoint
                 place = {"segment": 1, "first_sample": rows, "previous_seal": content_seal}
-                netcdf.write_bytes(path, self._image({}, 0, last, events, place))
+                atomic.write_bytes(path, self._image({}, 0, last, events, place))
             conclude()
         remove(self._folder)
         return rows
@@ -315,5 +329,5 @@ def remove(folder: Path) -> None:
     shutil.rmtree(gone, ignore_errors=True)
     with suppress(FileNotFoundError):
         folder.replace(gone)
-        netcdf.sync_folder(folder.parent)
+        atomic.sync_folder(folder.parent)
     shutil.rmtree(gone, ignore_errors=True)

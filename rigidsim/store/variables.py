@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from itertools import count, takewhile
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
 
 LABELS: dict[str, list[str]] = {
     "body_axis": ["x", "y", "z"],
@@ -42,9 +46,8 @@ class Variable:
         return tuple(len(LABELS[dim]) for dim in self.dims)
 
     def part_names(self) -> list[str]:
-        """``name``, ``name_lo``, ``name_lo2``, ..."""
-        suffixes = ["", "_lo", *(f"_lo{n}" for n in range(2, self.parts))]
-        return [self.name + suffix for suffix in suffixes[: self.parts]]
+        """The value's own name, then those of its residuals."""
+        return [part_name(self.name, part) for part in range(self.parts)]
 
     def part_attributes(self, part: int) -> dict[str, Any]:
         """Attributes of one part; residuals say what they belong to."""
@@ -59,6 +62,17 @@ class Variable:
             "long_name": f"residual {part} of {self.name}",
             "residual_of": self.name,
         }
+
+
+def part_name(name: str, part: int) -> str:
+    """What the parts of a value are called: ``name``, ``name_lo``, ``name_lo2``, ``name_lo3``, ..."""
+    return name + ("", "_lo")[part] if part < 2 else f"{name}_lo{part}"
+
+
+def parts_in(dataset: xarray.Dataset, name: str) -> list[str]:
+    """Names of the parts that a dataset holds of a value, whose sum, smallest first, is the exact value."""
+    residuals = takewhile(dataset.variables.__contains__, (part_name(name, part) for part in count(1)))
+    return [name, *takewhile(lambda residual: "residual_of" in dataset[residual].attrs, residuals)]
 
 
 def time_variable(parts: int) -> Variable:

@@ -10,32 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import support
 from typer.testing import CliRunner
 
-from rigidsim.cli import app
-
-BODY = (
-    "[body]\nprincipal_moments = [1, 2, 2.5]\n"
-    "[initial]\nangular_velocity = [0.3, 1.0, 0.5]\neuler_angles = [0.2, 1.1, 0.7]\n"
-)
+from rigidsim.cli.app import app
 
 
 @pytest.fixture
 def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
-    """Writes ``NAME.toml`` in an empty working folder and returns its name."""
+    """Writes ``NAME.toml`` in an empty working folder and returns its name; see ``support.config``."""
     monkeypatch.chdir(tmp_path)
 
-    def write(
-        name: str = "free",
-        time: str = "end = 3\nsamples = 49",
-        rest: str = "",
-        integrator: str = "",
-        body: str = BODY,
-    ) -> str:
-        Path(f"{name}.toml").write_text(
-            f'name = "{name}"\n{body}[time]\n{time}\n'
-            f"[integrator]\n{integrator}\n[output]\ntimeline = false\n{rest}\n"
-        )
+    def write(name: str = "free", time: str = "end = 3\nsamples = 49", rest: str = "", **tables: str) -> str:
+        Path(f"{name}.toml").write_text(support.config(time=time, more=rest, name=name, **tables))
         return f"{name}.toml"
 
     return write
@@ -59,7 +46,7 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     def launch(*arguments: str, prelude: str = "") -> subprocess.Popen[str]:
         program = ["-m", "rigidsim"]
         if prelude:
-            program = ["-c", f"{prelude}\nfrom rigidsim.cli import app\napp(prog_name='rigidsim')"]
+            program = ["-c", f"{prelude}\nfrom rigidsim.cli.app import app\napp(prog_name='rigidsim')"]
         process = subprocess.Popen(
             [sys.executable, *program, *arguments],
             stdout=subprocess.PIPE,

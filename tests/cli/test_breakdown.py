@@ -1,4 +1,4 @@
-"""Runs that can't go on: the status, the reason in words, and the good samples kept.
+"""Runs that break down: the status, the reason in words, and the good samples kept.
 
 Euler angles that are not allowed to change to another chart break down in their singularity. For the
 sequence xyz, whose middle angle is singular at 90 degrees, a body that turns about its y axis with psi =
@@ -37,15 +37,12 @@ def one_chart(monkeypatch: pytest.MonkeyPatch) -> None:
 def into_singularity(
     config: Config, offset: float, precision: str, samples: int = 301, form: str = "euler_angles"
 ) -> str:
-    body = (
-        "[body]\nprincipal_moments = [1, 2, 3]\n"
-        f"[initial]\nangular_velocity = [0, 1, 0]\neuler_angles = [0.3, {START}, {offset}]\n"
-    )
     return config(
         time=f"end = 3\nsamples = {samples}",
         integrator=f'precision = "{precision}"\nformulation = "{form}"\neuler_sequence = "xyz"',
         rest='record = ["angular_velocity", "quaternion", "euler_angles", "angular_momentum"]',
-        body=body,
+        body="principal_moments = [1, 2, 3]",
+        initial=f"angular_velocity = [0, 1, 0]\neuler_angles = [0.3, {START}, {offset}]",
     )
 
 
@@ -205,11 +202,9 @@ def test_a_motion_whose_series_ends_is_no_breakdown(
     rates: str, integrator: str, rest: str, time: str, config: Config, rigidsim_command: Command
 ) -> None:
     """A Taylor series that is a polynomial would allow an infinite step, which is no state at all."""
-    body = (
-        "[body]\nprincipal_moments = [1, 2, 3]\n"
-        f"[initial]\nangular_velocity = {rates}\neuler_angles = [0, 0, 0.7]\n"
-    )
-    result = rigidsim_command("run", config(time=time, integrator=integrator, rest=rest, body=body))
+    initial = f"angular_velocity = {rates}\neuler_angles = [0, 0, 0.7]"
+    tables = {"body": "principal_moments = [1, 2, 3]", "initial": initial, "integrator": integrator}
+    result = rigidsim_command("run", config(time=time, rest=rest, **tables))
     assert result.exit_code == 0, result.output
     with rigidsim.open_run("runs/free").dataset as dataset:
         assert dataset.sizes["time"] in (49, 4)

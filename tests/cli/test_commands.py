@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import same_bits
 
 import rigidsim
 from rigidsim.look import viewer
@@ -120,9 +121,7 @@ def test_the_saved_config_is_the_run(config: Config, rigidsim_command: Command) 
     result = rigidsim_command("run", "runs/free/config.toml", "--out", "again")
     assert result.exit_code == 0, result.output
     assert Path("again/free/config.toml").read_text() == Path("runs/free/config.toml").read_text()
-    with rigidsim.open_run("runs/free").dataset as a, rigidsim.open_run("again/free").dataset as b:
-        for name in a.variables:
-            np.testing.assert_array_equal(a[name].values, b[name].values)
+    same_bits(rigidsim.open_run("runs/free"), rigidsim.open_run("again/free"))
 
 
 @pytest.mark.parametrize("override", ["time.end", "=3", "time.bogus=1", "time.times[3]=1", "body[0]=1"])
@@ -371,9 +370,7 @@ def test_a_guard_that_is_not_reached_changes_nothing(config: Config, rigidsim_co
     limits = "[limits]\nmax_steps = 1_000_000\nmax_drift = 1e-9\nwall_time = 3600"
     assert rigidsim_command("run", config(rest=limits)).exit_code == 0
     assert rigidsim_command("run", config("plain")).exit_code == 0
-    with rigidsim.open_run("runs/free").dataset as a, rigidsim.open_run("runs/plain").dataset as b:
-        for name in a.variables:
-            np.testing.assert_array_equal(a[name].values, b[name].values)
+    same_bits(rigidsim.open_run("runs/free"), rigidsim.open_run("runs/plain"))
 
 
 def test_a_stopped_run_does_not_stop_the_next(config: Config, rigidsim_command: Command) -> None:
@@ -427,7 +424,7 @@ HEAVY = "{'rerun', 'xarray', 'matplotlib', 'heyoka', 'dask', 'h5py', 'numpy'}"
 
 def test_help_loads_nothing_heavy() -> None:
     done = python(
-        "import sys\nfrom rigidsim.cli import app\n"
+        "import sys\nfrom rigidsim.cli.app import app\n"
         "try: app(['--help'])\nexcept SystemExit: pass\n"
         f"print('loaded:', sorted({HEAVY} & set(sys.modules)))"
     )
@@ -458,9 +455,9 @@ def test_importing_loads_nothing_prints_nothing_and_writes_nothing(tmp_path: Pat
 def test_the_names_of_the_package_stay_functions() -> None:
     """Whichever is used first, and whatever is imported beside it."""
     done = python(
-        "import rigidsim, rigidsim.cli\n"
-        "from rigidsim import open_run\nfrom rigidsim.archive import Run\n"
-        "import rigidsim.runner, rigidsim.planner\n"
+        "import rigidsim, rigidsim.cli.app\n"
+        "from rigidsim import open_run\nfrom rigidsim.store.run import Run\n"
+        "import rigidsim.workflows.run, rigidsim.workflows.plan\n"
         "names = [rigidsim.run, rigidsim.plan, rigidsim.load, rigidsim.parse, rigidsim.open_run]\n"
         "print([type(n).__name__ for n in names])"
     )
@@ -469,28 +466,29 @@ def test_the_names_of_the_package_stay_functions() -> None:
 
 # What a terminal shows
 
-TOP = (
-    "[body]\nprincipal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 0.5]\n"
-    "[initial]\neuler_angles = [0, 0.5, 0]\nangular_velocity = [0, 0, 8.123456789]\n"
-    '[[loads]]\nkind = "uniform_gravity"\n'
-)
-FLIGHT = (
-    "[body]\nprincipal_moments = [1, 2, 2.5]\nmass = 1.23456789\n"
-    "[initial]\nangular_velocity = [-0.123456789, -1.23456789e-5, 0.5]\n"
-    "position = [0, 0, 0]\nvelocity = [-1.23456789, 2.3456789e-3, 1]\n"
-)
+TOP = {
+    "body": "principal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 0.5]",
+    "initial": "euler_angles = [0, 0.5, 0]\nangular_velocity = [0, 0, 8.123456789]",
+    "loads": 'kind = "uniform_gravity"',
+}
+FLIGHT = {
+    "body": "principal_moments = [1, 2, 2.5]\nmass = 1.23456789",
+    "initial": "angular_velocity = [-0.123456789, -1.23456789e-5, 0.5]\n"
+    "position = [0, 0, 0]\nvelocity = [-1.23456789, 2.3456789e-3, 1]",
+}
 
 
-@pytest.mark.parametrize("body", [TOP, FLIGHT])
-def test_the_summary_fits_eighty_columns(body: str, config: Config) -> None:
+@pytest.mark.parametrize("tables", [TOP, FLIGHT], ids=["top", "flight"])
+def test_the_summary_fits_eighty_columns(tables: dict[str, str], config: Config) -> None:
     """One line per invariant, with its drift, and no word broken."""
     from rich.console import Console
 
-    from rigidsim import report
+    from rigidsim.cli import tables as report
 
-    summary = rigidsim.run(config(body=body)).summary
+    run = rigidsim.run(config(**tables))
+    summary = run.summary
     screen = Console(width=80, record=True, file=io.StringIO(), highlight=False)
-    report.print_summary(summary, "runs/[bold]free", screen)
+    report.print_summary(run.outcome, "runs/[bold]free", screen)
     lines = screen.export_text().splitlines()
     assert max(map(len, lines)) <= 80
     for name, row in summary["invariants"].items():
@@ -509,9 +507,9 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
     """Name, bar, percentage, rate and time left, none of them cut."""
     from rich.console import Console
 
-    from rigidsim.prepare import prepare
-    from rigidsim.progress import TerminalObserver
-    from rigidsim.solve.advance import Progress
+    from rigidsim.cli.progress import TerminalObserver
+    from rigidsim.solve.loop import Progress
+    from rigidsim.solve.problem import prepare
 
     prepared = prepare(rigidsim.load(config("a_name_of_more_than_twenty_four_letters", time="end = 1000")))
     screen = io.StringIO()
@@ -538,9 +536,9 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
 
 
 def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[str]) -> None:
-    from rigidsim.prepare import prepare
-    from rigidsim.progress import LineObserver
-    from rigidsim.solve.advance import Progress
+    from rigidsim.cli.progress import LineObserver
+    from rigidsim.solve.loop import Progress
+    from rigidsim.solve.problem import prepare
 
     prepared = prepare(rigidsim.load(config(time="start = 100\nend = 500")))
     with LineObserver() as observer:

@@ -15,11 +15,11 @@ import rigidsim
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
-FLIGHT = (
-    "[body]\nprincipal_moments = [1, 2, 2.5]\nmass = 2\n"
-    "[initial]\nangular_velocity = [0.3, 1.0, 0.5]\nposition = [1, 2, 3]\nvelocity = [0.5, 0, 7]\n"
-    '[[loads]]\nkind = "uniform_gravity"\n'
-)
+FLIGHT = {
+    "body": "principal_moments = [1, 2, 2.5]\nmass = 2",
+    "initial": "angular_velocity = [0.3, 1.0, 0.5]\nposition = [1, 2, 3]\nvelocity = [0.5, 0, 7]",
+    "loads": 'kind = "uniform_gravity"',
+}
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def exported(config: Config, rigidsim_command: Command) -> Callable[..., Path]:
     """Runs a small flight and exports it; returns the file."""
 
     def export(file_format: str, integrator: str = "", *options: str) -> Path:
-        name = config("throw", time="end = 2\nsamples = 9", integrator=integrator, body=FLIGHT)
+        name = config("throw", time="end = 2\nsamples = 9", integrator=integrator, **FLIGHT)
         assert rigidsim_command("run", name, "--force").exit_code == 0
         result = rigidsim_command("export", "runs/throw", "--format", file_format, *options)
         assert result.exit_code == 0, result.output

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
+from support import OFTEN, same_bits
 
 import rigidsim
 
@@ -45,9 +46,7 @@ def integrating(process: subprocess.Popen[str]) -> None:
 def assert_first_samples(partial: xarray.Dataset, full: xarray.Dataset) -> int:
     """As many samples as both have are bit for bit the same; returns how many."""
     count = min(partial.sizes["time"], full.sizes["time"])
-    assert list(partial.data_vars) == list(full.data_vars)
-    for name in ["time", *partial.data_vars]:
-        np.testing.assert_array_equal(partial[name].values[:count], full[name].values[:count], strict=True)
+    same_bits(*(dataset.isel(time=slice(count)).load() for dataset in (partial, full)))
     return count
 
 
@@ -111,14 +110,10 @@ def test_a_killed_run_opens_as_running(config: Config, start: Start) -> None:
 
 
 def test_a_killed_run_keeps_its_segments(config: Config, start: Start) -> None:
-    prelude = (
-        "import rigidsim.solve.harvest as a, rigidsim.store.segments as s\n"
-        "a._PATIENCE = s.SEGMENT_SECONDS = 0.1"
-    )
     process = start(
         "run",
         config(time=f"end = {FOREVER}\nevery = 0.125", integrator='precision = "quadruple"'),
-        prelude=prelude,
+        prelude=OFTEN,
     )
     integrating(process)
     deadline = time.monotonic() + 30

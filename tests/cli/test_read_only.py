@@ -8,17 +8,21 @@ import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from support import same_bits
 
 import rigidsim
 from rigidsim.errors import RunFolderError
-from rigidsim.solve import advance, harvest
-from rigidsim.store import segments
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.pacing import Pacing
+from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder
+from rigidsim.store.segments import SegmentLimits
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -42,11 +46,8 @@ def remount(tmp_path: Path) -> Iterator[Remount]:
     subprocess.run(["umount", "-l", place], check=True)
 
 
-def eager(patch: pytest.MonkeyPatch) -> None:
-    """A segment for each chunk of some milliseconds."""
-    patch.setattr(advance, "_CHUNK_SECONDS", 0.005)
-    patch.setattr(harvest, "_PATIENCE", 0.0)
-    patch.setattr(segments, "SEGMENT_SECONDS", 0.0)
+# a segment for each chunk of a few strides
+EAGER = Tuning(Pacing(chunk_seconds=0.02, patience=0.0), SegmentLimits(seconds=0.0))
 
 
 def message(result: Any, code: int = 2) -> str:
@@ -56,13 +57,6 @@ def message(result: Any, code: int = 2) -> str:
     lines = [line for line in result.stderr.splitlines() if line.startswith("rigidsim:")]
     assert len(lines) == 1, result.stderr
     return lines[0]
-
-
-def same_bits(one: rigidsim.Run, other: rigidsim.Run) -> None:
-    with one.dataset as a, other.dataset as b:
-        assert sorted(map(str, a.variables)) == sorted(map(str, b.variables))
-        for name in a.variables:
-            np.testing.assert_array_equal(a[name].values, b[name].values, err_msg=str(name))
 
 
 def test_a_finished_run_is_read_verified_and_drawn(
@@ -129,7 +123,7 @@ def test_a_partial_run_is_read_and_gone_on_with_later(
     rows = rigidsim.open_run("disk/free").dataset.sizes["time"]
     assert 0 < rows < 3001
     with monkeypatch.context() as patch:  # refused before anything is compiled or integrated
-        patch.setattr("rigidsim.resuming.prepare", lambda *_, **__: pytest.fail("too late"))
+        patch.setattr("rigidsim.workflows.resume.prepare", lambda *_, **__: pytest.fail("too late"))
         told = message(rigidsim_command("resume", "disk/free", "--set", "limits.max_steps=100000"))
     assert "disk/free: can't be written: Read-only file system" in told
     remount("rw")
@@ -148,13 +142,13 @@ def test_a_folder_that_becomes_read_only_on_the_way(
 ) -> None:
     name = config(time="end = 8000\nsamples = 8001")
     assert rigidsim_command("run", name).exit_code == 0
-    atomic, remove = segments.netcdf.atomic, segments.remove
+    replacing, remove = atomic.replacing, segments.remove
     last = {"a later segment": "00000003.h5", "the dataset": "dataset.h5"}.get(moment)
 
     def writing(path: Path) -> Any:
         if path.name == last:
             remount("ro")
-        return atomic(path)
+        return replacing(path)
 
     def removing(folder: Path) -> None:
         if moment == "the end of the segments" and folder.is_dir():
@@ -162,12 +156,12 @@ def test_a_folder_that_becomes_read_only_on_the_way(
         remove(folder)
 
     with monkeypatch.context() as patch:
-        eager(patch)
-        patch.setattr(segments.netcdf, "atomic", writing)
+        patch.setattr("rigidsim.workflows.run.run", partial(rigidsim.run, tuning=EAGER))
+        patch.setattr(atomic, "replacing", writing)
         patch.setattr(segments, "remove", removing)
         told = message(rigidsim_command("run", name, "--out", "disk"), code=3)
     assert "Read-only file system" in told
-    assert "once its file system is mounted for writing again, rigidsim resume goes on" in told
+    assert "once its file system is mounted for writing again, rigidsim resume continues" in told
     opened = rigidsim.open_run("disk/free")
     with opened.dataset as saved, rigidsim.open_run("runs/free").dataset as whole:
         rows = saved.sizes["time"]

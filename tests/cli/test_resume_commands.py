@@ -10,17 +10,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from support import OFTEN, same_bits
 
 import rigidsim
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
 Start = Callable[..., subprocess.Popen[str]]
-OFTEN = (
-    "import rigidsim.solve.harvest as a, rigidsim.store.segments as s\na._PATIENCE = s.SEGMENT_SECONDS = 0.05"
-)
 
 
 def test_resume_goes_on_and_verify_agrees(config: Config, rigidsim_command: Command) -> None:
@@ -62,7 +59,7 @@ def test_a_dataset_is_enough(config: Config, rigidsim_command: Command) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_process_that_was_ended_is_gone_on_with(number: int, config: Config, start: Start) -> None:
+def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start: Start) -> None:
     """With the bits of a run in one go."""
     time_table = "end = 40000\nsamples = 4001"
     process = start("run", config(time=time_table, integrator='precision = "extended"'), prelude=OFTEN)
@@ -78,17 +75,15 @@ def test_a_process_that_was_ended_is_gone_on_with(number: int, config: Config, s
         assert 0 < partial.sizes["time"] < 4001
     resumed = rigidsim.resume("runs/free")
     whole = rigidsim.run("free.toml", out="whole")
-    with resumed.dataset as one, whole.dataset as other:
-        for name in other.variables:
-            np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name))
+    same_bits(resumed, whole)
 
 
 def test_sigterm_while_the_equations_are_compiled(config: Config, start: Start) -> None:
-    """Before anything is integrated it ends like Ctrl-C, too, and can be gone on with."""
+    """Before anything is integrated it ends like Ctrl-C, too, and can be resumed."""
     prelude = (
-        "import os, signal, rigidsim.guards as g\n"
+        "import os, signal, rigidsim.session.guards as g\n"
         "g.Observer.started = lambda *_: os.kill(os.getpid(), signal.SIGTERM)\n"
-        "import rigidsim.progress as p\n"
+        "import rigidsim.cli.progress as p\n"
         "for c in vars(p).values():\n"
         "    if isinstance(c, type) and issubclass(c, g.Observer): c.started = g.Observer.started"
     )

@@ -12,7 +12,7 @@ import xarray
 
 def test_table_dataset_and_figure(config: Callable[..., str], rigidsim_command: Callable[..., Any]) -> None:
     name = config(time="end = 20\nsamples = 5", rest='record = ["angular_velocity"]')
-    told = rigidsim_command("tradeoff", name, "--budget", "25", "--repeats", "1", "--json")
+    told = rigidsim_command("tradeoff", name, "--budget", "10", "--repeats", "1", "--json")
     assert told.exit_code == 0, told.stderr
     result = json.loads(told.stdout)
     with xarray.open_dataset("runs/free_tradeoff/tradeoff.h5") as data:
@@ -41,7 +41,7 @@ def test_the_printed_table_says_what_was_measured(
     config: Callable[..., str], rigidsim_command: Callable[..., Any]
 ) -> None:
     name = config(time="end = 1e7\nsamples = 5")
-    told = rigidsim_command("tradeoff", name, "--budget", "12", "--repeats", "1", "--out", "elsewhere")
+    told = rigidsim_command("tradeoff", name, "--budget", "6", "--repeats", "1", "--out", "elsewhere")
     assert told.exit_code == 0, told.stderr
     assert "for this accuracy, use this" in told.stdout
     assert "keys of [integrator]" in told.stdout

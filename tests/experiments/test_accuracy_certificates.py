@@ -21,9 +21,10 @@ from experiments.certificates.examining import Outcome, examine  # noqa: E402
 from experiments.certificates.ledger import Ledger, code_version  # noqa: E402
 from experiments.certificates.searching import Search, truth_setting  # noqa: E402
 from experiments.random_scenes import KINDS, RandomScene, random_scene  # noqa: E402
-from rigidsim import certify  # noqa: E402
-from rigidsim.accuracy import cost, taylor_order  # noqa: E402
-from rigidsim.trial import Setting, try_setting  # noqa: E402
+from rigidsim.accuracy.certificate import Certificate, certify  # noqa: E402
+from rigidsim.accuracy.cost import cost  # noqa: E402
+from rigidsim.accuracy.setting import Setting  # noqa: E402
+from rigidsim.accuracy.trial import try_setting  # noqa: E402
 
 
 def test_scenes_are_the_same_each_time_and_of_every_kind() -> None:
@@ -61,14 +62,13 @@ def test_a_search_stops_at_what_is_known_to_be_enough() -> None:
 
 def lying(monkeypatch: pytest.MonkeyPatch) -> None:
     """Certificates a hundred times too small from now on."""
-    sound = certify.certify
 
     def small(*given: Any, **more: Any) -> Any:
-        found = sound(*given, **more)
+        found = certify(*given, **more)
         assert found is not None
-        return certify.Certificate(found.error / 100, found.end, found.how, found.times)
+        return Certificate(found.error / 100, found.end, found.how, found.times)
 
-    monkeypatch.setattr(certify, "certify", small)
+    monkeypatch.setattr("rigidsim.workflows.certify.certify", small)
 
 
 def test_a_certificate_that_lies_fails_the_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,7 +148,7 @@ def test_counted_costs_are_of_what_the_engine_does() -> None:
     """The order of the series is heyoka's own, and rises with the digits."""
     for setting in (Setting("single"), Setting(tolerance=1e-8), Setting(), Setting("quadruple", 1e-20)):
         trial = try_setting(rigidsim.parse(BODY, overrides=["time.end=1", "time.samples=2"]), setting)
-        assert trial.order == taylor_order(setting)
+        assert trial.order == setting.taylor_order
     costs = [
         cost(Setting(p, t), 100, 10) for p, t in (("double", 1e-6), ("double", None), ("extended", None))
     ]

@@ -20,7 +20,7 @@ from experiments import all as everything  # noqa: E402
 from experiments import closed_forms, common, measure  # noqa: E402
 from experiments.common import Check  # noqa: E402
 
-SLOW = {"hyperion"}
+SLOW = {"flip_period", "heavy_top_regimes", "hyperion", "luni_solar_precession"}
 
 
 @pytest.mark.parametrize(

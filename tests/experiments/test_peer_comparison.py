@@ -40,7 +40,7 @@ def short_runs(reports: dict[str, campaign.Measured], peer: str) -> campaign.Mea
 
 
 @pytest.mark.parametrize(
-    "peer", [pytest.param(p, marks=pytest.mark.slow if p == "rigidsim" else ()) for p in ADAPTERS]
+    "peer", [pytest.param(p, marks=pytest.mark.slow if p in ("rigidsim", "heyoka") else ()) for p in ADAPTERS]
 )
 def test_errors_against_128_bits_vanish_as_the_setting_gets_tighter(
     peer: str, reports: dict[str, campaign.Measured]
@@ -63,6 +63,7 @@ def test_errors_against_128_bits_vanish_as_the_setting_gets_tighter(
             assert tight.error <= max(loose.error, 2.0**-51)  # of two at a double's end either may win
 
 
+@pytest.mark.slow
 def test_rigidsim_and_bare_heyoka_agree_to_round_off(reports: dict[str, campaign.Measured]) -> None:
     measured = short_runs(reports, "heyoka"), short_runs(reports, "rigidsim")
     for scene, end in SHORT:

@@ -12,7 +12,7 @@ sys.path.insert(0, str(ROOT))
 
 from experiments import precision_tradeoff as study  # noqa: E402
 from experiments.precision_tradeoff import Point  # noqa: E402
-from rigidsim.trial import Setting  # noqa: E402
+from rigidsim.accuracy.setting import Setting  # noqa: E402
 
 A, B, C = Setting("single"), Setting("double"), Setting("extended")
 MADE_UP = [Point(B, 1e-12, 1.0), Point(A, 1e-4, 0.2), Point(C, 1e-11, 12.0), Point(C, 1e-16, 10.0)]
@@ -34,6 +34,7 @@ def points() -> study.Points:
     return study.measure_scene("asymmetric_top", to=1e3, processes=1)
 
 
+@pytest.mark.slow
 def test_a_scene_is_measured_at_each_horizon(points: study.Points) -> None:
     assert list(points) == [1e2, 1e3]
     short, long = ({p.setting: p for p in points[h]} for h in (1e2, 1e3))
@@ -48,6 +49,7 @@ def test_a_scene_is_measured_at_each_horizon(points: study.Points) -> None:
     assert all(check.passed for check in study.checks({"asymmetric_top": points}))
 
 
+@pytest.mark.slow
 def test_figure_and_table(points: study.Points, tmp_path: Path) -> None:
     scenes = {"asymmetric_top": points}
     assert study.draw(scenes, tmp_path).stat().st_size > 50_000

@@ -20,6 +20,7 @@ from experiments.extremes.scenes import ANY, Extreme, all_scenes  # noqa: E402
 SCENES = {f"{scene.row}, {scene.name}": scene for scene in all_scenes(False)}
 
 
+@pytest.mark.slow
 @settings(max_examples=15, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_random_extremes_are_never_wrong_in_silence(data: st.DataObject) -> None:
@@ -31,6 +32,7 @@ def test_random_extremes_are_never_wrong_in_silence(data: st.DataObject) -> None
     assert verdict.kind in ("right", "announced", "refused"), verdict.line
 
 
+@pytest.mark.compact
 @pytest.mark.parametrize(
     ("name", "column", "kind"),
     [
@@ -66,6 +68,7 @@ def test_every_extreme_that_was_asked_for_is_in_the_table() -> None:
     assert {column for scene in SCENES.values() for column in scene.columns} == set(ANY)
 
 
+@pytest.mark.slow
 def test_a_wrong_answer_in_silence_is_seen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Held against a body whose middle moment is larger by 1e-11, everything is wrong."""
     right = judging.reference

@@ -55,7 +55,7 @@ def symmetric_top() -> Callable[..., xarray.Dataset]:
                     {"units": "kg m^2/s"},
                 ),
                 "energy": ("time", np.full(count, 0.4), {"units": "J", "invariant": 1}),
-                "energy_drift": ("time", 1e-16 * np.arange(count), {"units": "1"}),
+                "energy_drift": ("time", 1e-16 * np.arange(count), {"units": "1", "drift_of": "energy"}),
             },
             coords={
                 "time": ("time", time * scale, {"units": "s"}),

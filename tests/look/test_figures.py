@@ -22,17 +22,21 @@ Build = Callable[..., xarray.Dataset]
 
 def titles(dataset: xarray.Dataset) -> list[str]:
     page = figures._page(
-        figures.thin(dataset, 100).assign_attrs(dataset.attrs), drifts={"energy_drift": 1e-13}, complete=True
+        figures.thin(dataset, 100).assign_attrs(dataset.attrs), largest={"energy": 1e-13}, complete=True
     )
     return [axes.get_title("left") or axes.get_title() for axes in page.axes]
+
+
+def inked(path: Path) -> float:
+    """Part of a picture that isn't white."""
+    return float((imread(path)[..., :3].min(axis=2) < 0.9).mean())
 
 
 def test_png_is_a_picture_with_ink(symmetric_top: Build, tmp_path: Path) -> None:
     assert figures.save_figure(symmetric_top(), tmp_path / "f.png") == tmp_path / "f.png"
     picture = imread(tmp_path / "f.png")
     assert min(picture.shape[:2]) > 600
-    inked = (picture[..., :3].min(axis=2) < 0.9).mean()
-    assert 0.01 < inked < 0.6
+    assert 0.01 < inked(tmp_path / "f.png") < 0.6
     assert list(tmp_path.iterdir()) == [tmp_path / "f.png"]
 
 
@@ -118,12 +122,12 @@ def test_largest_drift_is_that_of_every_sample(
     dataset = symmetric_top(count=9999)
     dataset["energy_drift"][4567] = -3e-9  # between the samples that the curves show
     found: list[tuple[dict[str, float], bool]] = []
-    monkeypatch.setattr(panels, "facts", lambda *_, drifts, complete: found.append((drifts, complete)))
+    monkeypatch.setattr(panels, "facts", lambda *_, largest, complete: found.append((largest, complete)))
     figures.save_figure(dataset, tmp_path / "f.png")
     monkeypatch.setattr(figures, "FULL_READ", 5000)
     figures.save_figure(dataset, tmp_path / "f.png")
-    assert found[0] == ({"energy_drift": 3e-9}, True)
-    assert found[1] == ({"energy_drift": pytest.approx(1e-16 * 9998)}, False)
+    assert found[0] == ({"energy": 3e-9}, True)
+    assert found[1] == ({"energy": pytest.approx(1e-16 * 9998)}, False)
 
 
 def test_fast_spin_does_not_press_the_other_angles_flat(symmetric_top: Build) -> None:
@@ -153,3 +157,7 @@ def test_one_sample_and_nan_are_drawn(symmetric_top: Build, tmp_path: Path) -> N
     for name in ("quaternion", "angular_velocity", "energy_drift"):
         broken[name][-3:] = np.nan
     figures.save_figure(broken, tmp_path / "nan.png")
+    figures.save_figure(symmetric_top(count=30), tmp_path / "whole.png")
+    # axes and titles at least; and a tenth of the samples less leaves most of the curves
+    assert 0.005 < inked(tmp_path / "one.png") < inked(tmp_path / "whole.png")
+    assert inked(tmp_path / "nan.png") > 0.7 * inked(tmp_path / "whole.png")

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+import rigidsim
 from rigidsim.look.solids import (
     MINOR_SEGMENTS,
     SEGMENTS,
-    SOLIDS,
-    THINNESS,
     body_meshes,
     rotation_matrix,
     solid_mesh,
 )
+from rigidsim.scene.outlines import THINNESS, Arc, Line, Revolved
+from rigidsim.scene.scene import build_scene
+from rigidsim.scene.shapes import SHAPES, Shape
 
 # Area of the regular polygon inscribed in the unit circle, over pi.
 POLYGON = SEGMENTS / (2 * np.pi) * np.sin(2 * np.pi / SEGMENTS)
@@ -76,14 +79,13 @@ EXAMPLES = {name: case[0] for name, case in CASES.items()} | {
     "ellipsoid": {"semi_axes": [1, 2, 3]},
     "sphere": {"radius": 2},
     "spherical_shell": {"radius": 2},
-    "point": {"radius": 0.1},
     "cone": {"radius": 1, "height": 4},
     "ring": {"radius": 1},
 }
 
 
 def test_every_solid_has_an_example_here() -> None:
-    assert set(EXAMPLES) == set(SOLIDS)
+    assert set(EXAMPLES) == set(SHAPES)
 
 
 @pytest.mark.parametrize("solid", EXAMPLES)
@@ -132,6 +134,36 @@ def test_ideally_thin_body_is_drawn_with_some_thickness() -> None:
         solid_mesh("cuboid", {"size": [0, 0, 0]})
 
 
+HEMISPHERE = Shape(
+    {"radius": 1},
+    "dome towards z",
+    lambda _, d: [83 * d["radius"][0] ** 2 / 320] * 2 + [2 * d["radius"][0] ** 2 / 5],
+    lambda d: Revolved(
+        (
+            Line((0.0, -3 * d["radius"][0] / 8), (d["radius"][0], -3 * d["radius"][0] / 8)),
+            Arc((0.0, -3 * d["radius"][0] / 8), d["radius"][0], 0.0, np.pi / 2),
+        )
+    ),
+    {"pole": lambda c, d: [c.zero, c.zero, 5 * d["radius"][0] / 8]},
+)
+
+
+def test_a_shape_is_one_entry(monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]) -> None:
+    """Config, inertia, landmark and picture of a hemisphere: I = (83/320 + 25/64) m r^2 about its pole."""
+    monkeypatch.setitem(SHAPES, "hemisphere", HEMISPHERE)
+    table = 'shape = "hemisphere"\nradius = 2\nmass = 3\nreference = "pole"'
+    text = free_body().replace("principal_moments = [1, 2, 2.5]", table)
+    found = build_scene(rigidsim.parse(text)).body
+    expected = 3 * 4 * np.array([83 / 320 + 25 / 64, 83 / 320 + 25 / 64, 2 / 5])
+    np.testing.assert_allclose([float(m) for m in found.principal_moments], expected, rtol=1e-14)
+    (mesh,) = body_meshes(json.dumps(found.drawing))
+    # an inscribed polyhedron, see the ellipsoid above
+    deficit = 1 - mesh.volume() / (2 / 3 * np.pi * 8)
+    assert 0 < deficit < (np.pi / 2 / MINOR_SEGMENTS) ** 2 / 2 + (2 * np.pi / SEGMENTS) ** 2 / 2
+    np.testing.assert_allclose(mesh.vertices[:, 2].max(), 0, atol=1e-12)
+    np.testing.assert_allclose(mesh.vertices[:, 2].min(), -2, atol=1e-12)
+
+
 def test_missing_drawing_is_a_unit_cube() -> None:
     (mesh,) = body_meshes(None)
     assert mesh.volume() == pytest.approx(1)
@@ -145,6 +177,10 @@ def test_missing_drawing_is_a_unit_cube() -> None:
         ('[{"solid": "sfere"}]', "unknown solid 'sfere'; known are cone, cuboid"),
         ('[{"solid": "sphere", "dimensions": {}}]', "sphere needs dimension 'radius'"),
         ('[{"solid": "sphere", "dimensions": {"radius": -1}}]', r"1 finite number\(s\) >= 0"),
+        (
+            '[{"solid": "tube", "dimensions": {"inner_radius": 2, "outer_radius": 1, "height": 1}}]',
+            "tube inner_radius 2 exceeds outer_radius 1",
+        ),
         ('[{"solid": "cuboid", "dimensions": {"size": [1, 2]}}]', r"3 finite number\(s\) >= 0"),
     ],
 )

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from support import run_text
 
-from rigidsim.model.ephemeris import MEAN_DISTANCE, place
+from rigidsim.model.ephemeris import MEAN_DISTANCE, source_position
+
+pytestmark = pytest.mark.compact
 
 
 def at(body: str, seconds: float) -> tuple[float, float, float]:
     """Ecliptic longitude and latitude (degrees) and distance (m)."""
-    found = place(body, hy.time)
+    found = source_position(body, hy.time)
     function = hy.cfunc([*found.direction, found.inverse_distance], [hy.make_vars("none")], compact_mode=True)
     x, y, z, inverse = function([0.0], time=seconds)
     assert x * x + y * y + z * z == pytest.approx(1, abs=1e-14)

@@ -25,9 +25,9 @@ from equations import (
 from scipy.spatial.transform import Rotation
 
 from rigidsim.model.system import System
-from rigidsim.prepare import prepare
-from rigidsim.scene.reading import parse
+from rigidsim.scene.config import parse
 from rigidsim.scene.schema import EULER_SEQUENCES
+from rigidsim.solve.problem import prepare
 
 # ---- (a) Euler's equations --------------------------------------------------------------------------------
 
@@ -421,7 +421,7 @@ def test_only_what_is_needed_is_carried_and_each_has_a_reason(case: str) -> None
     system = prepared(body, initial, loads, record, f'formulation = "{formulation}"').system
     assert system.states == " ".join(groups).split()
     assert len(system.initial) == len(system.equations) == len(system.state_exponents) == len(system.states)
-    reasons = dict(system.requirements.reasons)
+    reasons = dict(system.reasons)
     shown = [group.replace(NINE, "r11 ... r33") for group in groups]
     assert list(reasons) == shown
     assert all(len(why) > 10 for why in reasons.values())
@@ -442,11 +442,11 @@ def test_counts_of_states() -> None:
 
 
 def test_reasons_name_what_asked() -> None:
-    recorded = prepared(FREE, SPIN, record='["quaternion", "energy"]').system.requirements
+    recorded = prepared(FREE, SPIN, record='["quaternion", "energy"]').system
     assert dict(recorded.reasons)[QUATERNION] == "quaternion is recorded"
-    heavy = prepared(HEAVY, SPIN, GRAVITY, record='["angular_velocity"]').system.requirements
+    heavy = prepared(HEAVY, SPIN, GRAVITY, record='["angular_velocity"]').system
     assert "Euler-Poisson" in dict(heavy.reasons)[VERTICAL]
-    asked = prepared(FREE, SPIN, integrator='formulation = "euler_angles"').system.requirements
+    asked = prepared(FREE, SPIN, integrator='formulation = "euler_angles"').system
     reasons = [why for states, why in asked.reasons if states == ANGLES]
     assert '"euler_angles" asks for it' in reasons[0]
     assert "near the singularity of zxz: angles of zxy" in reasons[1]

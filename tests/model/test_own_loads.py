@@ -14,8 +14,11 @@ import pytest
 from equations import CLOSE, Random, derivative, general_body, matrix
 
 import rigidsim
+from rigidsim.accuracy.error_law import motion_growth
 from rigidsim.model.loads import LoadModel
-from rigidsim.prepare import motion_growth, prepare
+from rigidsim.solve.problem import prepare
+
+pytestmark = pytest.mark.compact
 
 ROOT = Path(__file__).parents[2]
 FREE = """name = "free"

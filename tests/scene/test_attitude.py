@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rigidsim.prepare import prepare
 from rigidsim.scene import attitude
-from rigidsim.scene.context import context_for, multiply, transpose
-from rigidsim.scene.reading import parse
+from rigidsim.scene.arithmetic import context_for, multiply, transpose
+from rigidsim.scene.config import parse
 from rigidsim.scene.schema import EULER_SEQUENCES
+from rigidsim.solve.problem import prepare
 
 CONTEXT = context_for(50)
 LAST = CONTEXT.mpf(2) ** (16 - CONTEXT.prec)  # some tens of roundings of the context

@@ -10,10 +10,10 @@ import heyoka
 import pytest
 from typer.testing import CliRunner
 
-from rigidsim.cli import app
+from rigidsim.cli.app import app
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.prepare import prepare
-from rigidsim.scene.reading import load, parse
+from rigidsim.scene.config import load, parse
+from rigidsim.solve.problem import prepare
 
 GOOD = {
     "top": 'name = "box"',
@@ -127,7 +127,11 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "load misspelt": (
         {"loads": 'kind = "uniform_gravty"'},
         "[[loads]] number 1 kind",
-        ['given "uniform_gravty"', 'did you mean "uniform_gravity"?', "allowed: uniform_gravity"],
+        [
+            'given "uniform_gravty"',
+            'did you mean "uniform_gravity"?',
+            "allowed: central_gravity, force, gravity_gradient",
+        ],
     ),
     "shape misspelt": (
         {"body": 'shape = "spere"\nmass = 1\nradius = 1'},
@@ -208,7 +212,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "kind of load a number": (
         {"loads": "kind = 1"},
         "[[loads]] number 1 kind",
-        ["given 1; allowed: uniform_gravity"],
+        ["given 1; allowed: central_gravity, force, gravity_gradient"],
     ),
     "moments a number": (
         {"body": "principal_moments = 3"},

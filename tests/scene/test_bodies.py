@@ -12,9 +12,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from rigidsim.scene.arithmetic import context_for, cross, diagonal, dot, eigen, multiply, transpose
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia, parallel_axis
-from rigidsim.scene.context import context_for, cross, diagonal, dot, eigen, multiply, transpose
-from rigidsim.scene.reading import parse
+from rigidsim.scene.config import parse
 from rigidsim.scene.shapes import SHAPES
 from rigidsim.solve.precision import precision_of
 

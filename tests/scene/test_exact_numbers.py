@@ -11,11 +11,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from rigidsim.prepare import prepare
-from rigidsim.scene.context import context_for, working_bits
+from rigidsim.scene.arithmetic import context_for, working_bits
+from rigidsim.scene.config import parse
 from rigidsim.scene.exact import ExactNumber, parse_number
-from rigidsim.scene.reading import parse
 from rigidsim.solve.precision import precision_of
+from rigidsim.solve.problem import prepare
 
 DIGITS = 50
 CONTEXT = context_for(DIGITS)

@@ -13,21 +13,21 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rigidsim.scene.context import context_for
+from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.expression_parser import DEEPEST_NESTING, LONGEST_TEXT, parse_expression
 from rigidsim.scene.expressions import (
     FUNCTIONS,
+    Constant,
     Expression,
     ExpressionError,
     Name,
-    Number,
     Operation,
     constant_value,
     evaluate,
     fold,
     names_used,
 )
-from rigidsim.scene.parser import DEEPEST_NESTING, LONGEST_TEXT, parse_expression
 
 NAMES = ("t", "wx", "wy")
 CONTEXT = context_for(50)
@@ -51,7 +51,7 @@ def value(text: str, **values: Any) -> Any:
 def exact(text: str) -> Fraction:
     """The number that an expression was folded to."""
     root = parse(text).root
-    assert isinstance(root, Number), root
+    assert isinstance(root, Constant), root
     assert root.value.pi_power == 0
     return root.value.rational
 
@@ -104,12 +104,12 @@ def test_decimals_and_parameters_stay_exact() -> None:
     assert exact("0.1^20") == Fraction(1, 10**20)
     assert exact("pi/pi") == 1
     assert exact("zero*5") == 0
-    assert parse("180*turn").root == Number(ExactNumber(Fraction(1), 1), (0, 0))
+    assert parse("180*turn").root == Constant(ExactNumber(Fraction(1), 1), (0, 0))
     assert parse("2*pi*3").root == parse("6*pi").root
 
 
 def test_a_product_has_one_exact_number() -> None:
-    two_thirds = Number(ExactNumber(Fraction(2, 3)), (0, 0))
+    two_thirds = Constant(ExactNumber(Fraction(2, 3)), (0, 0))
     expected = Operation("product", (two_thirds, Name("wx", (0, 0))), (0, 0))
     for text in "2*wx/3", "wx*2/3", "wx/3*2", "(2/3)*wx", "2/3*wx":
         assert parse(text).root == expected
@@ -409,7 +409,7 @@ def test_random_texts_give_a_tree_or_an_error() -> None:
             continue
         understood += 1
         kinds = fold(expression, lambda node, operands: {type(node)}.union(*operands))
-        assert kinds <= {Number, Name, Operation}
+        assert kinds <= {Constant, Name, Operation}
         assert names_used(expression) <= set(NAMES)
     assert understood > 50
     assert time.process_time() - start < 30

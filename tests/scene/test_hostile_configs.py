@@ -10,7 +10,7 @@ import pytest
 
 import rigidsim
 from rigidsim.errors import ConfigError
-from rigidsim.prepare import prepare
+from rigidsim.solve.problem import prepare
 
 BASE = """
 name = "base"
@@ -26,11 +26,11 @@ samples = 11
 
 def refused(text: str, match: str | None = None) -> None:
     """Quickly, and in one message of bounded length."""
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(ConfigError, match=match) as caught:
         prepare(rigidsim.parse(text))
     assert len(str(caught.value)) < 20_000
-    assert time.perf_counter() - started < 5
+    assert time.process_time() - started < 5  # CPU: others may share the machine
 
 
 @pytest.mark.parametrize(

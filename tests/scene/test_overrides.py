@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rigidsim.errors import ConfigError
-from rigidsim.scene.reading import load, parse
+from rigidsim.scene.config import load, parse
 
 BASE = """\
 name = "base"

@@ -10,6 +10,8 @@ from support import angle_between, law, run_text
 
 from rigidsim.scene.schema import EULER_SEQUENCES
 
+pytestmark = pytest.mark.compact
+
 FREE = """
 name = "free"
 [body]
@@ -57,12 +59,12 @@ def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(
     runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """heyoka's step control is relative to the largest component: unwrapped angles loosen it."""
-    from rigidsim.solve.winding import Winding
+    from rigidsim.solve.angle_wrapping import AngleWrapping
 
     setting = ['integrator.formulation="euler_angles"', "time.end=20000", "time.samples=101"]
     wrapped = run_text(FREE, runs, 'name="w"', *setting)
     with monkeypatch.context() as patch:
-        patch.setattr(Winding, "wrap", lambda self, state: None)
+        patch.setattr(AngleWrapping, "wrap", lambda self, state: None)
         growing = run_text(FREE, runs, 'name="g"', *setting)
     assert growing.summary["cost"]["steps"] < 0.8 * wrapped.summary["cost"]["steps"]
     exact = run_text(FREE, runs, 'name="x"', "time.end=20000", "time.samples=101")

@@ -11,7 +11,10 @@ import pytest
 from support import run_text
 
 from rigidsim.errors import ConfigError
-from rigidsim.solve import advance
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.pacing import Pacing
+
+pytestmark = pytest.mark.compact
 
 FLIPS = """
 name = "flips"
@@ -82,16 +85,15 @@ def test_events_change_the_motion_by_rounding_alone(runs: Path) -> None:
 
 @pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rotation_matrix"])
 def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven(
-    formulation: str, runs: Path, monkeypatch: pytest.MonkeyPatch
+    formulation: str, runs: Path
 ) -> None:
     setting = f'integrator.formulation="{formulation}"'
     expected = run_text(FLIPS.format(samples=2001) + FLIP, runs, setting).dataset.load()
     sparse = run_text(FLIPS.format(samples=3) + FLIP, runs, setting, 'name="sparse"').dataset
     assert np.array_equal(expected["flip_time"], sparse["flip_time"])
     # skips that go too far are taken back, and their events with them
-    for name, value in {"_MARGIN": 1.7, "_MEAN_MARGIN": 1.4, "_LONG_GAP": 10.0, "_SPARSE": 2.0}.items():
-        monkeypatch.setattr(advance, name, value)
-    driven = run_text(FLIPS.format(samples=3) + FLIP, runs, setting, 'name="driven"')
+    tuning = Tuning(Pacing(chunk_seconds=10.0, skip_margin=1.7, skip_from=2.0))  # however slow the machine
+    driven = run_text(FLIPS.format(samples=3) + FLIP, runs, setting, 'name="driven"', tuning=tuning)
     assert driven.summary["cost"]["steps_redone"] > 0
     assert np.array_equal(expected["flip_time"], driven.dataset["flip_time"])
     assert np.array_equal(sparse["flip_quaternion"], driven.dataset["flip_quaternion"])

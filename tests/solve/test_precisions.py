@@ -11,6 +11,10 @@ import pytest
 import xarray
 from support import run_text
 
+from rigidsim.store.variables import parts_in
+
+pytestmark = pytest.mark.compact
+
 TOP = """
 name = "top"
 [body]
@@ -32,8 +36,7 @@ def exact_rates(digits: int, times: list) -> list[list]:
 
 def summed(dataset: xarray.Dataset, name: str) -> list[list]:
     """All parts of a variable, smallest first, as mpf."""
-    names = [name, *(f"{name}_lo{n}" if n else f"{name}_lo" for n in [0, *range(2, 20)])]
-    parts = [dataset[n].values for n in names if n in dataset]
+    parts = [dataset[part].values for part in parts_in(dataset, name)]
     rows = []
     with mpmath.workprec(4000):
         for i in range(parts[0].shape[0]):

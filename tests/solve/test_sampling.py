@@ -12,7 +12,9 @@ from support import run_text
 
 import rigidsim
 from rigidsim.errors import ConfigError
-from rigidsim.prepare import prepare
+from rigidsim.solve.problem import prepare
+
+pytestmark = pytest.mark.compact
 
 SPIN = """
 name = "spin"

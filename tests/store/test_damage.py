@@ -8,14 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import h5py
-import numpy as np
 import pytest
+from support import same_bits
 
 import rigidsim
 from rigidsim.errors import RunFolderError
-from rigidsim.solve import advance, harvest
-from rigidsim.store import seal, segments
-from rigidsim.store.segments import read_chain
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.pacing import Pacing
+from rigidsim.store import seal
+from rigidsim.store.segments import SegmentLimits, read_chain
 
 TEXT = (
     'name = "d"\n[body]\nprincipal_moments = [1, 2, 2.5]\n'
@@ -27,12 +28,8 @@ NUMBER = 2  # of the segment that something happens to
 
 def begun(out: Path) -> rigidsim.Run:
     """A run that was stopped, with a segment for every few steps."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(advance, "_CHUNK_SECONDS", 0.0)
-        patch.setattr(advance, "_BLOCK_STEPS", 4)
-        patch.setattr(harvest, "_PATIENCE", 0.0)
-        patch.setattr(segments, "SEGMENT_SECONDS", 0.0)
-        run = rigidsim.run(rigidsim.parse(TEXT + "[limits]\nmax_steps = 30\n"), out=out)
+    tuning = Tuning(Pacing(chunk_seconds=0.0, patience=0.0, block_steps=4), SegmentLimits(seconds=0.0))
+    run = rigidsim.run(rigidsim.parse(TEXT + "[limits]\nmax_steps = 30\n"), out=out, tuning=tuning)
     assert run.status == "stopped: max_steps"
     assert len(list(run.folder.segments.iterdir())) >= 5
     return run
@@ -134,9 +131,7 @@ def test_a_damaged_segment(kind: str, originals: dict[str, rigidsim.Run], tmp_pa
     assert SAYS[kind] in told
     aside = sorted(p.name for p in done.folder.set_aside.iterdir())
     assert aside == [p.name for p in before[good + (kind == "lost") :]]
-    with done.dataset as found, originals["whole"].dataset as expected:
-        for name in expected.variables:
-            np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=str(name))
+    same_bits(done, originals["whole"])
 
 
 def test_an_intact_run_has_no_damage(originals: dict[str, rigidsim.Run]) -> None:

@@ -23,13 +23,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigidsim
-from rigidsim.prepare import Prepared, prepare
-from rigidsim.solve.advance import Advance
-from rigidsim.solve.harvest import Checkpoint
+from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.precision import Precision, precision_of
-from rigidsim.solve.rhythm import Rhythm
-from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.winding import Winding
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import SampleReceiver
 
 PRECISIONS = ['"single"', '"double"', '"extended"', '"quadruple"', "50"]
 PARTS = {'"single"': 1, '"double"': 1, '"extended"': 2, '"quadruple"': 3, "50": 4}
@@ -302,26 +300,15 @@ def test_a_start_that_is_not_zero(tmp_path: Path, free_body: Callable[..., str])
 # Every digit
 
 
-def _states(prepared: Prepared) -> np.ndarray:
+def _states(prepared: InitialValueProblem) -> np.ndarray:
     """The states at the samples, integrated again."""
     pieces = []
-    winding = Winding(prepared.system.angle_states, prepared.precision, prepared.scene.context)
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
 
-    class Collected:
-        def take(
-            self, first: int, times: np.ndarray, states: np.ndarray, turns: np.ndarray, put_back: np.ndarray
-        ) -> None:
-            pieces.append(states)
+    class Collected(SampleReceiver):
+        def take(self, block: SampleBlock) -> None:
+            pieces.append(block.states)
 
-        def due(self) -> bool:
-            return False
-
-        def save(self, checkpoint: Checkpoint) -> None:
-            raise AssertionError
-
-    rhythm = Rhythm(stepper, winding)
-    Advance(rhythm, prepared.clock, prepared.precision, Collected(), lambda progress: None).run()
+    sampler(prepared, assemble(prepared), Collected()).run()
     return np.concatenate(pieces)
 
 

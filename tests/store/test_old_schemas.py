@@ -12,7 +12,7 @@ import xarray
 from typer.testing import CliRunner
 
 import rigidsim
-from rigidsim.cli import app
+from rigidsim.cli.app import app
 from rigidsim.errors import RunFolderError
 from rigidsim.store.seal import seal
 from rigidsim.store.variables import SCHEMA_VERSION

@@ -11,9 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 import rigidsim
-from rigidsim.cli import app
+from rigidsim.cli.app import app
 from rigidsim.errors import RunFolderError
 from rigidsim.store.folder import RunFolder
+from rigidsim.store.summary import Brief
 
 
 @pytest.fixture
@@ -186,8 +187,8 @@ def test_a_run_without_a_summary_was_killed(finished: rigidsim.Run) -> None:
 
 def test_a_summary_is_replaced_as_a_whole(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path)
-    folder.write_summary({"status": "running", "value": 0.1})
+    folder.write_summary(Brief.model_validate({"status": "running", "value": 0.1}))
     with pytest.raises(ValueError, match="Out of range float"):
-        folder.write_summary({"status": "finished", "value": float("nan")})
-    assert folder.read_summary() == {"status": "running", "value": 0.1}
+        folder.write_summary(Brief.model_validate({"status": "finished", "value": float("nan")}))
+    assert folder.read_summary().as_dict() == {"status": "running", "value": 0.1}
     assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
+from support import same_bits
 
 import rigidsim
 from rigidsim.errors import RunFolderError
-from rigidsim.solve import advance, harvest
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.pacing import Pacing
 from rigidsim.store import netcdf, segments
-from rigidsim.store.segments import SegmentWriter, read_chain, segment_paths
+from rigidsim.store.segments import SegmentLimits, SegmentWriter, read_chain, segment_paths
 from rigidsim.store.variables import SCHEMA_VERSION, Variable, time_variable
 
 VARIABLES = [
@@ -40,11 +42,12 @@ def block(first: int, rows: int) -> dict[str, list[np.ndarray]]:
     }
 
 
-def writer(folder: Path) -> SegmentWriter:
+def writer(folder: Path, limits: SegmentLimits | None = None) -> SegmentWriter:
     return SegmentWriter(
         folder,
         VARIABLES,
         {"title": "t", "status": "running", "run_id": "r", "schema_version": SCHEMA_VERSION},
+        limits=limits,
     )
 
 
@@ -100,10 +103,9 @@ def test_a_segment_without_samples_still_has_a_checkpoint(tmp_path: Path) -> Non
     assert w.complete(tmp_path / "d.h5", {}) == 3
 
 
-def test_a_segment_is_due_by_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_segment_is_due_by_size(tmp_path: Path) -> None:
     row = 8 * (2 + 6 + 1)
-    monkeypatch.setattr(segments, "SEGMENT_BYTES", 10 * row)
-    w = writer(tmp_path / "s")
+    w = writer(tmp_path / "s", SegmentLimits(bytes=10 * row))
     w.add(block(0, 9))
     assert not w.due
     w.add(block(9, 1))
@@ -116,9 +118,9 @@ def test_a_segment_is_due_by_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_segment_is_due_by_age(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr(segments.time, "monotonic", lambda: now[0])
-    w = writer(tmp_path / "s")
+    w = writer(tmp_path / "s", SegmentLimits(seconds=30.0))
     w.add(block(0, 1))
-    now[0] += segments.SEGMENT_SECONDS - 0.1
+    now[0] += 30.0 - 0.1
     assert not w.due
     now[0] += 0.2
     assert w.due
@@ -184,12 +186,10 @@ def test_a_full_disk_ends_a_run_with_a_message(
             full_disk()
         replace(source, target)
 
-    monkeypatch.setattr(segments, "SEGMENT_BYTES", 1)
-    monkeypatch.setattr(advance, "_CHUNK_SECONDS", 0.0)
-    monkeypatch.setattr(harvest, "_PATIENCE", 0.0)
     monkeypatch.setattr(os, "replace", full_after_one_segment)
+    tuning = Tuning(Pacing(chunk_seconds=0.0, patience=0.0), SegmentLimits(bytes=1))
     with pytest.raises(RunFolderError, match=r"No space left on device"):
-        rigidsim.run(rigidsim.parse(free_body()), out=tmp_path)
+        rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, tuning=tuning)
     assert names(tmp_path / "free" / "segments") == ["00000000.h5"]
     partial = rigidsim.open_run(tmp_path / "free")
     assert partial.status == "running"
@@ -231,20 +231,15 @@ def test_a_run_in_many_segments_is_the_run_in_one(
 
     monkeypatch.setattr(SegmentWriter, "complete", counted)
     one = rigidsim.run(rigidsim.parse(text), out=tmp_path / "one")
-    monkeypatch.setattr(segments, "SEGMENT_BYTES", 1)
-    monkeypatch.setattr(harvest, "ROWS_AT_ONCE", 5)
-    monkeypatch.setattr(advance, "_CHUNK_SECONDS", 0.0)
-    monkeypatch.setattr(harvest, "_PATIENCE", 0.0)
-    many = rigidsim.run(rigidsim.parse(text), out=tmp_path / "many")
+    pacing = Pacing(chunk_seconds=0.0, patience=0.0, rows_at_once=5)
+    tuning = Tuning(pacing, SegmentLimits(bytes=1))
+    many = rigidsim.run(rigidsim.parse(text), out=tmp_path / "many", tuning=tuning)
     assert counts[0] == 0
     assert counts[1] >= 7
     for run in (one, many):
         assert not run.folder.segments.exists()
         assert names(run.folder.path) == ["checkpoint.h5", "config.toml", "dataset.h5", "summary.json"]
-    with one.dataset as a, many.dataset as b:
-        assert list(a.variables) == list(b.variables)
-        for name in a.variables:
-            np.testing.assert_array_equal(a[name].values, b[name].values, strict=True)
+    same_bits(one, many)
 
 
 @pytest.mark.parametrize("missing", [0, 1])

@@ -1,0 +1,150 @@
+"""A measurement of settings as labelled data, and which of them no other beats."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidsim.accuracy.bench.measure import Measurement, RowStatus
+from rigidsim.accuracy.bench.plan import DEFAULT
+from rigidsim.accuracy.setting import Setting, precision_title
+
+if TYPE_CHECKING:
+    import xarray
+    from numpy.typing import ArrayLike
+
+
+def dataset_of(measured: Measurement) -> xarray.Dataset:
+    """The measurement as xarray data: dimensions ``setting``, ``time``, ``invariant``.
+
+    Errors are in rad, costs relative to the default setting (double precision, quaternions). Where a setting
+    was not measured its numbers are nan and ``reason`` says why.
+    """
+    import xarray
+
+    from rigidsim.store.provenance import versions
+
+    rows, plan = measured.rows, measured.plan
+    names = sorted({name for row in rows for name in row.drifts})
+    span = plan.end - plan.start
+    error = np.full((len(rows), len(plan.times)), np.nan)
+    own = np.full(len(rows), np.nan)
+    cost = np.full((len(rows), 3), np.nan)
+    for n, row in enumerate(rows):
+        if row.measured:
+            errors, reference = measured.errors(row)
+            error[n, : len(errors)], own[n] = errors, float(reference[-1])
+            cost[n] = measured.cost(row)
+    final = np.array([e[np.isfinite(e)][-1] if np.isfinite(e).any() else np.nan for e in error])
+    largest = np.array([np.nanmax(e) if np.isfinite(e).any() else np.nan for e in error])
+    text = {"setting": [r.setting.title for r in rows]}
+    text |= {"status": [r.status.value for r in rows], "reason": [r.problem for r in rows]}
+    known = [r.measured for r in rows]
+
+    def numbers(values: Sequence[float]) -> np.ndarray:
+        return np.where(known, np.array(values, dtype=np.float64), np.nan)
+
+    def variable(
+        values: ArrayLike, units: str, long_name: str, dims: Sequence[str] = ("setting",)
+    ) -> tuple[Sequence[str], ArrayLike, dict[str, str]]:
+        return (dims, values, {"units": units, "long_name": long_name})
+
+    relative = "relative to the default setting, per simulated second"
+    data = xarray.Dataset(
+        {
+            "status": variable(np.array(text["status"], dtype=object), "1", "what became of the setting"),
+            "reason": variable(np.array(text["reason"], dtype=object), "1", "why it was not measured"),
+            "attitude_error": variable(error, "rad", "attitude error", ("setting", "time")),
+            "attitude_error_final": variable(final, "rad", "attitude error at the end of what was measured"),
+            "attitude_error_largest": variable(largest, "rad", "largest attitude error"),
+            "reference_error": variable(own, "rad", "error of the reference itself, estimated, at the end"),
+            "cpu_ratio": variable(cost[:, 0], "1", f"CPU time, median of the processes, {relative}"),
+            "cpu_ratio_least": variable(cost[:, 1], "1", f"CPU time, least of the processes, {relative}"),
+            "cpu_ratio_largest": variable(cost[:, 2], "1", f"CPU time, largest of the processes, {relative}"),
+            "cpu_seconds": variable(
+                numbers([measured.cpu_seconds(r) for r in rows]), "s", "CPU time of the measured part"
+            ),
+            "steps": variable(numbers([r.steps for r in rows]), "1", "natural Taylor steps"),
+            "taylor_order": variable(numbers([r.order for r in rows]), "1", "order of the Taylor series"),
+            "work": variable(numbers([r.work for r in rows]), "1", "steps x order^2 x states"),
+            "measured_time": variable(
+                numbers([row.part * span for row in rows]), "s", "how much of the motion was measured"
+            ),
+            "drift": variable(
+                np.array([[row.drifts.get(name, np.nan) for name in names] for row in rows]).reshape(
+                    len(rows), len(names)
+                ),
+                "1",
+                "largest relative drift of the invariant",
+                ("setting", "invariant"),
+            ),
+        },
+        coords={
+            "setting": ("setting", np.array(text["setting"], dtype=object), {"long_name": "setting"}),
+            "precision": variable(
+                np.array([precision_title(r.setting.precision) for r in rows], dtype=object),
+                "1",
+                "arithmetic",
+            ),
+            "tolerance": variable([_tolerance(r.setting) for r in rows], "1", "of the step control"),
+            "formulation": variable(
+                np.array([r.setting.formulation for r in rows], dtype=object), "1", "of the attitude"
+            ),
+            "held": variable(
+                np.array([r.setting.hold_invariants for r in rows], dtype=np.int8), "1", "invariants put back"
+            ),
+            "method": variable(
+                np.array([r.setting.method for r in rows], dtype=object), "1", "taylor or closed_form"
+            ),
+            "time": ("time", np.array(plan.times), {"units": "s", "long_name": "since start of the scene"}),
+            "invariant": ("invariant", np.array(names, dtype=object), {"long_name": "invariant"}),
+        },
+        attrs={
+            "Conventions": "CF-1.10",
+            "title": measured.experiment.config.name,
+            "config": measured.experiment.text,
+            "config_sha256": measured.experiment.sha256,
+            "compared": "attitudes, carried in every setting, whatever the config records",
+            "reference": measured.reference.how,
+            "reference_of_quadruple": (measured.wide_reference or measured.reference).how,
+            "default_setting": DEFAULT.title,
+            "horizon_seconds": span,
+            "measured_seconds": plan.part * span,
+            "closed_form": "yes" if plan.closed else f"none: {plan.why}",
+            "processes": measured.processes,
+            "seconds": measured.seconds,
+            **versions(),
+        },
+    )
+    front = on_front(data)
+    data["on_front"] = variable(
+        front.astype(np.int8), "1", "no other setting is both cheaper and more accurate"
+    )
+    return data
+
+
+def _tolerance(setting: Setting) -> float:
+    return math.nan if setting.method == "closed_form" else setting.step_tolerance
+
+
+def trusted_error(dataset: xarray.Dataset) -> np.ndarray:
+    """Largest attitude errors, none below what the reference can tell."""
+    largest, own = dataset["attitude_error_largest"].values, dataset["reference_error"].values
+    return np.asarray(np.maximum(largest, own))
+
+
+def on_front(dataset: xarray.Dataset) -> np.ndarray:
+    """Whether no setting is both cheaper and at least as accurate; only for those measured over all that was
+    measured, since errors over less of a motion don't compare.
+    """
+    error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
+    fit = (dataset["status"].values == RowStatus.MEASURED.value) & np.isfinite(error) & np.isfinite(cost)
+    result = np.zeros(len(error), dtype=bool)
+    best = math.inf
+    for n in sorted(np.nonzero(fit)[0], key=lambda n: (cost[n], error[n])):
+        if error[n] < best:
+            best, result[n] = error[n], True
+    return result

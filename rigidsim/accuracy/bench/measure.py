@@ -1,0 +1,269 @@
+"""Speed and accuracy of one scene, measured over every kind of setting.
+
+Every setting integrates the scene's own motion, attitude included, and is held against a reference whose
+own error is known (``rigidsim.accuracy.reference``): the closed form to 50 digits where there is one, else
+the best that a higher precision can do. Speeds are taken over several fresh processes, in turn
+(``rigidsim.accuracy.bench.worker``).
+
+A budget of time bounds it all: long motions are measured over their beginning, quadruple precision over less
+of it, and what doesn't fit is listed as left out. Nothing is extrapolated.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from rigidsim.accuracy.bench.plan import DEFAULT, Plan, every_setting, make_plan
+from rigidsim.accuracy.bench.solutions import ReferenceSolution, ReferenceThread, attitude_task
+from rigidsim.accuracy.bench.worker import Task, ask
+from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.setting import Setting
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.config import Experiment
+
+_LEAST_BUDGET = 5.0
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How a budget of time is spent.
+
+    Attributes:
+        grace: seconds for what a measurement can't do without, be the machine busy.
+        exploring: part of the budget until attitudes must be there.
+        single: part of the budget that one setting may take.
+        passes: CPU seconds of passes for each setting in each process: their median is then known to a
+            few per cent.
+    """
+
+    grace: float = 120.0
+    exploring: float = 0.65
+    single: float = 0.4
+    passes: float = 0.03
+
+
+TIMING = Timing()
+
+
+class RowStatus(StrEnum):
+    """What became of a setting; the values stand in datasets."""
+
+    MEASURED = "measured"
+    SHORT = "measured over less"
+    LEFT_OUT = "left out"
+    FAILED = "refused"
+
+
+@dataclass
+class Row:
+    """What is known of one setting.
+
+    Attributes:
+        part: of the horizon that it was measured over.
+        status: what became of it.
+        problem: why it was not measured, for the user.
+        attitudes: float64 parts (samples, 4).
+        unit_seconds: CPU seconds per step (closed form: per sample), one for each process.
+        default_seconds: the default's, in the same processes.
+    """
+
+    setting: Setting
+    part: float = 1.0
+    status: RowStatus = RowStatus.LEFT_OUT
+    problem: str = ""
+    attitudes: list[np.ndarray] = field(default_factory=list)
+    drifts: dict[str, float] = field(default_factory=dict)
+    steps: int = 0
+    order: int = 0
+    work: float = 0.0
+    unit_seconds: list[float] = field(default_factory=list)
+    default_seconds: list[float] = field(default_factory=list)
+
+    @property
+    def measured(self) -> bool:
+        """Whether its attitudes are there, to the end of its part."""
+        return self.status in (RowStatus.MEASURED, RowStatus.SHORT)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """All that was measured; see ``rigidsim.workflows.tradeoff`` for the dataset."""
+
+    experiment: Experiment
+    plan: Plan
+    rows: list[Row]
+    reference: ReferenceSolution
+    wide_reference: ReferenceSolution | None
+    processes: int
+    seconds: float
+
+    def reference_of(self, row: Row) -> ReferenceSolution:
+        """What a setting is held against."""
+        if row.setting.precision == "quadruple" and self.wide_reference is not None:
+            return self.wide_reference
+        return self.reference
+
+    def errors(self, row: Row) -> tuple[np.ndarray, np.ndarray]:
+        """Attitude errors (samples,) of a measured setting, and the reference's own, rad."""
+        reference = self.reference_of(row)
+        count = min(len(row.attitudes[0]), len(reference.attitudes[0]))
+        mine = [part[:count] for part in row.attitudes]
+        theirs = [part[:count] for part in reference.attitudes]
+        return angles_between(mine, theirs), reference.error[:count]
+
+    def cost(self, row: Row) -> tuple[float, float, float]:
+        """CPU time per simulated second relative to the default's: median, least and largest of the
+        processes; nan where its speed was not measured.
+        """
+        default = next(r for r in self.rows if r.setting == DEFAULT)
+        scale = (self._units(row) / row.part) / (default.steps / default.part)
+        ratios = [scale * a / b for a, b in zip(row.unit_seconds, row.default_seconds, strict=True)]
+        if not ratios:
+            return (math.nan,) * 3
+        return statistics.median(ratios), min(ratios), max(ratios)
+
+    def cpu_seconds(self, row: Row) -> float:
+        """Of the setting over its part: steps (or samples) times the median of a step's cost."""
+        if not row.unit_seconds:
+            return math.nan
+        return self._units(row) * statistics.median(row.unit_seconds)
+
+    def _units(self, row: Row) -> float:
+        """What is paid for: steps, or samples of a closed form."""
+        return self.plan.samples * row.part if row.setting.method == "closed_form" else row.steps
+
+
+def measure(
+    experiment: Experiment,
+    *,
+    budget: float = 90.0,
+    repeats: int = 3,
+    plan: Plan | None = None,
+    reference: str = "best",
+    full: bool = False,
+    settings: Sequence[Setting] | None = None,
+    told: Callable[[str], None] = lambda _: None,
+    timing: Timing = TIMING,
+) -> Measurement:
+    """Measure the settings of a scene.
+
+    Args:
+        budget: seconds that it may take, roughly.
+        repeats: fresh processes in which speeds are taken.
+        plan: what to measure over; None for as much as the budget allows.
+        reference: "best", or "extended" to use that setting where nothing better can be had in time.
+        full: every tolerance in every formulation and precision.
+        settings: to compare, beside the default; None for every kind.
+        told: called with what is being done.
+
+    Raises:
+        ConfigError: the config can't be run.
+        RigidsimError: the budget is too small for anything.
+    """
+    if not budget >= _LEAST_BUDGET:
+        raise RigidsimError(
+            f"tradeoff: --budget {budget:g} s is too short; {_LEAST_BUDGET:g} s or more is needed"
+        )
+    if repeats < 1:
+        raise RigidsimError(f"tradeoff: --repeats {repeats} is not possible; at least 1 process is needed")
+    begun = time.monotonic()
+    plan = plan or make_plan(experiment, budget)
+    if settings is None:
+        settings = every_setting(plan.closed, full=full)
+    rows = [Row(s) for s in dict.fromkeys([DEFAULT, *settings])]
+    explored = begun + timing.exploring * budget
+    references = ReferenceThread(experiment, plan, explored, timing.grace, wanted=reference == "best")
+    references.start()
+    told(f"attitudes of {len(rows)} settings")
+    _explore(experiment, plan, rows, budget, explored, timing)
+    told("the reference")
+    references.join()
+    found, wide = references.found({row.setting: row.attitudes for row in rows if row.measured})
+    told("speeds")
+    done = _time(experiment, plan, rows, repeats, begun + 1.1 * budget, timing, told)
+    return Measurement(experiment, plan, rows, found, wide, done, time.monotonic() - begun)
+
+
+# --- attitudes -------------------------------------------------------------------------------------------
+
+
+def _explore(
+    experiment: Experiment, plan: Plan, rows: list[Row], budget: float, deadline: float, timing: Timing
+) -> None:
+    """Fill in attitudes, drifts and counts."""
+    tasks = []
+    for row in rows:
+        wide = row.setting.precision == "quadruple" and row.setting.method == "taylor"
+        row.part = plan.short if wide else plan.part
+        tasks.append(attitude_task(plan, row.setting, timing.single * budget, wide=wide))
+        row.problem = f"left out: the budget of {budget:g} s was used up before its turn"
+    # without the default there is nothing to compare with: on a busy machine it may be late
+    first_by = time.monotonic() + timing.grace
+    for answer in ask(experiment, tasks, deadline=deadline, first_by=first_by):
+        row = rows[answer.index]
+        row.status = RowStatus.MEASURED if row.part >= plan.part else RowStatus.SHORT
+        row.problem = ""
+        if answer.problem is not None:
+            row.status, row.problem = RowStatus.FAILED, answer.problem
+        if answer.values:
+            row.attitudes = [np.array(part) for part in answer.values["attitudes"]]
+            row.drifts = answer.values["drifts"]
+            row.steps, row.order = answer.values["steps"], answer.values["order"]
+            row.work = answer.values["work"]
+    if not rows[0].measured:
+        raise RigidsimError(
+            f"tradeoff: the default setting ({DEFAULT.title}), which costs are relative to, could not be "
+            f"measured: {rows[0].problem}"
+        )
+
+
+# --- speeds ----------------------------------------------------------------------------------------------
+
+
+def _time(
+    experiment: Experiment,
+    plan: Plan,
+    rows: list[Row],
+    repeats: int,
+    deadline: float,
+    timing: Timing,
+    told: Callable[[str], None],
+) -> int:
+    """Take speeds in fresh processes, in a different order in each; returns how many got through."""
+    measured = [row for row in rows if row.measured]
+    done = 0
+    for repeat in range(repeats):
+        told(f"speeds, process {repeat + 1} of {repeats}")
+        order = [row for row in measured if row.setting != DEFAULT]
+        random.Random(repeat).shuffle(order)
+        middle = len(order) // 2
+        turns = [rows[0], *order[:middle], rows[0], *order[middle:], rows[0]]
+        tasks = [Task(row.setting, "speed", plan.times, timing.passes, max(1, row.steps)) for row in turns]
+        seconds: dict[int, float] = {}
+        limit = deadline if repeat else max(deadline, time.monotonic() + 30.0)
+        first_by = 0.0 if repeat else time.monotonic() + timing.grace
+        for answer in ask(experiment, tasks, deadline=limit, first_by=first_by):
+            if answer.problem is None:
+                seconds[answer.index] = answer.values["seconds"]
+        defaults = [seconds[n] for n, row in enumerate(turns) if row is rows[0] and n in seconds]
+        if not defaults:
+            break
+        base = statistics.median(defaults)
+        for n, row in enumerate(turns):
+            if row is not rows[0] and n in seconds:
+                row.unit_seconds.append(seconds[n])
+                row.default_seconds.append(base)
+        rows[0].unit_seconds.append(base)
+        rows[0].default_seconds.append(base)
+        done += len(seconds) == len(turns)
+        if time.monotonic() > deadline:
+            break
+    return done

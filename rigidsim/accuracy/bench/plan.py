@@ -1,0 +1,161 @@
+"""Which settings are measured, and over how much of the motion: what a budget of time allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigidsim.accuracy.error_law import closed_form_if_any
+from rigidsim.accuracy.motion import run_pilot
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import trial_scene
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.scene import build_scene
+from rigidsim.solve.assembly import assemble
+from rigidsim.solve.problem import prepare_scene
+
+DEFAULT = Setting()
+"""What every cost is relative to."""
+FORMULATIONS = ("quaternion", "rotation_matrix", "euler_angles", "canonical")
+_TOLERANCES: dict[str, tuple[float, ...]] = {
+    "double": (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14),
+    "extended": (1e-12, 1e-16),
+    "single": (1e-3, 1e-5),
+    "quadruple": (1e-24,),
+}
+_WARMING = 32  # steps whose cost isn't measured
+_FEW_TOLERANCES = (1e-6, 1e-10)  # of the other formulations in double precision
+
+
+@dataclass(frozen=True)
+class Budgeting:
+    """How a budget of time is divided.
+
+    Costs are in steps of the default setting, measured and rounded up.
+
+    Attributes:
+        pilot_steps: that the pace of the default setting is taken from.
+        all_share, all_cost: of all settings together.
+        reference_share, reference_cost: of the reference in quadruple precision.
+        quadruple_share, quadruple_cost: of all quadruple settings.
+        digits_share, digits_cost: of the reference for these.
+        samples, short_samples: where attitudes are compared, over the whole part and over the short one.
+    """
+
+    pilot_steps: int = 4000
+    all_share: float = 0.3
+    all_cost: float = 350.0
+    reference_share: float = 0.3
+    reference_cost: float = 1300.0
+    quadruple_share: float = 0.1
+    quadruple_cost: float = 2600.0
+    digits_share: float = 0.2
+    digits_cost: float = 12000.0
+    samples: int = 32
+    short_samples: int = 6
+
+
+BUDGETING = Budgeting()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much of the motion is measured.
+
+    Attributes:
+        start, end: of the experiment, seconds.
+        steps: of the default setting over all of it, roughly.
+        part, short: measured over, by most settings and by quadruple precision.
+        times: seconds, ascending; the first ``short_count`` reach to the end of ``short``.
+        closed: whether the scene has a closed form; why: else why not.
+        samples: that the experiment itself records.
+    """
+
+    start: float
+    end: float
+    steps: float
+    part: float
+    short: float
+    times: tuple[float, ...]
+    short_count: int
+    closed: bool
+    why: str
+    samples: int
+
+
+def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
+    """All settings, those that matter most first: a budget cuts at the end.
+
+    Args:
+        closed: whether the scene has a closed form.
+        full: every tolerance in every formulation and precision.
+    """
+
+    def both(settings: list[Setting]) -> list[Setting]:
+        return [replace(s, hold_invariants=held) for s in settings for held in (False, True)]
+
+    plain = both([Setting(p) for p in ("double", "extended", "single", "quadruple")])
+    exact = [Setting(p, method="closed_form") for p in ("double", "extended", "quadruple")] if closed else []
+    loose = both([Setting(p, tolerance) for p, some in _TOLERANCES.items() for tolerance in some])
+    tight = [
+        replace(s, formulation=f)
+        for p in ("double", "single", "extended")
+        for s in both([Setting(p)])
+        for f in FORMULATIONS[1:]
+    ]
+    few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in FORMULATIONS[1:]])
+    rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in FORMULATIONS[1:]]
+    listed = [*plain[:2], *exact, *plain[2:], *loose, *tight[:12], *few, *tight[12:], *(rest if full else [])]
+    return list(dict.fromkeys(listed))
+
+
+def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING) -> Plan:
+    """From a short pilot of the default setting.
+
+    Args:
+        budget: seconds for everything.
+
+    Raises:
+        ConfigError: the config can't be run.
+    """
+    scene = build_scene(experiment)
+    start, end = float(scene.start), float(scene.samples.last)
+    prepared = prepare_scene(experiment, trial_scene(experiment, DEFAULT))
+    corrected = assemble(prepared).corrected
+    pilot = run_pilot(
+        corrected.stepper, prepared.clock, corrected.skip, steps=how.pilot_steps, warming=_WARMING
+    )
+    whole = pilot.whole * pilot.seconds_per_step
+    form, why = closed_form_if_any(scene)
+    part = min(1.0, how.all_share * budget / (whole * how.all_cost))
+    short = how.quadruple_share * budget / (whole * how.quadruple_cost)
+    if form is None:
+        part = min(part, how.reference_share * budget / (whole * how.reference_cost))
+        short = min(short, how.digits_share * budget / (whole * how.digits_cost))
+    short = min(part, short)
+    short_times = grid(start, end, short, how.short_samples) if short < part else ()
+    # the start is a sample, so that the motion begins there
+    times = tuple(sorted({start, *short_times, *grid(start, end, part, how.samples)}))
+    limit = short_times[-1] if short_times else times[-1]
+    return Plan(
+        start=start,
+        end=end,
+        steps=pilot.whole,
+        part=part,
+        short=short,
+        times=times,
+        short_count=sum(t <= limit for t in times),
+        closed=form is not None,
+        why=why,
+        samples=scene.samples.count,
+    )
+
+
+def grid(start: float, end: float, part: float, count: int) -> tuple[float, ...]:
+    """Times over the first part of a motion that single precision means exactly too."""
+    exact = start + (end - start) * part * np.arange(1, count + 1) / count
+    rounded = exact.astype(np.float32)
+    late = rounded.astype(np.float64) > exact
+    rounded[late] = np.nextafter(rounded[late], np.float32(-np.inf))
+    return tuple(sorted({float(t) for t in rounded if float(t) > start})) or (float(exact[-1]),)

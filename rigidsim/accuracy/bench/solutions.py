@@ -1,0 +1,125 @@
+"""The references of a measurement, integrated in a process of their own while the settings are tried."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidsim.accuracy.bench.plan import Plan
+from rigidsim.accuracy.bench.worker import Task, ask
+from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.reference import (
+    LEAST_DIGITS,
+    best_and_second,
+    closed_form_error,
+    closed_form_to,
+    errors_of_best,
+)
+from rigidsim.accuracy.setting import Setting
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.config import Experiment
+
+_WITHOUT_END = 1e6  # seconds: a reference is stopped by the deadline alone
+
+Solutions = Mapping[Setting, list[np.ndarray]]
+"""Attitudes of settings, float64 parts (samples, 4)."""
+
+
+@dataclass(frozen=True)
+class ReferenceSolution:
+    """Attitudes to hold others against.
+
+    Attributes:
+        attitudes: float64 parts (samples, 4).
+        error: (samples,) estimate of their own error, rad.
+        how: in words.
+    """
+
+    setting: Setting
+    attitudes: list[np.ndarray]
+    error: np.ndarray
+    how: str
+
+
+def attitude_task(plan: Plan, setting: Setting, patience: float, *, wide: bool) -> Task:
+    """Attitudes of a setting over the plan's times, or where it is ``wide`` over the short part of them.
+
+    Args:
+        patience: CPU seconds that it may take.
+    """
+    times = plan.times[: plan.short_count] if wide else plan.times
+    return Task(setting, "attitudes", times, patience)
+
+
+class ReferenceThread(threading.Thread):
+    """Integrates the references while the settings are tried (in a process of its own)."""
+
+    def __init__(
+        self, experiment: Experiment, plan: Plan, deadline: float, grace: float, *, wanted: bool
+    ) -> None:
+        super().__init__(daemon=True)
+        self._experiment, self._plan, self._deadline, self._grace = experiment, plan, deadline, grace
+        self._exact = closed_form_to(LEAST_DIGITS).setting
+        self._tasks: list[Task] = []
+        if plan.closed:
+            self._tasks = [attitude_task(plan, self._exact, _WITHOUT_END, wide=False)]
+        elif wanted:
+            self._tasks = [
+                attitude_task(plan, setting, _WITHOUT_END, wide=precision == LEAST_DIGITS)
+                for precision in ("quadruple", LEAST_DIGITS)
+                for setting in best_and_second(precision)
+            ]
+        self._found: dict[Setting, list[np.ndarray]] = {}
+        self._failure: BaseException | None = None
+
+    def run(self) -> None:
+        """See ``Thread``."""
+        try:
+            first_by = time.monotonic() + self._grace
+            for answer in ask(self._experiment, self._tasks, deadline=self._deadline, first_by=first_by):
+                if answer.problem is None:
+                    parts = [np.array(part) for part in answer.values["attitudes"]]
+                    self._found[self._tasks[answer.index].setting] = parts
+        except BaseException as error:  # told in the main thread
+            self._failure = error
+
+    def found(self, measured: Solutions) -> tuple[ReferenceSolution, ReferenceSolution | None]:
+        """The reference, and the one for quadruple precision where it needs another.
+
+        Args:
+            measured: solutions over the same times, the best of which must do where nothing better is there.
+
+        Raises:
+            RigidsimError: there is none.
+        """
+        if self._failure is not None:
+            raise self._failure
+        if self._exact in self._found:
+            exact = self._found[self._exact]
+            own = np.full(len(exact[0]), closed_form_error(LEAST_DIGITS))
+            how = f"closed form to {LEAST_DIGITS} digits"
+            return ReferenceSolution(self._exact, exact, own, how), None
+        wide = _best_of(LEAST_DIGITS, self._found)
+        for precision, solutions in (
+            ("quadruple", self._found), ("extended", measured), ("double", measured),
+        ):  # fmt: skip
+            best = _best_of(precision, solutions)
+            if best is not None:
+                return best, wide
+        raise RigidsimError(
+            "tradeoff: no reference could be integrated within the budget; give a larger --budget"
+        )
+
+
+def _best_of(precision: str | int, solutions: Solutions) -> ReferenceSolution | None:
+    """The best solution of a precision, where there is a second best that its error is known by."""
+    best, second = best_and_second(precision)
+    if best not in solutions or second not in solutions:
+        return None
+    error = errors_of_best(angles_between(solutions[best], solutions[second]), best)
+    how = f"{best.title}; its error is its distance from {second.title}"
+    return ReferenceSolution(best, solutions[best], error, how)

@@ -1,0 +1,184 @@
+"""How right is a run really: its attitude against an independent and better solution, at a set of times.
+
+What is certified is the largest difference found, some more for what lies between the times compared, and
+what the reference itself may be wrong by (``rigidsim.accuracy.reference``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import mpmath
+import numpy as np
+
+from rigidsim.accuracy.comparison import angles_between, exact_times, parts_of, rows_to_compare
+from rigidsim.accuracy.motion import Motion, motion_of
+from rigidsim.accuracy.reference import LOST, STANDARD, Kind, Policy, Reference, own_error, references
+from rigidsim.accuracy.setting import Setting, setting_of
+from rigidsim.accuracy.trial import Told, Trials, try_setting
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was found.
+
+    Attributes:
+        error: bound of the attitude error at the times compared, the end among them, rad.
+        end: the difference found at the end itself, rad.
+        how: against what.
+        times: how many.
+    """
+
+    error: float
+    end: float
+    how: str
+    times: int
+
+    def as_dict(self) -> dict[str, float | str | int]:
+        """For the summary."""
+        return {
+            "certified": self.error,
+            "difference_at_end": self.end,
+            "how": self.how,
+            "times_compared": self.times,
+        }
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """An accuracy that was asked for and not certified.
+
+    Attributes:
+        asked, certified: rad.
+        how: against what.
+    """
+
+    code: ClassVar[str] = "accuracy_not_certified"
+    asked: float
+    certified: float
+    how: str
+
+    @property
+    def message(self) -> str:
+        """For the user."""
+        return (
+            f"accuracy = {self.asked:.3g} rad was asked for, but only {self.certified:.2g} rad could be "
+            f"certified ({self.how}); choose a higher precision or a nearer end"
+        )
+
+
+def certify(
+    dataset: xarray.Dataset,
+    experiment: Experiment,
+    *,
+    accuracy: float,
+    loads: Sequence[Load] = (),
+    known: Motion | None = None,
+    told: Told | None = None,
+    policy: Policy = STANDARD,
+) -> Certificate | None:
+    """Compare a finished run with an independent solution.
+
+    Args:
+        dataset: of the run.
+        experiment: that was run.
+        accuracy: asked for, rad; decides how good the reference must be.
+        known: of the motion, where it was looked at already.
+        told: of the comparisons, as in ``try_setting``.
+        policy: of references.
+
+    Returns:
+        None where the run recorded too little to be compared.
+    """
+    if dataset.sizes["time"] == 0:
+        return None
+    motion = known or motion_of(experiment, loads=loads)
+    compared = _Compared(dataset, Trials(experiment, loads, told), motion, policy)
+    best: Certificate | None = None
+    for reference in references(compared.setting, motion, accuracy, policy):
+        found = compared.against(reference)
+        if found is None:
+            continue
+        if best is None or found.error < best.error:
+            best = found
+        settled = compared.largest - compared.own > accuracy and compared.largest < LOST
+        if best.error <= accuracy or settled:
+            break
+    return best
+
+
+class _Compared:
+    """A run's recorded attitudes, and what others say at the same times.
+
+    Attributes:
+        setting: of the run.
+        largest: of the differences from the latest reference, rad.
+        own: that reference's own error, at most, rad.
+    """
+
+    def __init__(self, dataset: xarray.Dataset, trials: Trials, motion: Motion, policy: Policy) -> None:
+        self.setting = setting_of(trials.experiment)
+        self._trials, self._motion, self._policy = trials, motion, policy
+        self._count = dataset.sizes["time"]
+        self._rows = {most: rows_to_compare(dataset, most) for most in (policy.times, policy.wide_times)}
+        everything = np.unique(np.concatenate(list(self._rows.values())))
+        self._place = {row: n for n, row in enumerate(everything)}
+        self._times = exact_times(dataset, everything)
+        if "quaternion" in dataset:
+            self._parts = parts_of(dataset, "quaternion", everything)
+        else:
+            again = try_setting(trials.experiment, self.setting, self._times, loads=trials.loads)
+            self._parts = again.attitudes
+        self.largest = self.own = math.inf
+
+    def against(self, reference: Reference) -> Certificate | None:
+        """The certificate that a reference gives; None where it can't be had."""
+        policy = self._policy
+        rows = self._rows[policy.wide_times if reference.kind is Kind.CLOSED_FORM else policy.times]
+        safety = policy.safety if len(rows) == self._count else policy.picked_safety
+        if reference.kind is Kind.PEER:
+            safety = policy.peer_safety
+        places = [self._place[row] for row in rows]
+        times = [self._times[place] for place in places]
+        attitudes = self._attitudes(reference.setting, times)
+        if attitudes is None:
+            return None
+        difference = angles_between([part[places] for part in self._parts], attitudes)
+
+        def distance(other: Setting) -> float:
+            found = self._attitudes(other, times)
+            return math.inf if found is None else float(angles_between(found, attitudes).max())
+
+        self.largest = float(difference.max())
+        self.own = own_error(reference, self.setting, self.largest, self._motion, distance, policy)
+        # a quaternion's own last bit: what is recorded can't be compared more closely
+        floor = 2.0 ** (2 - self.setting.bits)
+        error = safety * self.largest + self.own + floor
+        if not self.largest < LOST:
+            error = math.pi
+        return Certificate(min(error, math.pi), float(difference[-1]), reference.how, len(rows))
+
+    def _attitudes(self, setting: Setting, times: Sequence[mpmath.mpf]) -> list[np.ndarray] | None:
+        trial = self._trials.whole(setting, times)
+        return None if trial is None else trial.attitudes
+
+
+def shortfall(certificate: Certificate, accuracy: float) -> Shortfall | None:
+    """What an accuracy asked for (rad) was missed by; None where it was certified."""
+    if certificate.error <= accuracy:
+        return None
+    return Shortfall(accuracy, min(certificate.error, math.pi), certificate.how)
+
+
+def verdict(certificate: Certificate, accuracy: float) -> str | None:
+    """The warning for a summary where the accuracy asked for (rad) wasn't certified; None where it was."""
+    short = shortfall(certificate, accuracy)
+    return None if short is None else short.message

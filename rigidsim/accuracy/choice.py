@@ -1,0 +1,217 @@
+"""``[integrator] accuracy``: the cheapest setting that keeps the attitude as right as was asked for.
+
+Settings are tried over the motion's beginning, which is the whole of a short run, against a better one
+(``rigidsim.accuracy.forecast``); what wasn't tried follows from what was: errors of rounding are in
+proportion to the precision's epsilon, those of the series to the tolerance. A choice is a forecast: what the
+run really kept is certified afterwards (``rigidsim.accuracy.certificate``).
+
+Choices depend on counts alone, never on a clock, so that a config always chooses the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from rigidsim.accuracy.cost import MEASURED, cost
+from rigidsim.accuracy.forecast import Forecasts
+from rigidsim.accuracy.motion import Motion
+from rigidsim.accuracy.setting import Setting, epsilon, setting_of
+from rigidsim.accuracy.trial import Told
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.scene.schema import LARGEST_DIGITS
+
+_DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
+"""Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""
+_LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100, 150, 200, LARGEST_DIGITS)
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Between what is forecast and what was asked for.
+
+    With the defaults 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice
+    the cheapest setting of a full search (``experiments/accuracy_certificates.py``).
+
+    Attributes:
+        safety: the accuracy over the largest forecast.
+        hope: of the accuracy: worth a try where the next precision costs ten times as much; hope_long: the
+            same of a long run, which mostly does better than forecast from its beginning.
+        progress: of the error forecast of a setting that failed: what the next must promise.
+    """
+
+    safety: float = 3.0
+    hope: float = 0.6
+    hope_long: float = 3.0
+    progress: float = 0.2
+
+
+MARGINS = Margins()
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A setting and what is forecast of it.
+
+    Attributes:
+        forecast: attitude error at the end, rad.
+        steps: natural steps, roughly.
+        why: one sentence for the summary.
+        known: of the motion.
+    """
+
+    setting: Setting
+    forecast: float
+    steps: int
+    why: str
+    known: Motion
+
+
+def leaves_choice(experiment: Experiment) -> bool:
+    """Whether ``accuracy`` is given and precision, tolerance or method are open to be chosen for it."""
+    integrator = experiment.config.integrator
+    fixed = {"precision", "tolerance", "method"} <= integrator.model_fields_set
+    return integrator.accuracy is not None and not fixed
+
+
+def chosen(
+    experiment: Experiment,
+    *,
+    loads: Sequence[Load] = (),
+    beyond: Setting | None = None,
+    told: Told | None = None,
+) -> tuple[Experiment, Choice | None]:
+    """The experiment with the settings that its ``accuracy`` asks for written into it.
+
+    Keys that the config gives stay as they are; where it gives precision, tolerance and method, nothing is
+    chosen and the run is only certified. The text says what was chosen in ``#:set`` lines, so that it
+    means the same run again.
+
+    Args:
+        loads: given from Python.
+        beyond: a setting that was run and didn't keep the accuracy; only dearer ones are looked at.
+        told: of the trials, as in ``try_setting``.
+
+    Raises:
+        ConfigError: no setting reaches the accuracy; says what can be reached.
+    """
+    integrator = experiment.config.integrator
+    if integrator.accuracy is None or not leaves_choice(experiment):
+        return experiment, None
+    accuracy = float(integrator.accuracy.rational)
+    try:
+        choice = choose(experiment, accuracy, loads=loads, beyond=beyond, told=told)
+    except ConfigError as error:
+        raise error.at(experiment.source) from None
+    keys = choice.setting.overrides(without=integrator.model_fields_set)
+    return parse_saved(experiment.text, source=experiment.source, overrides=keys), choice
+
+
+def choose(
+    experiment: Experiment,
+    accuracy: float,
+    *,
+    loads: Sequence[Load] = (),
+    beyond: Setting | None = None,
+    told: Told | None = None,
+    margins: Margins = MARGINS,
+) -> Choice:
+    """The cheapest setting whose forecast keeps an accuracy, within what the config leaves open.
+
+    Args:
+        accuracy: rad, at the end.
+        beyond, told: as of ``chosen``.
+
+    Raises:
+        ConfigError: none does.
+    """
+    forecasts = Forecasts(experiment, accuracy, loads, told)
+    motion = forecasts.motion
+
+    def counted(setting: Setting) -> float:
+        return cost(setting, motion.steps, forecasts.samples)
+
+    candidates = sorted(_candidates(experiment, motion), key=counted)
+    most = accuracy / margins.safety
+    hope = accuracy * (margins.hope_long if forecasts.part < 1 else margins.hope)
+    if beyond is not None:
+        hope = 0.0
+        most = min(most, margins.progress * forecasts.error(beyond))
+        spent = counted(beyond)
+        candidates = [s for s in candidates if counted(s) > spent]
+    while True:
+        choice = _first(forecasts, candidates, most, hope)
+        if choice is None:
+            reached = min(candidates, key=forecasts.error, default=None)
+            raise ConfigError(Problem("[integrator] accuracy", _unreachable(forecasts, reached, accuracy)))
+        if not forecasts.measure(choice.setting):
+            return choice  # it was tried, or is too dear to be
+
+
+def _first(forecasts: Forecasts, candidates: list[Setting], most: float, hope: float) -> Choice | None:
+    """The first of the candidates that is forecast to be within ``most``, or within ``hope`` where only
+    another precision would do better.
+    """
+    motion = forecasts.motion
+    steps = int(motion.steps)
+    for n, setting in enumerate(candidates):
+        error = forecasts.error(setting)
+        if error <= most:
+            return Choice(setting, error, steps, forecasts.why(setting), motion)
+        dearer = all(s.precision != setting.precision for s in candidates[n + 1 :] if s.method == "taylor")
+        if dearer and setting.method == "taylor" and error <= hope:
+            why = f"{forecasts.why(setting)}; the next precision costs ten times as much"
+            return Choice(setting, error, steps, why, motion)
+    return None
+
+
+def _candidates(experiment: Experiment, motion: Motion) -> list[Setting]:
+    """All that the config leaves open."""
+    integrator = experiment.config.integrator
+    given = integrator.model_fields_set
+    formulation = integrator.formulation
+    charts = formulation not in ("auto", "rates", "quaternion")
+    precisions = (integrator.precision,) if "precision" in given else _LADDER
+    found: list[Setting] = []
+    if integrator.method == "closed_form" or "method" not in given:
+        open_ = motion.closed and not charts and not experiment.config.events
+        open_ = open_ and not (integrator.hold_invariants and "hold_invariants" in given)
+        found += [Setting(p, method="closed_form") for p in precisions if p != "extended" and open_]
+    if "method" in given and integrator.method == "closed_form":
+        return found
+    plain = Setting(formulation=formulation if charts else "quaternion")
+    holds = [integrator.hold_invariants] if "hold_invariants" in given else [False, True]
+    looser = 13
+    for precision in precisions:
+        finest = math.floor(-math.log10(epsilon(precision)))
+        digits = _DIGITS.get(precision, range(looser, finest + 1))
+        tolerances: list[float | None] = [None, *(float(f"1e-{d}") for d in digits)]
+        if "tolerance" in given:
+            tolerances = [setting_of(experiment).tolerance]
+        looser = finest
+        found += [
+            replace(plain, precision=precision, tolerance=tolerance, hold_invariants=projected)
+            for tolerance in tolerances
+            for projected in holds
+            if motion.holds or not projected or "hold_invariants" in given
+        ]
+    return found
+
+
+def _unreachable(forecasts: Forecasts, best: Setting | None, accuracy: float) -> str:
+    if best is None:
+        return f"given {accuracy:.3g} rad, but the other keys of [integrator] leave no setting to choose from"
+    motion = forecasts.motion
+    seconds = cost(best, motion.steps, forecasts.samples) * MEASURED.seconds
+    reached = forecasts.error(best)
+    what = f"would be right to about {reached:.2g} rad" if reached < 1 else "would keep no digit"
+    text = (
+        f"given {accuracy:.3g} rad at the end, which no setting open to it reaches; the best, {best.title}, "
+        f"{what}, in about {seconds:.2g} s"
+    )
+    if motion.growth.rate > 0:
+        text += f"; errors here grow e-fold every {1 / motion.growth.rate:.3g} s, so choose a nearer end"
+    return text + "; ask for less, or leave precision, tolerance and method open"

@@ -1,0 +1,76 @@
+"""Attitudes compared with every digit, at the samples that are worth comparing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise, zip_longest
+from typing import TYPE_CHECKING
+
+import mpmath
+import numpy as np
+
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.scene import build_scene
+from rigidsim.store.variables import parts_in
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def angles_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+    """Rotation angles (n,) in rad between attitudes given as float64 parts (n, 4) of quaternions.
+
+    Small angles keep their digits: parts are subtracted before anything is rounded.
+    """
+    lead = np.einsum("ij,ij->i", one[0], other[0])
+    sign = np.where(lead < 0, -1.0, 1.0)[:, None]
+    terms = [*one, *(-sign * b for b in other)]
+    if len(terms) <= 4:
+        pairs = zip_longest(one, other, fillvalue=np.zeros_like(one[0]))
+        difference = sum((a - sign * b for a, b in pairs), np.zeros_like(one[0]))
+    else:  # differences of single parts are rounded at 1e-32 already
+        difference = np.array([math.fsum(row) for row in np.stack(terms, axis=-1).reshape(-1, len(terms))])
+        difference = difference.reshape(one[0].shape)
+    chord = np.linalg.norm(difference, axis=1)
+    return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
+
+
+def spread_times(experiment: Experiment, count: int, until: float = 1.0) -> list[mpmath.mpf]:
+    """Up to ``count`` times over the first part ``until`` of a run, its end included, as mpf.
+
+    Each is a double, so that every precision from double on means the same moment by it.
+    """
+    scene = build_scene(experiment)
+    start, last = float(scene.start), float(scene.samples.last)
+    grid = start + (last - start) * until * np.arange(1, count + 1) / count
+    return [mpmath.mpf(float(t)) for t in grid]
+
+
+def rows_to_compare(dataset: xarray.Dataset, most: int) -> np.ndarray:
+    """All samples, or of each of ``most`` stretches the one where the body turns fastest, and the last."""
+    count = dataset.sizes["time"]
+    if count <= most:
+        return np.arange(count)
+    rates = np.zeros(count)
+    if "angular_velocity" in dataset:
+        rates = np.linalg.norm(dataset["angular_velocity"].values, axis=1)
+    elif "quaternion" in dataset:
+        attitudes = dataset["quaternion"].values
+        turned = np.abs(np.einsum("ij,ij->i", attitudes[:-1], attitudes[1:]))
+        rates[1:] = np.arccos(np.minimum(turned, 1.0)) / np.diff(dataset["time"].values)
+    edges = np.linspace(0, count, most).astype(int)
+    picked = [a + int(np.argmax(rates[a:b])) for a, b in pairwise(edges)]
+    return np.unique([*picked, count - 1])
+
+
+def exact_times(dataset: xarray.Dataset, rows: np.ndarray) -> list[mpmath.mpf]:
+    """Of some rows, mpf seconds."""
+    parts = zip(*parts_of(dataset, "time", rows), strict=True)
+    with mpmath.workprec(1200):
+        return [mpmath.fsum(float(part) for part in row) for row in parts]
+
+
+def parts_of(dataset: xarray.Dataset, name: str, rows: np.ndarray) -> list[np.ndarray]:
+    """A variable's float64 parts at some rows."""
+    return [np.asarray(dataset[part].values[rows]) for part in parts_in(dataset, name)]

@@ -1,0 +1,204 @@
+"""Errors of settings at a run's end, forecast from short trials over its beginning.
+
+Laws: errors of rounding grow like t^1.5 (Brouwer 1937), or t with projected invariants; those of the series
+at most like t^2; both times the motion's own growth. Short motions are tried whole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from rigidsim.accuracy.comparison import angles_between, spread_times
+from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
+from rigidsim.accuracy.reference import STANDARD, Policy, closed_form_beyond, stepped_reference
+from rigidsim.accuracy.setting import Setting, epsilon
+from rigidsim.accuracy.trial import Told, Trial, Trials
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.scene import build_scene
+
+_BASE_TOLERANCE = 1e-8  # of the trial that all other tolerances are first forecast from
+_LARGEST_EXPONENT = 600.0  # keeps products within doubles
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """From what trials show to a run's end.
+
+    With the defaults 96 of 100 choices cost at most twice the cheapest setting of a full search, and 199 of
+    200 were kept (``experiments/accuracy_certificates.py``).
+
+    Attributes:
+        steps: natural ones of a trial, at most.
+        times: compared; closed_times: of a closed form, a sample of which may take milliseconds.
+        saturated: rad, past which errors are no longer small, and don't scale.
+        closed_floor: roundings of a closed form, at least.
+        exponential: power of time past which growth is none.
+        power: of time, at most, where it is one.
+        series, projected, rounding: the same, at least, for errors of series, and of rounding with projected
+            invariants and without.
+        clearly: times the law of rounding is less than the accuracy: then nobody needs to measure it.
+    """
+
+    steps: int = PILOT_STEPS
+    times: int = 200
+    closed_times: int = 17
+    saturated: float = 0.05
+    closed_floor: float = 8.0
+    exponential: float = 5.0
+    power: float = 2.0
+    series: float = 1.2
+    projected: float = 1.0
+    rounding: float = 1.5
+    clearly: float = 20.0
+
+    def at_end(self, early: float, late: float, part: float, setting: Setting) -> float:
+        """Error at a run's end, rad.
+
+        Args:
+            early, late: largest errors over the first quarter of a trial, and over all of it.
+            part: of the run that was tried.
+        """
+        early = max(early, late * 1e-300)
+        power = math.log(late / early) / math.log(4)
+        if power > self.exponential:
+            left = (1 / part - 1) / 0.75 * math.log(late / early)
+            return late * math.exp(min(left, _LARGEST_EXPONENT))
+        rounding = self.projected if setting.hold_invariants else self.rounding
+        law = self.series if setting.tolerance is not None else rounding
+        return late * (1 / part) ** max(law, min(power, self.power))
+
+
+LAW = Extrapolation()
+
+
+class Forecasts:
+    """Errors of settings, measured where that is cheap, and forecast from what was measured elsewhere.
+
+    Attributes:
+        motion: what is known of it.
+        samples: of the run.
+        part: of the run that is tried.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        accuracy: float,
+        loads: Sequence[Load] = (),
+        told: Told | None = None,
+        *,
+        law: Extrapolation = LAW,
+        policy: Policy = STANDARD,
+    ) -> None:
+        """Look at a motion's beginning.
+
+        Args:
+            accuracy: asked for, rad: what is obviously within it isn't tried.
+            loads, told: as in ``try_setting``.
+        """
+        self._experiment, self._accuracy, self._law, self._policy = experiment, accuracy, law, policy
+        self._trials = Trials(experiment, loads, told)
+        self.motion = motion_of(experiment, loads=loads, pilot_steps=law.steps)
+        self.samples = build_scene(experiment).samples.count
+        self.part = min(1.0, law.steps / self.motion.steps)
+        self._times = spread_times(experiment, law.times, self.part)
+        self._measured: dict[Setting, float] = {}
+        self._references: dict[Setting, Trial | None] = {}
+
+    def error(self, setting: Setting) -> float:
+        """Forecast at the run's end, rad; measures what it needs."""
+        if setting.method == "closed_form":
+            return self._closed_error(setting)
+        rounding = self._rounding(setting)
+        if setting.tolerance is None:
+            return rounding
+        return max(rounding, self._series(setting))
+
+    def measure(self, setting: Setting) -> bool:
+        """Try a setting itself, if that is worth it; False where nothing new can be learnt."""
+        if setting.method == "closed_form" or setting.tolerance is None or setting in self._measured:
+            return False
+        if setting.bits > 53:
+            return False
+        self._measured[setting] = self._try(setting)
+        return True
+
+    def why(self, setting: Setting) -> str:
+        """Where the forecast is from, for the summary."""
+        if setting.method == "closed_form":
+            return "its solution in closed form costs less than its steps"
+        if setting.tolerance is None and self._obvious(setting):
+            return "by the law of rounding errors"
+        extent = "whole run" if self.part >= 1 else f"first {self.part * self.motion.seconds:.3g} s"
+        if setting.bits <= 53:
+            return f"tried over the {extent} against a better solution"
+        return f"from trials in double precision over the {extent}, whose errors shrink with epsilon"
+
+    def _closed_error(self, setting: Setting) -> float:
+        """Of a closed form; it costs the same at any horizon, so that it is compared over all of it."""
+        if setting not in self._measured:
+            floor = self._law.closed_floor * epsilon(setting.precision)
+            self._measured[setting] = math.inf
+            if floor <= self._accuracy:
+                times = spread_times(self._experiment, self._law.closed_times)
+                better = closed_form_beyond(setting.precision).setting
+                one, other = (self._trials.whole(s, times) for s in (setting, better))
+                if one is not None and other is not None:
+                    found = float(angles_between(one.attitudes, other.attitudes).max())
+                    self._measured[setting] = max(found, floor)
+        return self._measured[setting]
+
+    def _obvious(self, setting: Setting) -> bool:
+        """Whether rounding is clearly no matter."""
+        return self.motion.rounding(setting.precision) * self._law.clearly <= self._accuracy
+
+    def _rounding(self, setting: Setting) -> float:
+        if self._obvious(setting):
+            return self.motion.rounding(setting.precision)
+        base = Setting(formulation=setting.formulation, hold_invariants=setting.hold_invariants)
+        if base not in self._measured:
+            self._measured[base] = self._try(base)
+        return self._measured[base] * epsilon(setting.precision) / epsilon(base.precision)
+
+    def _series(self, setting: Setting) -> float:
+        """Error of a tolerance: measured, or in proportion to the nearest one measured."""
+        if setting in self._measured:
+            return self._measured[setting]
+        alike = replace(setting, precision="double", tolerance=_BASE_TOLERANCE)
+        if alike not in self._measured:
+            self._measured[alike] = self._try(alike)
+        same = [
+            (s, s.tolerance)
+            for s in self._measured
+            if s.tolerance is not None
+            and (s.formulation, s.hold_invariants) == (setting.formulation, setting.hold_invariants)
+        ]
+        wanted = math.log(setting.step_tolerance)
+        nearest, tolerance = min(same, key=lambda s: abs(math.log(s[1]) - wanted))
+        return self._measured[nearest] * setting.step_tolerance / tolerance
+
+    def _try(self, setting: Setting) -> float:
+        """Error at the run's end, from that over the part tried."""
+        reference, trial = self._reference(setting), self._trials.whole(setting, self._times)
+        if trial is None or reference is None:
+            return math.inf
+        errors = angles_between(trial.attitudes, reference.attitudes)
+        late = float(errors.max())
+        if late > self._law.saturated:  # no longer small: only the law knows how large it would be
+            return max(late, self.motion.error(setting.level))
+        late = max(late, epsilon(setting.precision))
+        if self.part >= 1.0:
+            return late
+        return self._law.at_end(float(errors[: len(errors) // 4].max()), late, self.part, setting)
+
+    def _reference(self, setting: Setting) -> Trial | None:
+        """What a setting's trial is held against: double precision where rounding is no matter."""
+        precision = "double" if self._obvious(setting) else "extended"
+        steps = self.motion.steps * self.part
+        best = stepped_reference(precision, self.motion, steps, self._policy, setting.formulation)
+        if best not in self._references:
+            self._references[best] = self._trials.whole(best, self._times)
+        return self._references[best]

@@ -1,0 +1,131 @@
+"""What the beginning of a motion tells of the whole: its steps, their cost, and how its errors grow."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any
+from rigidsim.accuracy.setting import Setting, epsilon
+from rigidsim.accuracy.trial import compactly, trial_scene
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment
+from rigidsim.solve.error_growth import Growth, measure_growth
+from rigidsim.solve.problem import double_twin, prepare_scene
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.stepper import Stepper
+
+PILOT_STEPS = 20_000
+"""Of double precision at its epsilon: some tens of milliseconds."""
+_FEWEST_STEPS = 16  # for the law of rounding, which is one of many steps
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """A motion's first steps.
+
+    Attributes:
+        taken: how many.
+        step: their mean length, internal units.
+        whole: natural steps of the whole motion, if they go on so.
+        seconds_per_step: CPU.
+    """
+
+    taken: int
+    step: float
+    whole: float
+    seconds_per_step: float
+
+
+def run_pilot(
+    stepper: Stepper,
+    clock: SampleClock,
+    skip: Callable[[int], bool] | None = None,
+    *,
+    steps: int = PILOT_STEPS,
+    seconds: float = math.inf,
+    chunk: int = 64,
+    largest_chunk: int = 64,
+    warming: int = 0,
+) -> Pilot:
+    """Take the first steps of a motion.
+
+    Args:
+        stepper: at the motion's start, which is the clock's.
+        skip: takes so many steps with what is done between them; the stepper's own by default.
+        steps: at most, or a chunk more; and none after the last sample.
+        seconds: of CPU, at most, or a chunk more.
+        chunk: steps taken at once, at first; doubled each time up to ``largest_chunk``.
+        warming: steps before those whose cost is measured.
+    """
+    skip = skip or stepper.skip
+    begin, end = float(clock.start), float(clock.at(clock.count - 1))
+    going = not warming or skip(warming)
+    warm, spent = stepper.steps, 0.0
+    while going:
+        started = time.process_time()
+        going = skip(chunk) and stepper.largest > 0
+        spent += time.process_time() - started
+        going = going and spent < seconds and stepper.steps < steps and float(stepper.time) < end
+        chunk = min(2 * chunk, largest_chunk)
+    done = max(float(stepper.time) - begin, 1e-300)
+    taken = max(stepper.steps, 1)
+    return Pilot(
+        taken=taken,
+        step=done / taken,
+        whole=max(1.0, stepper.steps * (end - begin) / done),
+        seconds_per_step=spent / max(stepper.steps - warm, 1),
+    )
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is known of a motion before its long run.
+
+    Attributes:
+        steps: of double precision at its epsilon, over the whole run.
+        rate: bound of the angular velocity, rad/s.
+        seconds: the run's length.
+        growth: of errors by the motion itself.
+        holds: whether it has invariants to project, be it the quaternion's norm alone.
+        closed: whether it has a closed form.
+    """
+
+    steps: float
+    rate: float
+    seconds: float
+    growth: Growth
+    holds: bool
+    closed: bool
+
+    def error(self, level: float) -> float:
+        """Attitude error at the end, rad, from random errors of this size at each step, which the motion
+        amplifies.
+        """
+        steps = max(int(self.steps), _FEWEST_STEPS)
+        return attitude_error(1.0, steps, self.rate, self.seconds, self.growth) * level
+
+    def rounding(self, precision: str | int) -> float:
+        """Attitude error of rounding at the end, rad."""
+        return self.error(epsilon(precision))
+
+
+def motion_of(
+    experiment: Experiment, *, loads: Sequence[Load] = (), pilot_steps: int = PILOT_STEPS
+) -> Motion:
+    """Look at the beginning of a motion (some tens of milliseconds)."""
+    scene = trial_scene(experiment, Setting())
+    prepared = compactly(prepare_scene(experiment, scene, loads=loads))
+    clock, precision = prepared.clock, prepared.precision
+    begin, end = float(clock.start), float(clock.at(clock.count - 1))
+    pilot = run_pilot(Stepper(prepared.system, precision, None, clock.start), clock, steps=pilot_steps)
+    return Motion(
+        steps=pilot.whole,
+        rate=float(prepared.system.rate_bound),
+        seconds=float(scene.samples.last - scene.start),
+        growth=measure_growth(double_twin(prepared), precision, begin, end),
+        holds=any(i.name != "energy_balance" for i in prepared.system.invariants),
+        closed=closed_form_if_any(scene, driven=bool(loads))[0] is not None,
+    )

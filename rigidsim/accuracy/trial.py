@@ -1,0 +1,210 @@
+"""A motion integrated in memory, nothing written: for comparing settings with one another."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import mpmath
+import numpy as np
+
+from rigidsim.accuracy.setting import Setting
+from rigidsim.errors import ConfigError
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.scene import SampleTimes, Scene, build_scene
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.problem import InitialValueProblem, prepare_scene
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import Check, Progress, SampleReceiver
+from rigidsim.solve.status import Status
+
+_TOLD_EVERY = 0.05  # seconds
+
+Told = Callable[[str, float], None]
+"""Is told a setting's title and how far its trial has come (0 to 1), some tens of times per second."""
+
+
+@dataclass
+class Trial:
+    """What a trial gave.
+
+    Attributes:
+        setting: that it was made with.
+        attitudes: float64 parts of the quaternions, each (samples, 4).
+        drifts: largest relative drift of each invariant at the samples.
+        cpu_seconds: of the integration alone; compile_seconds: before it.
+        work: steps times Taylor order squared times states: a count that doesn't jitter.
+        rows: samples reached.
+        histories: relative drift (samples,) of each invariant.
+    """
+
+    setting: Setting
+    status: Status
+    attitudes: list[np.ndarray]
+    drifts: dict[str, float]
+    steps: int
+    order: int
+    cpu_seconds: float
+    compile_seconds: float
+    work: float
+    rows: int = field(default=0)
+    histories: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+class _Collected(SampleReceiver):
+    """Keeps everything in memory."""
+
+    def __init__(self, prepared: InitialValueProblem, evaluator: Evaluator) -> None:
+        self._prepared, self._evaluator = prepared, evaluator
+        self.pieces: list[list[np.ndarray]] = []
+        self.drifts: dict[str, float] = {}
+        self.histories: dict[str, list[np.ndarray]] = {}
+
+    def take(self, block: SampleBlock) -> None:
+        recorded = self._evaluator.evaluate(block)
+        self.pieces.append(recorded["quaternion"])
+        for invariant in self._prepared.system.invariants:
+            drift = recorded[f"{invariant.name}_drift"][0]
+            self.histories.setdefault(invariant.name, []).append(np.asarray(drift, dtype=np.float64).ravel())
+            largest = float(np.max(np.abs(drift)))
+            self.drifts[invariant.name] = max(largest, self.drifts.get(invariant.name, 0.0))
+
+
+def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath.mpf] | None = None) -> Scene:
+    """The scene of an experiment under another setting, recording its attitude alone.
+
+    Args:
+        times: where to sample, mpf seconds in ascending order; None keeps the experiment's.
+
+    Raises:
+        ConfigError: the scene can't be integrated so.
+    """
+    config = experiment.config
+    integrator = config.integrator.model_copy(
+        update={
+            "precision": setting.precision,
+            "tolerance": "auto",
+            "formulation": setting.formulation,
+            "hold_invariants": setting.hold_invariants,
+            "method": setting.method,
+            "accuracy": None,
+        }
+    )
+    output = config.output.model_copy(update={"record": ["quaternion"], "lyapunov": False, "timeline": False})
+    changed = config.model_copy(update={"integrator": integrator, "output": output, "events": []})
+    scene = build_scene(replace(experiment, config=changed))
+    if times is None:
+        return scene
+    exact = [scene.context.mpf(t) for t in times]
+    start = scene.samples.start
+    return replace(scene, samples=SampleTimes(start, exact[-1] - start, 0, exact, len(exact)))
+
+
+def try_setting(
+    experiment: Experiment,
+    setting: Setting,
+    times: Sequence[mpmath.mpf] | None = None,
+    *,
+    loads: Sequence[Load] = (),
+    go_on: Check | None = None,
+    told: Told | None = None,
+    compact: bool = False,
+) -> Trial:
+    """Integrate an experiment's motion under a setting.
+
+    Args:
+        experiment: gives the scene; its own ``[integrator]`` is replaced by the setting.
+        times: where to sample, mpf seconds; None keeps the experiment's.
+        loads: given from Python.
+        go_on: asked between chunks; a status ends the trial.
+        told: the setting's title, and how far the trial has come (0 to 1), some tens of times per second.
+        compact: compiled in a tenth of the time to code that takes up to twice as long a step in double
+            precision, and as long in the others; rounding differs.
+
+    Raises:
+        ConfigError: the scene can't be integrated so (no closed form, nothing to hold, ...).
+    """
+    started = time.process_time()
+    scene = trial_scene(experiment, setting, times)
+    samples, early = scene.samples, 0
+    if samples.times is not None and samples.times[0] > samples.start:
+        # a motion begins at its first sample, which must be its start
+        early, whole = 1, [samples.start, *samples.times]
+        scene = replace(scene, samples=replace(samples, times=whole, count=len(whole)))
+    prepared = prepare_scene(experiment, scene, loads=loads, tolerance=setting.tolerance)
+    if compact:
+        prepared = compactly(prepared)
+    parts = assemble(prepared)
+    receiver = _Collected(prepared, parts.evaluator)
+    check = go_on or (lambda _: None)
+    if told is not None:
+        told(setting.title, 0.0)
+        check = _telling(check, told, setting.title, float(scene.start), float(samples.last))
+    loop = sampler(prepared, parts, receiver, check)
+    built = time.process_time()
+    progress = loop.run()
+    ended = time.process_time()
+    order = int(parts.stepper.integrator.order)
+    attitudes = [np.concatenate(part)[early:] for part in zip(*receiver.pieces, strict=True)]
+    return Trial(
+        setting=setting,
+        status=progress.status,
+        attitudes=attitudes,
+        drifts=receiver.drifts,
+        steps=progress.steps,
+        order=order,
+        cpu_seconds=ended - built,
+        compile_seconds=built - started,
+        work=float(progress.steps) * order**2 * len(prepared.system.states),
+        rows=max(progress.next_sample - early, 0),
+        histories={name: np.concatenate(pieces) for name, pieces in receiver.histories.items()},
+    )
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Trials of one motion, in compact code.
+
+    Attributes:
+        loads: given from Python.
+        told: of each, as in ``try_setting``.
+    """
+
+    experiment: Experiment
+    loads: Sequence[Load] = ()
+    told: Told | None = None
+
+    def whole(self, setting: Setting, times: Sequence[mpmath.mpf]) -> Trial | None:
+        """A trial that reached the last of the times (mpf seconds); None where the scene can't be integrated
+        so (a chart, a load, no closed form), or not so far.
+        """
+        try:
+            trial = try_setting(
+                self.experiment, setting, times, loads=self.loads, compact=True, told=self.told
+            )
+        except ConfigError:
+            return None
+        return trial if trial.status is Status.FINISHED and trial.rows == len(times) else None
+
+
+def _telling(check: Check, told: Told, title: str, start: float, last: float) -> Check:
+    """A check between chunks that also tells how far a trial has come."""
+    latest = time.monotonic()
+
+    def both(progress: Progress) -> Status | None:
+        nonlocal latest
+        now = time.monotonic()
+        if now - latest > _TOLD_EVERY and last > start:
+            latest = now
+            told(title, min(1.0, (progress.time - start) / (last - start)))
+        return check(progress)
+
+    return both
+
+
+def compactly(prepared: InitialValueProblem) -> InitialValueProblem:
+    """The same, to be compiled in compact mode."""
+    return replace(prepared, precision=replace(prepared.precision, compact=True))

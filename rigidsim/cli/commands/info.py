@@ -1,0 +1,29 @@
+"""``rigidsim info``: the summary of a run."""
+
+from __future__ import annotations
+
+import json
+
+from rigidsim.cli.options import JsonOption, RunPath
+
+
+def info(run_path: RunPath, as_json: JsonOption = False) -> None:
+    """Summary of a run, finished or partial.
+
+    Example: rigidsim info runs/intermediate_axis
+    """
+    from rigidsim.cli import tables
+    from rigidsim.store.run import open_run
+
+    opened = open_run(run_path)
+    if as_json:
+        print(json.dumps(opened.summary))
+        return
+    tables.print_summary(opened.outcome, str(opened.folder.path))
+    if not opened.saved:
+        tables.console().print("dataset  nothing was saved yet")
+        return
+    with opened.dataset as dataset:
+        tables.console().print(
+            f"dataset  {dataset.sizes['time']:,} samples of {', '.join(map(str, dataset.data_vars))}"
+        )

@@ -1,0 +1,23 @@
+"""``rigidsim plan``: what would be integrated, and what it would cost."""
+
+from __future__ import annotations
+
+import json
+
+from rigidsim.cli.options import ConfigPath, JsonOption, SetOption
+
+
+def plan(config: ConfigPath, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+    """Explain what would be integrated and why; predict steps, time, memory and file sizes.
+
+    Example: rigidsim plan configs/heavy_top_nutating.toml
+    """
+    from rigidsim.cli import tables
+    from rigidsim.workflows.plan import plan as make_plan
+    from rigidsim.workflows.read import load
+
+    made = make_plan(load(config, overrides=overrides or []))
+    if as_json:
+        print(json.dumps(made))
+    else:
+        tables.print_plan(made)

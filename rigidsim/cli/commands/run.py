@@ -1,0 +1,52 @@
+"""``rigidsim run``: integrate configs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigidsim.cli.options import JsonOption, SetOption, print_run
+from rigidsim.errors import RigidsimError
+
+
+def run(
+    configs: Annotated[
+        list[Path] | None, typer.Argument(metavar="CONFIG...", help="TOML files.", show_default=False)
+    ] = None,
+    dataset: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds."),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")] = Path(
+        "runs"
+    ),
+    overrides: SetOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Integrate, write the run folder, print a summary of invariants and cost.
+
+    Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
+    """
+    from rigidsim.cli import progress
+    from rigidsim.workflows.read import load
+    from rigidsim.workflows.run import run as run_experiment
+
+    experiments = [load(path, overrides=overrides or []) for path in configs or []]
+    if dataset is not None:
+        from rigidsim.workflows.verify import embedded
+
+        experiments.append(embedded(dataset, overrides=overrides or []))
+    if not experiments:
+        raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
+    worst = 0
+    for experiment in experiments:
+        with progress.observer() as observer:
+            result = run_experiment(experiment, out=out, force=force, observer=observer)
+        code = print_run(result, as_json)
+        worst = worst or code
+        if code == 130:
+            break
+    raise typer.Exit(worst)

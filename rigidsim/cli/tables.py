@@ -1,0 +1,283 @@
+"""What the commands print on stdout: tables for people, never needed by the library."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
+
+
+def console() -> Console:
+    """stdout; wide enough for whole words when piped."""
+    width = None if sys.stdout.isatty() else max(110, shutil.get_terminal_size().columns)
+    return Console(width=width, highlight=False)
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for name in columns:
+        right = name in ("largest drift", "final", "bound", "initial", "put back")
+        table.add_column(name, justify="right" if right else "left", overflow="fold")
+    return table
+
+
+def duration(seconds: float) -> str:
+    """A time span in the unit that suits it."""
+    for unit, size in (("yr", 31557600.0), ("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.3g} {unit}"
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
+def size(count: float) -> str:
+    """Bytes in a readable unit."""
+    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= factor:
+            return f"{count / factor:.3g} {unit}"
+    return f"{count:.0f} B"
+
+
+def _line(out: Console, label: str, text: str, style: str = "") -> None:
+    """A label and a text that is broken between words, indented; never read as markup."""
+    line = Table.grid(padding=(0, 1))
+    line.add_column(width=8)
+    line.add_column(overflow="fold")
+    line.add_row(Text(label, style=style), Text(text, style=style))
+    out.print(line)
+
+
+def _initial(value: float | tuple[float, ...] | None) -> str:
+    """A number, or the norm of a vector: enough to recognise it; all digits are in summary.json."""
+    if value is None:
+        return "-"
+    return f"|{math.hypot(*value):.6g}|" if isinstance(value, tuple) else f"{value:.6g}"
+
+
+def _scales(invariants: dict[str, Invariant]) -> str:
+    """What the drifts are relative to; invariants of the same scale together."""
+    names: dict[str, list[str]] = {}
+    for name, row in invariants.items():
+        names.setdefault(row.scale_name, []).append(name)
+    return "; ".join(f"{scale} ({', '.join(of)})" for scale, of in names.items())
+
+
+def _drift(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2e}"
+
+
+def print_summary(summary: Brief, folder: str, out: Console | None = None) -> None:
+    """The table at the end of ``run`` and of ``info``."""
+    out = out or console()
+    color = "green" if summary.status == "finished" else "yellow"
+    out.print(Text.assemble((summary.name, "bold"), "  ", (summary.status, f"bold {color}")))
+    if summary.description:
+        out.print(Text(summary.description, style="dim"))
+    if summary.status != "finished":
+        out.print(Text(summary.message))
+    if isinstance(summary, Summary):
+        _print_ended(summary, out)
+    _line(out, "folder", folder)
+
+
+def _print_ended(summary: Summary, out: Console) -> None:
+    how = f"tolerance {summary.tolerance:.3g}"
+    if summary.method == "closed_form":
+        how = "in closed form"
+    if summary.hold_invariants:
+        how += ", invariants projected"
+    _line(
+        out,
+        "model",
+        f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
+        f"{summary.precision} precision, {how}",
+    )
+    cost = summary.cost
+    seconds = sum(v for k, v in cost.seconds.items() if k != ENGINE)
+    _line(
+        out,
+        "cost",
+        f"{cost.steps:,} steps, {summary.samples:,} of {summary.samples_planned:,} samples, "
+        f"{duration(seconds)} wall ({duration(cost.seconds[ENGINE])} integrating), "
+        f"{duration(cost.cpu_seconds)} CPU",
+    )
+    if cost.cpu_by_phase:
+        spent = [f"{name.replace('_', ' ')} {duration(s)}" for name, s in cost.cpu_by_phase.items()]
+        _line(out, "CPU", ", ".join(spent))
+    out.print(_invariants(summary))
+    _line(out, "drifts", "relative to: " + _scales(summary.invariants))
+    if summary.hold_invariants:
+        _line(out, "held", "put back: what the drift would have been; held drifts are no independent check")
+    _print_accuracy(summary.accuracy, out)
+    if summary.events:
+        _line(out, "events", ", ".join(f"{name} {count:,}" for name, count in summary.events.items()))
+    chaos = summary.lyapunov
+    if chaos is not None:
+        what = "chaotic" if chaos.chaotic else "regular"
+        moved = f"moved by {chaos.moved_over_second_half:.1g} over the second half"
+        _line(out, "motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
+    for warning in summary.warnings:
+        _line(out, "warning", warning, "bold red")
+
+
+def _invariants(summary: Summary) -> Table:
+    held = ["put back"] if summary.hold_invariants else []
+    table = _table("invariant", "initial", "largest drift", "final", "bound", *held)
+    for name, row in summary.invariants.items():
+        sound = row.largest_drift is None or row.largest_drift <= row.bound
+        table.add_row(
+            name,
+            Text(_initial(row.initial)),
+            Text(_drift(row.largest_drift), style="" if sound else "red"),
+            _drift(row.final_drift),
+            _drift(row.bound),
+            *([_drift(row.put_back)] if held else []),
+        )
+    return table
+
+
+def _print_accuracy(accuracy: Accuracy, out: Console) -> None:
+    if accuracy.chosen:
+        _line(out, "chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
+    estimate = accuracy.estimated_attitude_error
+    if accuracy.certified is not None:
+        asked = accuracy.requested or math.nan
+        text = f"certified to {accuracy.certified:.1e} rad, {asked:.1e} asked for ({accuracy.how}, "
+        _line(out, "attitude", f"{text}{accuracy.times_compared} times)")
+    elif estimate is not None:
+        factor = accuracy.amplification or 1.0
+        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
+        size = f"uncertain by about {estimate:.1e} rad" if estimate < math.pi else "unknown"
+        _line(out, "attitude", f"{size} at the end (round-off law{unstable})")
+
+
+def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
+    """What ``rigidsim plan`` says."""
+    out = out or console()
+    out.print(Text.assemble((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}"))
+    for effect in plan["loads"]:
+        out.print(Text("  " + effect))
+    table = _table("states", "carried because")
+    for row in plan["reasons"]:
+        table.add_row(row["states"], row["why"])
+    for row in plan["left_out"]:
+        table.add_row(Text(f"no {row['what']}", style="dim"), Text(row["why"], style="dim"))
+    out.print(table)
+    out.print(Text("equations (internal units: powers of two)", style="bold"))
+    for line in plan["equations"]:
+        out.print(Text("  " + line), soft_wrap=True)
+    table = _table("invariant", "holds because")
+    for row in plan["invariants"]:
+        table.add_row(row["name"], row["why"])
+    out.print(table)
+    out.print(f"recorded   {', '.join(plan['recorded'])}", soft_wrap=True)
+    predicted, pilot = plan["predicted"], plan["pilot"]
+    held = ", invariants held" if plan["hold_invariants"] else ""
+    out.print(
+        f"precision  {plan['precision']}, tolerance {plan['tolerance']:.3g}, Taylor order "
+        f"{plan['taylor_order']}{held}"
+    )
+    if plan["method"] == "closed_form":
+        out.print(f"method     {plan['closed_form']}: no steps are taken")
+    elif plan["closed_form"] is not None:
+        out.print(f'closed     {plan["closed_form"]}: method = "closed_form" would take no steps')
+    if plan["accuracy"] is not None:
+        out.print(f"chosen     {plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
+    out.print(
+        f"predicted  {predicted['steps']:.3g} steps of about {duration(pilot['step'])} "
+        f"(pilot of {pilot['steps']:.0f}), {duration(predicted['total_seconds'])}, "
+        f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
+        f"timeline {size(predicted['timeline_bytes'])}"
+    )
+    error = predicted["attitude_error_rad"]
+    if error is not None and math.isfinite(error):
+        factor = predicted["amplification"]
+        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
+        out.print(
+            f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
+        )
+
+
+def print_verdict(verdict: dict[str, Any]) -> None:
+    """A verification in words, from ``Verdict.as_dict``."""
+    out = console()
+    if verdict["identical"]:
+        out.print(f"identical: {verdict['samples']:,} samples, every variable, every bit")
+    else:
+        out.print(f"different: {verdict['path']}")
+    for problem in verdict["problems"]:
+        out.print(f"  {problem}", markup=False)
+    first = verdict["first_difference"]
+    if first is not None:
+        out.print(
+            f"  first difference: {first['variable']} at sample {first['sample']}: saved "
+            f"{first['saved']!r}, again {first['again']!r}, {first['size']:.3g} apart"
+        )
+    names = verdict["differing_variables"]
+    if names:
+        out.print(f"  variables that differ: {', '.join(names)}")
+    if verdict["environment"]:
+        out.print("  changed since, which can explain other bits:")
+        for line in verdict["environment"]:
+            out.print(f"    {line}", markup=False)
+    elif names:
+        out.print("  versions, CPU features and settings are the same, so they don't explain it")
+
+
+def print_tradeoff(result: dict[str, Any]) -> None:
+    """What ``rigidsim tradeoff`` says, from ``Tradeoff.as_dict``."""
+    out = console()
+    out.print(Text.assemble((result["name"], "bold"), "  for this accuracy, use this"))
+    table = _table("attitude error, rad", "cost", "error reached", "keys of \\[integrator]")
+    over = result["measured_seconds"]
+    marked = False
+    for row in result["advice"]:
+        reach = f"<= {row['at_most']:.0e}"
+        if row["more_than"] * 10 < row["at_most"] * 0.5:
+            reach += f" to {row['more_than'] * 10:.0e}"
+        marked = marked or row["less"]
+        star = " *" if row["less"] else ""
+        table.add_row(
+            Text(reach), f"{row['cost']:.3g}", f"{row['error']:.1e}{star}", Text(", ".join(row["keys"]))
+        )
+    out.print(table)
+    if marked:
+        less = next(row["seconds"] for row in result["advice"] if row["less"])
+        out.print(Text(f"  * over the first {duration(less)} only: quadruple precision is slow"))
+    part = over / result["horizon_seconds"]
+    how_much = "all" if part >= 1 else f"the first {100 * part:.2g} %"
+    _line(out, "measured", f"{how_much} of {duration(result['horizon_seconds'])}; nothing is extrapolated")
+    _line(out, "compared", f"{result['compared']}; largest error at up to 38 times")
+    _line(out, "against", result["reference"])
+    _line(
+        out,
+        "cost",
+        f"CPU time of integration over that of double precision in quaternions, {result['processes']} fresh "
+        f"processes, medians; recording not counted",
+    )
+    if result["closed_form"] != "yes":
+        _line(out, "exact", f"no: {result['closed_form'].removeprefix('none: ')}")
+    _not_measured(out, result["settings"])
+    if result["folder"]:
+        _line(out, "folder", result["folder"])
+
+
+def _not_measured(out: Console, settings: list[dict[str, Any]]) -> None:
+    """Settings without numbers, those with the same reason together."""
+    reasons: dict[str, list[str]] = {}
+    for row in settings:
+        if row["reason"]:
+            reasons.setdefault(row["reason"], []).append(row["setting"])
+    for reason, names in reasons.items():
+        many = f"{len(names)} settings, from {names[0]} on" if len(names) > 4 else "; ".join(names)
+        _line(out, "no data", f"{many}: {reason}", "yellow")

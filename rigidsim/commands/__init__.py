@@ -1,1 +1,0 @@
-"""The commands of ``rigidsim``, one function each; ``rigidsim.cli`` puts them together."""

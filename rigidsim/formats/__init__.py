@@ -1,0 +1,4 @@
+"""Datasets in the formats of other tools: one module each, which holds its ``FORMAT``."""
+
+FORMATS = ("csv", "parquet", "zarr", "aem", "oem")
+"""All there are, by the names of their modules, which are loaded when they are asked for."""

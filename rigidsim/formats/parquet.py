@@ -1,0 +1,40 @@
+"""Apache Parquet: float64 columns with their residuals, units in each column's metadata."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rigidsim.formats.registry import Format, Source
+from rigidsim.formats.tables import BLOCK_ROWS, Table
+
+
+def write_parquet(table: Table, path: Path, source: Source) -> None:
+    """Write one table; ``pyarrow`` must be there.
+
+    Args:
+        table: rows and columns; residuals become columns such as ``time_lo``.
+        path: the file; replaced.
+        source: the run, for the file's metadata.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    fields = []
+    for column in table.columns:
+        for part in range(len(column.parts)):
+            told = {"units": column.units, "long_name": str(column.attributes.get("long_name", ""))}
+            if part:
+                told["residual_of"] = column.name
+            elif "exact_value" in column.attributes:
+                told["exact_value"] = " + ".join(
+                    column.part_name(n) for n in reversed(range(len(column.parts)))
+                )
+            fields.append(pa.field(column.part_name(part), pa.float64(), nullable=False, metadata=told))
+    schema = pa.schema(fields, metadata={str(key): str(value) for key, value in source.attributes.items()})
+    with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=False) as writer:
+        for block in table.blocks(rows=8 * BLOCK_ROWS):
+            arrays = [pa.array(part) for parts in block for part in parts]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+
+
+FORMAT = Format(write_parquet, package="pyarrow", side_tables=True)

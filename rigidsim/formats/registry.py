@@ -1,0 +1,63 @@
+"""What a format is, and how the one that is asked for is found."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from rigidsim.errors import RigidsimError
+from rigidsim.formats import FORMATS
+from rigidsim.formats.ccsds import Naming
+from rigidsim.formats.tables import Table
+
+
+@dataclass(frozen=True)
+class Source:
+    """The run that a table is of.
+
+    Attributes:
+        title: its name.
+        bits: of its precision.
+        attributes: of its dataset.
+        naming: what the dataset doesn't know of itself.
+    """
+
+    title: str
+    bits: int
+    attributes: dict[str, Any]
+    naming: Naming
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of another tool.
+
+    Attributes:
+        write: writes a table to a path that doesn't exist yet.
+        package: that it needs beside what rigidsim always has.
+        side_tables: whether tables along other dimensions than time get files of their own.
+        folder: what such a folder is called, and a file by which one is known; None: it is a file.
+    """
+
+    write: Callable[[Table, Path, Source], None]
+    package: str = ""
+    side_tables: bool = False
+    folder: tuple[str, str] | None = None
+
+
+def format_named(name: str) -> Format:
+    """The format ``rigidsim.formats.NAME.FORMAT``.
+
+    Raises:
+        RigidsimError: there is none of that name, or the package that it needs is missing.
+    """
+    if name not in FORMATS:
+        raise RigidsimError(f'--format: given "{name[:40]}"; allowed: {", ".join(FORMATS)}')
+    found: Format = import_module(f"rigidsim.formats.{name}").FORMAT
+    if found.package and importlib.util.find_spec(found.package) is None:
+        raise RigidsimError(f'{name} needs {found.package}, which is missing: pip install "rigidsim[export]"')
+    return found

@@ -1,0 +1,121 @@
+"""A dataset as flat tables, read block by block: what CSV, Parquet and the CCSDS messages are written from.
+
+One table has a row per sample; each event, and the Lyapunov estimates, have a table of their own. A vector
+becomes a column per component (``angular_velocity_x``), and a column knows the residuals that hold its digits
+beyond double.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+import xarray
+
+from rigidsim.store.netcdf import CHUNK_ROWS
+from rigidsim.store.variables import LABELS, parts_in
+
+BLOCK_ROWS = 2 * CHUNK_ROWS
+
+
+@dataclass(frozen=True)
+class Column:
+    """One component of a variable.
+
+    Attributes:
+        variable: it is a component of, ``angular_velocity``.
+        suffix: for the component, ``_x``.
+        index: of the component, beside the row.
+        parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
+        attributes: units, long_name, ... of the variable.
+    """
+
+    variable: str
+    suffix: str
+    index: tuple[int, ...]
+    parts: tuple[str, ...]
+    attributes: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """``angular_velocity_x``."""
+        return self.variable + self.suffix
+
+    @property
+    def units(self) -> str:
+        """As in the dataset."""
+        return str(self.attributes.get("units", "1"))
+
+    def part_name(self, part: int) -> str:
+        """Name of a residual's column: ``angular_velocity_lo_x``."""
+        return self.parts[part] + self.suffix
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns along one dimension.
+
+    Attributes:
+        dim: "time", or the name of an event, ...
+        columns: the coordinate first where there is one.
+        dataset: that the columns are read from, block by block.
+    """
+
+    dim: str
+    columns: tuple[Column, ...]
+    dataset: xarray.Dataset
+
+    @property
+    def rows(self) -> int:
+        """How many there are."""
+        return int(self.dataset.sizes[self.dim])
+
+    def column(self, name: str) -> Column | None:
+        """By name; None where there is none."""
+        return next((column for column in self.columns if column.name == name), None)
+
+    def blocks(
+        self, columns: Sequence[Column] | None = None, rows: int = BLOCK_ROWS
+    ) -> Iterator[list[list[np.ndarray]]]:
+        """Parts of each column, block by block: ``block[column][part]`` has shape (at most ``rows``,)."""
+        wanted = self.columns if columns is None else columns
+        names = dict.fromkeys(part for column in wanted for part in column.parts)
+        for first in range(0, self.rows, rows):
+            here = {self.dim: slice(first, first + rows)}
+            read = {name: self.dataset[name].isel(here).values for name in names}
+            yield [[_column(read[part], column.index) for part in column.parts] for column in wanted]
+
+
+def _column(values: np.ndarray, index: tuple[int, ...]) -> np.ndarray:
+    """One component along the first dimension."""
+    key: Any = (slice(None), *index)
+    return np.asarray(values[key])
+
+
+def tables_of(dataset: xarray.Dataset) -> list[Table]:
+    """The table along time, then those along other dimensions."""
+    variables = dataset.variables
+    names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind == "f"]
+    names.sort(key=lambda name: name != "time")
+    columns: dict[str, list[Column]] = {}
+    for name in names:
+        columns.setdefault(str(variables[name].dims[0]), []).extend(_columns(dataset, name))
+    return [Table(dim, tuple(found), dataset) for dim, found in columns.items() if found]
+
+
+def _columns(dataset: xarray.Dataset, name: str) -> list[Column]:
+    variable = dataset[name]
+    if "residual_of" in variable.attrs:
+        return []
+    parts = tuple(parts_in(dataset, name))
+    labels = []
+    for dim in map(str, variable.dims[1:]):
+        labels.append(LABELS.get(dim) or [str(n) for n in range(variable.sizes[dim])])
+    found = []
+    for index in product(*(range(len(names)) for names in labels)):
+        suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True))
+        found.append(Column(name, suffix, index, parts, dict(variable.attrs)))
+    return found

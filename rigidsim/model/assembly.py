@@ -1,0 +1,178 @@
+"""The states of a system, block by block: which there are, how they change, where they begin, and why."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import heyoka as hy
+
+from rigidsim.model.canonical import MOMENTA, CanonicalStates, canonical_states, hamilton_equations
+from rigidsim.model.equations import (
+    flight_equations,
+    rate_equations,
+    vertical_equations,
+    vertical_from_attitude,
+)
+from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
+from rigidsim.model.kinematics import in_common_unit
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.model_plan import ModelPlan
+from rigidsim.model.needs import work_is_needed
+from rigidsim.model.numbers import Rounder
+from rigidsim.model.observables import WORK
+from rigidsim.model.orbital_frame import orbital_states
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import StateBlock, joined
+from rigidsim.model.step_limiter import PACE, arguments, pace_derivative
+from rigidsim.scene import attitude as numeric
+from rigidsim.scene.arithmetic import apply, transpose
+from rigidsim.scene.orbits import KeplerOrbit
+
+RATES, VERTICAL = ["wx", "wy", "wz"], ["gx", "gy", "gz"]
+POSITION, VELOCITY = ["x", "y", "z"], ["vx", "vy", "vz"]
+
+
+def assemble_states(
+    plan: ModelPlan, number: Rounder, sequence: str | None = None
+) -> tuple[Mechanics, list[StateBlock]]:
+    """The mechanical quantities of a scene, and the blocks of its states in the order of the system.
+
+    Args:
+        number: from an mpf to the working precision's scalar, rounded once.
+        sequence: of the Euler angles that are states, where it is not the scene's.
+
+    Raises:
+        ConfigError: a load without a potential in the canonical formulation.
+    """
+    requirements, numbers = plan.requirements, plan.numbers
+    canonical = None
+    if requirements.canonical:
+        canonical = canonical_states(plan.scene, plan.scaling, numbers, number)
+    rate_states = canonical.rates if canonical else list(hy.make_vars(*RATES))
+    rates = in_common_unit(rate_states, numbers.rate_units, number)
+    attitude = canonical.attitude if canonical else _attitude(plan, rates, number, sequence)
+    vertical = None
+    if attitude is not None and numbers.arm is not None:
+        vertical = vertical_from_attitude(attitude.matrix, numbers, number)
+    elif requirements.vertical:
+        vertical = list(hy.make_vars(*VERTICAL))
+    flies = requirements.flight
+    m = Mechanics(
+        plan.scene,
+        plan.scaling,
+        numbers,
+        rate_states,
+        attitude,
+        vertical,
+        list(hy.make_vars(*POSITION)) if flies else None,
+        list(hy.make_vars(*VELOCITY)) if flies else None,
+        number,
+        plan.orbit_tags,
+        loads=list(plan.loads),
+    )
+    blocks = [_canonical_block(m, canonical, plan)] if canonical else _rotation_blocks(m, plan)
+    if flies:
+        blocks.append(_flight_block(m, plan))
+    blocks += _load_blocks(m)
+    if work_is_needed(m):
+        blocks.append(_work_block(m))
+    blocks += _pace_block(m, joined(blocks))
+    return m, blocks
+
+
+def _attitude(
+    plan: ModelPlan, rates: list[Symbolic], number: Rounder, sequence: str | None
+) -> AttitudeStates | None:
+    """Of the formulations that carry an attitude beside the rates."""
+    scene, formulation = plan.scene, plan.requirements.formulation
+    if formulation == "rates":
+        return None
+    if formulation == "euler_angles":
+        return euler_states(scene, rates, sequence)
+    if plan.frame_orbit is not None:
+        unit = scene.context.ldexp(scene.context.one, plan.scaling.time)
+        return orbital_states(scene, rates, plan.frame_orbit, plan.orbit_tags[plan.frame_orbit], unit, number)
+    return BUILDERS[formulation](scene, rates)
+
+
+def _canonical_block(m: Mechanics, states: CanonicalStates, plan: ModelPlan) -> StateBlock:
+    return StateBlock(
+        [*states.attitude.names, *MOMENTA],
+        hamilton_equations(m),
+        [*states.attitude.initial, *states.initial_momenta],
+        exponents=[0] * 3 + [m.scaling.momentum] * 3,
+        why=plan.requirements.why["attitude"],
+    )
+
+
+def _rotation_blocks(m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
+    """Body rates, and the attitude or the vertical."""
+    scene, scaling, why = m.scene, m.scaling, plan.requirements.why
+    initial = [
+        scene.context.ldexp(w, scaling.time - e)
+        for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
+    ]
+    exponents = [e - scaling.time for e in scaling.rates]
+    blocks = [StateBlock(RATES, rate_equations(m, m.torque), initial, exponents=exponents, why=why["rates"])]
+    if m.attitude is not None:
+        reason = why["attitude"]
+        if m.attitude.orbital is not None:
+            reason += "; relative to the frame that turns with the orbit, where the gradient takes a third "
+            reason += "fewer products"
+        blocks.append(StateBlock(m.attitude.names, m.attitude.derivatives, m.attitude.initial, why=reason))
+    elif plan.requirements.vertical:
+        assert m.numbers.up is not None
+        seen = apply(transpose(numeric.rotation_matrix(scene.quaternion)), m.numbers.up)
+        turning = vertical_equations(m.carried(m.vertical), m.rates)
+        blocks.append(StateBlock(VERTICAL, turning, seen, why=why["vertical"]))
+    return blocks
+
+
+def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
+    context, scaling = m.scene.context, m.scaling
+    x_rates, v_rates = flight_equations(m, m.force)
+    initial = [context.ldexp(x, -scaling.length) for x in m.carried(m.scene.position)]
+    initial += [context.ldexp(v, -scaling.speed) for v in m.carried(m.scene.velocity)]
+    return StateBlock(
+        [*POSITION, *VELOCITY],
+        [*x_rates, *v_rates],
+        initial,
+        exponents=[scaling.length] * 3 + [scaling.speed] * 3,
+        why=plan.requirements.why["flight"],
+    )
+
+
+def _load_blocks(m: Mechanics) -> list[StateBlock]:
+    """Orbits, each once for all the loads on it, and what other states loads bring."""
+    blocks: list[StateBlock] = []
+    placed: dict[KeplerOrbit, list[str]] = {}
+    for load in m.loads:
+        if load.orbit is not None:
+            placed.setdefault(load.orbit, []).append(load.title)
+    for load in m.loads:
+        if load.orbit is not None and load.orbit in placed:
+            titles = ", ".join(dict.fromkeys(placed.pop(load.orbit)))
+            blocks.append(replace(m.orbit_block(load.orbit), why=f"{titles}: where its source is"))
+        own = load.extra_states(m)
+        if own is not None:
+            blocks.append(replace(own, why=own.why or f"{load.title}: where its source is"))
+    return blocks
+
+
+def _work_block(m: Mechanics) -> StateBlock:
+    why = "work of the loads without a potential, to check the energy"
+    return StateBlock(
+        [WORK], [m.carried(m.power)], [m.scene.context.zero], exponents=[m.scaling.energy], why=why
+    )
+
+
+def _pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
+    """The state by which no step passes over a pulse or a switch, where there is any."""
+    watched = arguments(m)
+    if not watched:
+        return []
+    carried = dict(zip(before.names, before.derivatives, strict=True))
+    titles = ", ".join(dict.fromkeys(title for title, _ in watched))
+    derivative = pace_derivative([u for _, u in watched], carried)
+    why = f"{titles}: no step may pass over what is narrow in it"
+    return [StateBlock([PACE], [derivative], [m.scene.context.zero], why=why)]

@@ -1,0 +1,94 @@
+"""A user's expression as a heyoka expression, its constants rounded once, to the working precision.
+
+What heyoka does with expressions on its own account, and what is done about it here:
+
+- ``x / c`` becomes ``(1/c) * x`` with a reciprocal taken in the working precision: constants are divided
+  and reduced in the scene's arithmetic before they get there.
+- The Taylor series of ``x**n`` divides by x for every n but 2, so a state that passes through zero ends as
+  NaN: whole powers are products of squares.
+- ``x**0.5`` and the other fractional powers have no series at zero; ``sqrt(x^2)`` is no way past it.
+- The step is chosen from the series' last terms. They vanish at x = 0 for powers above the method's order
+  (20 in double, less with a loose tolerance), and far from a short pulse in t: both can be stepped over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.numbers import Rounder
+from rigidsim.model.two_part import rounded
+from rigidsim.scene import expressions
+from rigidsim.scene.expressions import Expression, Name, Node
+
+
+def to_heyoka(expression: Expression, variables: Mapping[str, Any], number: Rounder, context: Any) -> Any:
+    """The expression over heyoka's variables.
+
+    Args:
+        variables: a heyoka expression for every name that the expression uses; ``t`` is heyoka's time
+            unless it is given here.
+        number: from an mpf to the working precision's scalar, rounded once.
+        context: mpmath context with guard bits, in which constant parts are worked out.
+
+    Raises:
+        ExpressionError: a constant has no finite value, or lies beyond the range of the numbers.
+    """
+
+    def literal(node: Node, value: Any) -> Any:
+        """A constant (mpf) as an expression; what is an expression already stays."""
+        if isinstance(value, hy.expression):
+            return value
+        try:
+            return hy.expression(rounded(number(value)))
+        except OverflowError:
+            raise expression.error("a constant beyond the range of the working precision", node) from None
+
+    def combine(node: Node, operands: list[Any]) -> Any:
+        """An mpf while everything is constant, an expression from the first name on."""
+        if isinstance(node, expressions.Constant):
+            return node.value.at(context)
+        if isinstance(node, Name):
+            return hy.time if node.name == "t" and "t" not in variables else variables[node.name]
+        if not any(isinstance(operand, hy.expression) for operand in operands):
+            return expressions.operate(expression, node, operands, context)
+        if node.operator == "quotient" and not isinstance(operands[1], hy.expression):
+            inverse = expressions.operate(expression, node, [context.one, operands[1]], context)
+            return operands[0] * literal(node, inverse)
+        if node.operator == "power":
+            exponent = operands[1]
+            if context.isint(exponent):
+                return whole_power(operands[0], int(exponent))
+            return operands[0] ** literal(node, exponent)
+        return _symbolic(node.operator, [literal(node, operand) for operand in operands])
+
+    return literal(expression.root, expressions.fold(expression, combine))
+
+
+def whole_power(base: Any, exponent: int) -> Any:
+    """``base**exponent`` out of squares and products, whose Taylor series hold at base = 0 as well."""
+    if exponent < 0:
+        return 1.0 / whole_power(base, -exponent)
+    factors = []
+    square = base
+    while exponent:
+        if exponent & 1:
+            factors.append(square)
+        exponent >>= 1
+        if exponent:
+            square = square**2.0
+    return hy.prod(factors) if factors else hy.expression(1.0)
+
+
+def _symbolic(operator: str, operands: list[Any]) -> Any:
+    if operator == "sum":
+        return hy.sum(operands)
+    if operator == "product":
+        return hy.prod(operands)
+    if operator == "negative":
+        return -operands[0]
+    if operator == "quotient":
+        return operands[0] / operands[1]
+    return getattr(hy, operator)(*operands)

@@ -1,0 +1,153 @@
+"""The state of a scene as expressions: what loads, observables and equations of motion are written in.
+
+One object for all of them, in internal units; what a scene doesn't carry is None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, TypeVar
+
+import heyoka as hy
+
+from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.numbers import Rounder, ScaledNumbers
+from rigidsim.model.orbit_states import OrbitStates, orbit_states
+from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply
+from rigidsim.model.scaling import Scaling
+from rigidsim.model.state_blocks import StateBlock
+from rigidsim.scene.arithmetic import Vector, dot, negligible
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.scene import Scene
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Expressions of the state.
+
+    Attributes:
+        rate_states: the three states of the rates, each in its own unit.
+        attitude: None where no attitude is carried.
+        vertical: unit vector against gravity, body axes; None where no torque needs it.
+        position, velocity: states in their own units; None unless carried.
+        number: mpf to the working precision.
+        orbit_tags: what makes the names of each prescribed orbit's states unique.
+    """
+
+    scene: Scene
+    scaling: Scaling
+    numbers: ScaledNumbers
+    rate_states: list[Symbolic]
+    attitude: AttitudeStates | None
+    vertical: list[Symbolic] | None
+    position: list[Symbolic] | None
+    velocity: list[Symbolic] | None
+    number: Rounder
+    orbit_tags: Mapping[KeplerOrbit, str] = field(default_factory=dict)
+    _orbits: dict[KeplerOrbit, OrbitStates] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def rates(self) -> list[Symbolic]:
+        """Angular velocity in units of 1/time, body axes."""
+        return in_common_unit(self.rate_states, self.numbers.rate_units, self.number)
+
+    @cached_property
+    def momentum_body(self) -> list[Symbolic]:
+        """Angular momentum I w, body axes."""
+        largest = max(abs(x) for row in self.numbers.inertia for x in row)
+        least = largest * negligible(self.scene.context)
+        rows = []
+        for row in self.numbers.inertia:
+            terms = [self.number(x) * w for x, w in zip(row, self.rates, strict=True) if abs(x) > least]
+            rows.append(hy.sum(terms) if terms else hy.expression(0.0))
+        return rows
+
+    @cached_property
+    def momentum_space(self) -> list[Symbolic]:
+        """Angular momentum R I w, space axes."""
+        return apply(self.matrix, self.momentum_body)
+
+    @staticmethod
+    def carried(part: T | None) -> T:
+        """A part that the caller knows to be carried (``Observable.needs`` says so)."""
+        assert part is not None
+        return part
+
+    @property
+    def matrix(self) -> SymbolicMatrix:
+        """R, body to space."""
+        assert self.attitude is not None
+        return self.attitude.matrix
+
+    @cached_property
+    def rotational_energy(self) -> Symbolic:
+        """w . I w / 2."""
+        return 0.5 * hy.sum([w * m for w, m in zip(self.rates, self.momentum_body, strict=True)])
+
+    @cached_property
+    def symmetry_direction(self) -> Vector | None:
+        """Unit axis about which the tensor is symmetric, body axes (mpf).
+
+        None for an asymmetric body, and for a sphere without a weight to mark an axis.
+        """
+        context, body = self.scene.context, self.scene.body
+        moments, axes = body.principal_moments, body.principal_axes
+        tiny = max(moments) * negligible(context)
+        if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere: gravity marks its axis
+            if self.numbers.arm is None:
+                return None
+            length = context.sqrt(dot(self.numbers.arm, self.numbers.arm))
+            return [a / length for a in self.numbers.arm]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            if abs(moments[j] - moments[k]) <= tiny:
+                return axes[i]
+        return None
+
+    def orbit(self, orbit: KeplerOrbit) -> OrbitStates:
+        """A prescribed orbit, carried by the states that all its loads share."""
+        if orbit not in self._orbits:
+            context = self.scene.context
+            unit = context.ldexp(context.one, self.scaling.time)
+            tag = self.orbit_tags.get(orbit, "")
+            self._orbits[orbit] = orbit_states(orbit, tag, unit, self.scene.start, context, self.number)
+        return self._orbits[orbit]
+
+    def orbit_block(self, orbit: KeplerOrbit) -> StateBlock:
+        """The states that carry an orbit: those of the attitude's own frame, where that turns with it."""
+        if self.attitude is not None and self.attitude.orbital is not None:
+            return self.attitude.orbital.states
+        return self.orbit(orbit).block
+
+
+def in_common_unit(states: list[Symbolic], units: list[Any], number: Rounder) -> list[Symbolic]:
+    """States times their own units; a unit of one costs nothing."""
+    return [s if u == 1 else number(u) * s for s, u in zip(states, units, strict=True)]
+
+
+def seconds(m: Kinematics) -> Symbolic:
+    """The scene's time as an expression, s; heyoka's own is in internal units."""
+    context = m.scene.context
+    unit = context.ldexp(context.one, m.scaling.time)
+    return hy.time if unit == 1 else m.number(unit) * hy.time
+
+
+def quadratic_form(m: Kinematics, direction: list[Symbolic]) -> Symbolic:
+    """c . I c for a direction c in body axes, internal units of inertia."""
+    rows = []
+    for row, c in zip(m.numbers.inertia, direction, strict=True):
+        rows += [m.number(x) * (c * d) for x, d in zip(row, direction, strict=True) if x != 0]
+    return hy.sum(rows)
+
+
+def inertia_times(m: Kinematics, direction: list[Symbolic]) -> list[Symbolic]:
+    """I c for a direction c in body axes, internal units of inertia."""
+    rows = []
+    for row in m.numbers.inertia:
+        terms = [m.number(x) * d for x, d in zip(row, direction, strict=True) if x != 0]
+        rows.append(hy.sum(terms) if terms else hy.expression(0.0))
+    return rows

@@ -1,0 +1,110 @@
+"""What a load is: one class from the keys of a config to torque, force and potential.
+
+Torques and forces are sums of terms, each a constant vector (mpf, worked out with guard bits) times an
+expression of the state, so that constants are rounded once, with those of the inertia tensor already in them.
+Loads of the config, of rigidsim and of one's own in Python derive from ``Load`` alike.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import StateBlock
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.registry import SceneLoad
+from rigidsim.scene.scene import Scene
+
+Term = tuple[Vector, Symbolic]
+"""A constant vector (mpf) times an expression."""
+
+
+class Load(SceneLoad):
+    """Base of all loads; the defaults are those of a load that does nothing, of a size nobody knows.
+
+    Attributes:
+        title: in reasons and messages.
+        reads: what it must find among the states: "attitude", "vertical", "flight".
+        conservative: whether it has a potential that doesn't depend on time.
+        wide: whether its expressions are too many to be unrolled (series of thousands of terms).
+        about_vertical: whether it may have a torque about the direction of gravity.
+        orbit: the prescribed orbit that its source moves on; all loads on one orbit share its states.
+        corotating_orbit: a circular orbit in a fixed plane in whose frame its potential rests: then there is
+            Jacobi's constant.
+        attracting_point: centre of its force (mpf, m, space axes), where that always points to one.
+    """
+
+    title = "load"
+    reads: frozenset[str] = frozenset()
+    conservative = False
+    wide = False
+    about_vertical = True
+    orbit: KeplerOrbit | None = None
+    corotating_orbit: KeplerOrbit | None = None
+    attracting_point: Vector | None = None
+
+    # --- equations ---------------------------------------------------------------------------------------
+
+    def extra_states(self, m: Kinematics) -> StateBlock | None:
+        """States of its own; those of ``orbit`` need not be named."""
+        return None
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """About the reference point, body axes, in internal units of energy."""
+        return []
+
+    def force(self, m: Kinematics) -> list[Term]:
+        """Acceleration of the centre of mass, space axes, in internal units of speed over time."""
+        return []
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        """Potential energy in internal units; part of the total energy where ``conservative``, and of the
+        Hamiltonian of the canonical formulation in any case.
+        """
+        return None
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether it has no torque about a symmetry axis of the body (mpf, body axes)."""
+        return False
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        """Dimensionless expressions of ``seconds(m)`` and the states around whose zeros the load changes all
+        at once, such as (t - t0) / width of a pulse or a switch. Steps chosen by the motion alone would pass
+        over it; with them they shorten on the way there.
+        """
+        return []
+
+    # --- estimates, from which units and the scales of drifts are chosen ---------------------------------
+
+    def amplitude(self, scene: Scene) -> Any | None:
+        """By how much it may change the energy of rotation (mpf, J).
+
+        None where nobody knows: it is estimated then, by trying (``rigidsim.model.load_estimate``).
+        """
+        return None
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        """Fastest angular rate of its source as seen from the body (mpf, rad/s)."""
+        return scene.context.zero
+
+    def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
+        """Largest distance from the origin (m) and speed (m/s) of a body that flies under this load alone.
+
+        Args:
+            fed: speed that loads of unknown size are estimated to add, m/s.
+
+        Returns:
+            None where it doesn't bound the flight.
+        """
+        return None
+
+    # --- words -------------------------------------------------------------------------------------------
+
+    described = "a load given from Python"
+
+    @property
+    def effect(self) -> str:
+        """What it does, in one sentence for ``rigidsim plan``."""
+        return f"{self.title}: given from Python"

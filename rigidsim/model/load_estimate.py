@@ -1,0 +1,258 @@
+"""How much a load of unknown size can do: an estimate, from which units and drift scales are chosen.
+
+Torques given as expressions, or from Python, are evaluated over the run's time span, at the initial state
+and at others like it: turned by the rotations of a tetrahedron, with rates, position and velocity reversed.
+What the torque is on average over these acts for good, and its impulse adds up; what is left is taken as a
+spring or a swing, which does the work of one turn at most. It is an estimate: it is rounded to powers of
+two, and never enters the equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.equations import vertical_from_attitude
+from rigidsim.model.formulations import BUILDERS
+from rigidsim.model.kinematics import in_common_unit
+from rigidsim.model.load import Load, Term
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.numbers import scaled_numbers
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Drive, choose_scaling
+from rigidsim.model.state_selection import Requirements
+from rigidsim.scene import attitude as numeric
+from rigidsim.scene.arithmetic import apply, transpose
+from rigidsim.scene.scene import Scene
+
+_TIMES = 2048  # over the run
+_LARGEST = 1e100  # of a torque or force in SI that is looked at
+_TETRAHEDRAL = np.concatenate([np.eye(4), [[0.5, *signs] for signs in product((-0.5, 0.5), repeat=3)]])
+"""Rotations of a tetrahedron: over them, functions of first and second order of the attitude average out."""
+_OBLIQUE = np.array([[0.8, 0.4, -0.2, 0.4], [0.5, -0.1, 0.7, -0.5], [0.3, 0.9, 0.1, 0.3]])
+_OBLIQUE /= np.linalg.norm(_OBLIQUE, axis=1)[:, None]
+"""In front of them: charts of the attitude are singular or symmetric in special places."""
+_STATES = 2 * (1 + len(_TETRAHEDRAL) * len(_OBLIQUE))
+"""The initial one and the turned ones, and each with everything else reversed."""
+_LASTING = 0.3  # of a torque's impulse; less is what an average over few states leaves of nothing
+_TURN = 2 * np.pi  # rad of a swing
+_CYCLE = 8.0  # of 1 / (rate of change): impulse of half a period, and a margin
+_NOISE = 4.0  # standard deviations of a mean over the times
+_AROUND = 2.0 ** -np.arange(0, 48, 0.25)  # of the run's length, around what is narrow in time
+_MOST_PULSES = 16
+_NEWTON = 40  # halvings, at a double zero
+_CLOCK = "t_of_drive"
+
+
+def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requirements) -> Drive | None:
+    """What these loads can add to the motion; None without any.
+
+    Args:
+        loads: those of whose size the scene knows nothing.
+    """
+    if not loads:
+        return None
+    m = _probe(scene, requirements, loads)
+    torque = [term for load in loads for term in load.torque(m)]
+    force = [term for load in loads for term in load.force(m)] if m.velocity is not None else []
+    names, start = _start(m, loads)
+    narrow = [u for load in loads for u in load.narrow(m)]
+    samples = _Samples(m, names, start, narrow)
+    context, scaling = scene.context, m.scaling
+    inverse = np.array([[float(x) for x in row] for row in m.numbers.inverse_inertia])
+    turned = samples.evaluate(torque)
+    pushed = samples.evaluate(force)
+    rates = samples.of(m.rates)
+    power = (turned.values * rates).sum(axis=0)
+    if m.velocity is not None:
+        speeds = samples.of(m.velocity)
+        power = power + (pushed.values * speeds).sum(axis=0)
+    if np.any(power != 0) and power.max() <= 0:  # damping, which only takes
+        return Drive(context.zero, context.zero)
+    heaviest = float(np.linalg.norm(inverse, 2))
+    by_space = np.einsum("aij,jta->ita", samples.matrices, turned.values)
+    lasting = 0.0
+    for values, frame in ((turned.values, np.eye(3)), (by_space, samples.matrices[0].T)):
+        impulse = frame @ samples.impulse(values)
+        lasting = max(lasting, float(np.einsum("it,ij,jt->t", impulse, inverse, impulse).max()) / 2)
+    peak = turned.peak(without_mean=lasting > 0)
+    swing = min(_TURN * peak, heaviest * min(turned.most, _CYCLE * peak * turned.period) ** 2 / 2)
+    energy = lasting + swing
+    speed = 0.0
+    if force:
+        speed = float(np.linalg.norm(samples.impulse(pushed.values), axis=0).max())
+        peak = pushed.peak(without_mean=speed > 0)
+        room = 2.0 ** (scaling.length - scaling.speed - scaling.time)
+        speed += min(pushed.most, _CYCLE * peak * pushed.period, float(np.sqrt(2 * peak * room)))
+    return Drive(
+        context.ldexp(context.mpf(energy), scaling.energy), context.ldexp(context.mpf(speed), scaling.speed)
+    )
+
+
+def _probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
+    """The scene in double precision and quaternions, in units that know nothing of these loads."""
+    scaling = choose_scaling(scene)
+    numbers = scaled_numbers(scene, scaling)
+    states = list(hy.make_vars("wx", "wy", "wz"))
+    rates = in_common_unit(states, numbers.rate_units, float)
+    attitude = None if requirements.formulation == "rates" else BUILDERS["quaternion"](scene, rates)
+    vertical = list(hy.make_vars("gx", "gy", "gz")) if requirements.vertical else None
+    if attitude is not None and numbers.arm is not None:
+        vertical = vertical_from_attitude(attitude.matrix, numbers, float)
+    position = list(hy.make_vars("x", "y", "z")) if requirements.flight else None
+    velocity = list(hy.make_vars("vx", "vy", "vz")) if requirements.flight else None
+    return Mechanics(
+        scene, scaling, numbers, states, attitude, vertical, position, velocity, float, loads=list(loads)
+    )
+
+
+def _start(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
+    """Names and initial values of all states that the loads may read, internal units."""
+    scene, scaling, context = m.scene, m.scaling, m.scene.context
+    values = {
+        name: context.ldexp(w, scaling.time - e)
+        for name, w, e in zip(("wx", "wy", "wz"), scene.angular_velocity, scaling.rates, strict=True)
+    }
+    values |= zip(("qw", "qx", "qy", "qz"), scene.quaternion, strict=True)
+    if m.numbers.up is not None:
+        up = apply(transpose(numeric.rotation_matrix(scene.quaternion)), m.numbers.up)
+        values |= zip(("gx", "gy", "gz"), up, strict=True)
+    if scene.position is not None and scene.velocity is not None:
+        values |= zip("xyz", [context.ldexp(x, -scaling.length) for x in scene.position], strict=True)
+        values |= zip(
+            ("vx", "vy", "vz"), [context.ldexp(v, -scaling.speed) for v in scene.velocity], strict=True
+        )
+    for load in loads:
+        extra = load.extra_states(m)
+        if extra is not None:
+            values |= zip(extra.names, extra.initial, strict=True)
+    return list(values), np.array([float(x) for x in values.values()])
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """A vector over times and states, shape (3, times, states).
+
+    Attributes:
+        most: impulse if it always pointed the same way.
+        period: of its explicit change in time (inverse rate), infinite where it has none.
+    """
+
+    values: np.ndarray
+    most: float
+    period: float
+
+    def peak(self, *, without_mean: bool) -> float:
+        """Largest norm, or that of what the mean over the states leaves."""
+        values = self.values - self.values.mean(axis=2, keepdims=True) if without_mean else self.values
+        return float(np.linalg.norm(values, axis=0).max(initial=0.0))
+
+
+class _Samples:
+    """Times and states at which expressions are evaluated."""
+
+    def __init__(self, m: Mechanics, names: list[str], start: np.ndarray, narrow: list[Symbolic]) -> None:
+        self._names = names
+        generator = np.random.default_rng(0)  # the same each time: the units are a function of the scene
+        states = np.repeat(start[:, None], _STATES, axis=1)
+        index = {name: i for i, name in enumerate(names)}
+        for name in ("wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz"):
+            if name in index:
+                states[index[name], _STATES // 2 :] *= -1
+        first = [index[name] for name in ("qw", "qx", "qy", "qz")]
+        turns = [_product(start[first], _product(g, h)) for g in _TETRAHEDRAL for h in _OBLIQUE]
+        states[first] = np.tile(np.array([start[first], *turns]).T, (1, 2))
+        self._states = states
+        self.matrices = np.array([_matrix(q) for q in states[first].T])
+        unit = float(m.scene.context.ldexp(m.scene.context.one, m.scaling.time))
+        begin, end = float(m.scene.start) / unit, float(m.scene.end) / unit
+        cells = np.linspace(begin, end, _TIMES + 1)
+        uniform = cells[:-1] + generator.uniform(0, 1, _TIMES) * np.diff(cells)
+        self._span = end - begin
+        self._times = np.unique(np.concatenate([[begin, end], uniform, *self._pulses(narrow, uniform)]))
+        self._times = self._times[(self._times >= begin) & (self._times <= end)]
+        self._uniform = np.searchsorted(self._times, uniform)
+
+    def _compiled(self, expressions: Sequence[Symbolic]) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """A function of times (t,) and states (names, s) with values (expressions, t, s); 0 for what is not
+        finite.
+        """
+        function = hy.cfunc(list(expressions), list(hy.make_vars(*self._names)), compact_mode=True)
+
+        def evaluated(times: np.ndarray, states: np.ndarray) -> np.ndarray:
+            inputs = np.ascontiguousarray(np.tile(states, (1, len(times))))
+            with np.errstate(all="ignore"):
+                found = function(inputs, time=np.repeat(times, states.shape[1]))
+            found = np.asarray(found).reshape(len(expressions), len(times), states.shape[1])
+            # what no run survives says nothing of its scale
+            return np.where(np.abs(found) < _LARGEST, found, 0.0)
+
+        return evaluated
+
+    def of(self, expressions: Sequence[Symbolic]) -> np.ndarray:
+        """Values over all times and states."""
+        return self._compiled(expressions)(self._times, self._states)
+
+    def evaluate(self, terms: Sequence[Term]) -> _Sampled:
+        """The sum of terms."""
+        if not terms:
+            return _Sampled(np.zeros((3, len(self._times), _STATES)), 0.0, np.inf)
+        sums = [hy.sum([float(vector[i]) * x for vector, x in terms]) for i in range(3)]
+        values = self.of([*sums, *(_by_time(x) for x in sums)])
+        changes, values = values[3:], values[:3]
+        size = np.linalg.norm(values, axis=0)
+        fastest = float(np.linalg.norm(changes, axis=0).max())
+        most = float(np.trapezoid(size.max(axis=1), self._times))
+        return _Sampled(values, most, float(size.max()) / fastest if fastest > 0 else np.inf)
+
+    def impulse(self, values: np.ndarray) -> np.ndarray:
+        """Running integral over time of a vector's mean over the states, shape (3, times); zero where it is
+        but noise.
+        """
+        means, size = values.mean(axis=2), np.sqrt((values**2).sum(axis=0).mean(axis=1))
+        steps = np.diff(self._times)
+        total = np.concatenate(
+            [np.zeros((3, 1)), np.cumsum((means[:, 1:] + means[:, :-1]) / 2 * steps, axis=1)], axis=1
+        )
+        spread = means[:, self._uniform].std(axis=1)
+        noise = _NOISE * self._span * float(np.linalg.norm(spread)) / np.sqrt(_TIMES)
+        noise = max(noise, _LASTING * float(np.trapezoid(size, self._times)))
+        return total if np.linalg.norm(total, axis=0).max() > noise else np.zeros_like(total)
+
+    def _pulses(self, narrow: list[Symbolic], times: np.ndarray) -> list[np.ndarray]:
+        """Times on a logarithmic grid around the zeros of arguments, by Newton's method from all others."""
+        found = []
+        for u in narrow:
+            argument, at = self._compiled([u, _by_time(u)]), times
+            for _ in range(_NEWTON):
+                value, slope = argument(at, self._states[:, :1])[:, :, 0]
+                moves = slope != 0
+                at = at - np.clip(
+                    np.where(moves, value / np.where(moves, slope, 1), 0), -self._span, self._span
+                )
+            zeros = np.sort(at[np.abs(argument(at, self._states[:, :1])[0, :, 0]) < 1])
+            zeros = zeros[np.diff(zeros, prepend=-np.inf) > 1e-9 * self._span][:_MOST_PULSES]
+            found += [zero + sign * self._span * _AROUND for zero in zeros for sign in (-1, 1)]
+        return found
+
+
+def _by_time(u: Symbolic) -> Symbolic:
+    """The part of its change that is explicit in time."""
+    clock = hy.make_vars(_CLOCK)
+    slope = hy.diff(hy.subs(hy.expression(u), {hy.time: clock}), clock)
+    return hy.subs(slope, {clock: hy.time})
+
+
+def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Of quaternions, shape (4,)."""
+    w, v = p[0] * q[0] - p[1:] @ q[1:], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
+    return np.array([w, *v])
+
+
+def _matrix(q: np.ndarray) -> np.ndarray:
+    """Body to space."""
+    return np.array([[float(x) for x in row] for row in numeric.rotation_matrix(list(q))])

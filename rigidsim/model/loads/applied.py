@@ -1,0 +1,186 @@
+"""Torques and forces that a user gives as expressions of time and the state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Annotated, Any, Literal
+
+from pydantic import PlainValidator, WithJsonSchema
+
+from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.state_names import state_names
+from rigidsim.scene.arithmetic import Vector, cross, diagonal
+from rigidsim.scene.expression_parser import parse_expression
+from rigidsim.scene.expressions import (
+    ATTITUDE_NAMES,
+    FLIGHT_NAMES,
+    RATE_NAMES,
+    Constant,
+    Expression,
+    ExpressionError,
+    names_used,
+)
+from rigidsim.scene.fields import Metre, Triple, refuse
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.transitions import narrow_parts
+from rigidsim.scene.validation_messages import shown
+
+
+def _component(value: Any) -> str:
+    """An expression; a bare number is one too."""
+    if isinstance(value, bool) or not isinstance(value, str | int | Decimal | float):
+        raise refuse(f'given {shown(value)}; an expression in quotes is allowed, such as "k*sin(t)^2"')
+    return value if isinstance(value, str) else str(value)
+
+
+Formula = Annotated[
+    str, PlainValidator(_component), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
+]
+
+
+class TorqueFields(LoadFields):
+    """A torque as expressions of t, the state and [parameters], N m."""
+
+    kind: Literal["torque"]
+    components: Triple[Formula]
+    frame: Literal["body", "space"] = "body"
+
+
+class ForceFields(LoadFields):
+    """A force as expressions, N, at a point of the body (from the reference point; default the centre of
+    mass).
+    """
+
+    kind: Literal["force"]
+    components: Triple[Formula]
+    frame: Literal["body", "space"] = "space"
+    point: Triple[Metre] | None = None
+
+
+@dataclass(frozen=True)
+class Applied(Load):
+    """A torque or a force given by expressions; its work is integrated, since it need have no potential.
+
+    Attributes:
+        components: of the torque (N m) or force (N).
+        frame: "body" or "space", of the components.
+        arm: from the reference point to where a force acts, body axes, m (mpf).
+        pushes: whether it moves the centre of mass.
+        number: place in the config, for messages.
+    """
+
+    components: tuple[Expression, Expression, Expression]
+    frame: str
+    arm: Vector
+    pushes: bool
+    number: int
+
+    @classmethod
+    def resolve(cls, fields: Any, around: Surroundings) -> Applied:
+        """See ``SceneLoad``."""
+        names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if around.free_flight else ()))
+        components = []
+        for i, text in enumerate(fields.components):
+            try:
+                components.append(parse_expression(text, names, parameters=around.parameters))
+            except ExpressionError as error:
+                raise around.fault(f"components[{i}]", str(error)) from None
+        point = getattr(fields, "point", None)
+        arm = around.center_of_mass if point is None else [x.at(around.context) for x in point]
+        first, second, third = components
+        pushes = cls.title == "force" and around.free_flight
+        return cls((first, second, third), fields.frame, arm, pushes, around.number)
+
+    def acts(self) -> bool:
+        """Unless all components are zero."""
+        return not all(isinstance(c.root, Constant) and c.root.value.sign == 0 for c in self.components)
+
+    def formulas(self) -> Iterator[tuple[str, Expression]]:
+        """See ``SceneLoad``."""
+        for i, component in enumerate(self.components):
+            yield f"[[loads]] number {self.number + 1} components[{i}]", component
+
+    @property
+    def names(self) -> frozenset[str]:
+        """That the expressions use."""
+        return frozenset().union(*(names_used(c) for c in self.components))
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        """What the expressions name, and what turns the components."""
+        turns = self.title == "torque" or any(x != 0 for x in self.arm)
+        crosses = (turns and self.frame == "space") or (self.pushes and self.frame == "body")
+        attitude = {"attitude"} if crosses or self.names & set(ATTITUDE_NAMES) else set()
+        flight = {"flight"} if self.pushes or self.names & set(FLIGHT_NAMES) else set()
+        return frozenset(attitude | flight)
+
+    @property
+    def described(self) -> str:  # type: ignore[override]
+        """See ``Load``."""
+        return f"a {self.title} given by expressions"
+
+    @property
+    def effect(self) -> str:
+        """See ``Load``."""
+        texts = ", ".join(component.text for component in self.components)
+        return f"{self.title}: [{texts}] in {self.frame} axes"
+
+    def _components(self, m: Kinematics) -> list[Symbolic]:
+        variables = state_names(m, self.names)
+        context = m.scene.context
+        return [to_heyoka(c, variables, m.number, context) for c in self.components]
+
+    def _in_body(self, m: Kinematics) -> list[Symbolic]:
+        found = self._components(m)
+        return apply(transpose(m.matrix), found) if self.frame == "space" else found
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        """Arguments of pulses and switches in the components."""
+        variables = state_names(m, self.names)
+        parts = {part.root: part for c in self.components for part in narrow_parts(c)}
+        return [to_heyoka(part, variables, m.number, m.scene.context) for part in parts.values()]
+
+
+@register_load
+class Torque(Applied):
+    """A torque given by expressions."""
+
+    Fields = TorqueFields
+    title = "torque"
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """See ``Load``."""
+        size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)
+        return list(zip(diagonal([size] * 3), self._in_body(m), strict=True))
+
+
+@register_load
+class Force(Applied):
+    """A force given by expressions."""
+
+    Fields = ForceFields
+    title = "force"
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """arm x force."""
+        if all(x == 0 for x in self.arm):
+            return []
+        size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)
+        arms = [cross(self.arm, axis) for axis in diagonal([size] * 3)]
+        return list(zip(arms, self._in_body(m), strict=True))
+
+    def force(self, m: Kinematics) -> list[Term]:
+        """Of a freely flying body, over its mass."""
+        if m.velocity is None:
+            return []
+        context = m.scene.context
+        found = self._components(m)
+        if self.frame == "body":
+            found = apply(m.matrix, found)
+        size = context.ldexp(1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)
+        return list(zip(diagonal([size] * 3), found, strict=True))

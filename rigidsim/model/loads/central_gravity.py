@@ -1,0 +1,177 @@
+"""Central gravity: a point that attracts a freely flying body, force and torque to second degree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import heyoka as hy
+from pydantic import Field
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
+from rigidsim.model.load import Load, Term
+from rigidsim.model.loads.gravity_gradient import gradient_terms, positive_strength, tidal_range
+from rigidsim.model.numbers import unit_vectors
+from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.exact import ZERO
+from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
+
+
+class CentralGravityFields(LoadFields):
+    """A point that attracts a freely flying body: force and torque to second degree."""
+
+    kind: Literal["central_gravity"]
+    gravitational_parameter: GravitationalParameter
+    position: Triple[Metre] = Field(default_factory=lambda: [ZERO] * 3)
+
+
+@register_load
+@dataclass(frozen=True)
+class CentralGravity(Load):
+    """A point that attracts a free body: U = -GMm/r - (GM/2r^3)(tr I - 3 c . I c), c = R^T r/|r|.
+
+    Attributes:
+        position: of the point, space axes, m (mpf).
+    """
+
+    gravitational_parameter: Any
+    position: Vector
+    Fields = CentralGravityFields
+    title = "central_gravity"
+    described = "a central-gravity load"
+    reads = frozenset({"attitude", "flight"})
+    conservative = True
+
+    @classmethod
+    def resolve(cls, fields: CentralGravityFields, around: Surroundings) -> CentralGravity:
+        """See ``SceneLoad``."""
+        strength = positive_strength(fields.gravitational_parameter, around)
+        return cls(strength, [x.at(around.context) for x in fields.position])
+
+    def check(self, number: int, position: Vector | None) -> None:
+        """The body must have a position, and not start where the point is."""
+        where = f"[[loads]] number {number + 1} kind"
+        if position is None:
+            raise ConfigError(
+                Problem(
+                    where,
+                    'given "central_gravity" for a body without a position; give [initial] position and '
+                    'velocity, or use "gravity_gradient" for a prescribed orbit',
+                )
+            )
+        if position == self.position:
+            raise ConfigError(Problem(where, "the body starts at the attracting point; start it elsewhere"))
+
+    @property
+    def attracting_point(self) -> Vector:  # type: ignore[override]
+        """The force points to it but for the body's own shape."""
+        return self.position
+
+    def geometry(self, m: Kinematics) -> tuple[list[Symbolic], list[Symbolic], Symbolic]:
+        """Unit direction from the attracting point in space axes and in body axes, and 1/r (1/length)."""
+        context = m.scene.context
+        assert m.position is not None
+        offset = []
+        for x, a in zip(m.position, self.position, strict=True):
+            shift = context.ldexp(a, -m.scaling.length)
+            offset.append(x - m.number(shift) if shift != 0 else x)
+        inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in offset]))
+        space = [x * inverse for x in offset]
+        return space, apply(transpose(m.matrix), space), inverse
+
+    def _strength(self, m: Kinematics, length_power: int, extra: int) -> Any:
+        """G M over length^power, times 2^extra."""
+        exponent = extra - length_power * m.scaling.length
+        return m.scene.context.ldexp(self.gravitational_parameter, exponent)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """(3 G M / r^3) c x (I c)."""
+        _, body, inverse = self.geometry(m)
+        return gradient_terms(m, body, self._strength(m, 3, 2 * m.scaling.time), inverse**3)
+
+    def force(self, m: Kinematics) -> list[Term]:
+        """-GM r/r^3 - (3GM / 2 M r^4)[(tr I - 5 c . I c) r/|r| + 2 R I c] (physics of MacCullagh)."""
+        scaling = m.scaling
+        space, body, inverse = self.geometry(m)
+        shift = scaling.time - scaling.speed
+        point = m.number(self._strength(m, 2, shift)) * inverse**2
+        ratio = self._strength(m, 4, shift + scaling.inertia) * 3 / (2 * m.carried(m.scene.body.mass))
+        second = m.number(ratio) * inverse**4
+        trace = sum(m.numbers.inertia[i][i] for i in range(3))
+        radial = point + second * (m.number(trace) - 5.0 * quadratic_form(m, body))
+        turned = apply(m.matrix, inertia_times(m, body))
+        terms: list[Term] = []
+        for i, axis in enumerate(unit_vectors(m.scene.context)):
+            terms.append(([-x for x in axis], radial * space[i] + 2.0 * second * turned[i]))
+        return terms
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        """To second degree."""
+        scaling = m.scaling
+        _, body, inverse = self.geometry(m)
+        point = self._strength(m, 1, -scaling.energy) * m.scene.body.mass
+        second = self._strength(m, 3, scaling.inertia - scaling.energy) / 2
+        trace = sum(m.numbers.inertia[i][i] for i in range(3))
+        bracket = m.number(trace) - 3.0 * quadratic_form(m, body)
+        return -(m.number(point) * inverse) - m.number(second) * inverse**3 * bracket
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """c x (I c) has no part along an axis of symmetry."""
+        return True
+
+    # --- estimates, from the Kepler orbit through the initial state --------------------------------------
+
+    def _relative(self, scene: Scene) -> tuple[Vector, Any]:
+        assert scene.position is not None
+        assert scene.velocity is not None
+        offset = [x - a for x, a in zip(scene.position, self.position, strict=True)]
+        return offset, norm(scene.context, scene.velocity)
+
+    def nearest_approach(self, scene: Scene) -> Any:
+        """Pericentre distance, m: at least a thousandth of the initial distance, since a scale must not
+        vanish for a plunging orbit.
+        """
+        context = scene.context
+        offset, speed = self._relative(scene)
+        distance = norm(context, offset)
+        momentum = norm(context, cross(offset, scene.velocity or offset))
+        strength = self.gravitational_parameter
+        energy = speed**2 / 2 - strength / distance
+        e = context.sqrt(max(1 + 2 * energy * momentum**2 / strength**2, context.zero))
+        pericentre = momentum**2 / strength / (1 + e)
+        return max(min(pericentre, distance), distance / 1000)
+
+    def amplitude(self, scene: Scene) -> Any:
+        """As of ``tidal_range`` at the nearest approach."""
+        return tidal_range(scene, self.gravitational_parameter, self.nearest_approach(scene))
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        """At the nearest approach."""
+        offset, _ = self._relative(scene)
+        assert scene.velocity is not None
+        momentum = norm(scene.context, cross(offset, scene.velocity))
+        return momentum / self.nearest_approach(scene) ** 2
+
+    def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any]:
+        """See ``Load``."""
+        context, strength = scene.context, self.gravitational_parameter
+        assert scene.position is not None
+        horizon = scene.end - scene.start
+        offset, speed = self._relative(scene)
+        distance = norm(context, offset)
+        energy = speed**2 / 2 - strength / distance
+        swiftest = context.sqrt(2 * abs(energy + strength / self.nearest_approach(scene)))
+        if energy < 0:
+            farthest = strength / -energy  # twice the semi-major axis
+            reach = min(farthest, distance + swiftest * horizon) + fed * horizon
+            return norm(context, self.position) + reach, swiftest + fed
+        return norm(context, scene.position) + (swiftest + fed) * horizon, swiftest + fed
+
+    @property
+    def effect(self) -> str:
+        """See ``Load``."""
+        return "central_gravity: force and torque of an attracting point, to second degree"

@@ -1,0 +1,196 @@
+"""Gravity gradient: the torque of a distant body on an orbit, at a fixed place, or from an ephemeris."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import heyoka as hy
+
+from rigidsim.model.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
+from rigidsim.model.kinematics import Kinematics, quadratic_form
+from rigidsim.model.load import Load, Term
+from rigidsim.model.numbers import unit_vectors
+from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.two_part import as_factor
+from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
+
+
+class GravityGradientFields(LoadFields):
+    """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
+
+    kind: Literal["gravity_gradient"]
+    gravitational_parameter: GravitationalParameter
+    orbit: Orbit | None = None
+    position: Triple[Metre] | None = None
+    ephemeris: Literal["sun", "moon"] | None = None
+
+
+@register_load
+@dataclass(frozen=True)
+class GravityGradient(Load):
+    """Torque (3 G M / R^3) c x (I c) of a distant body in direction c (MacCullagh).
+
+    Exactly one of ``orbit``, ``position`` (space axes, m) and ``ephemeris`` says where it is; for an
+    ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from J2000.
+    """
+
+    gravitational_parameter: Any
+    orbit: KeplerOrbit | None = None
+    position: Vector | None = None
+    ephemeris: str | None = None
+    Fields = GravityGradientFields
+    title = "gravity_gradient"
+    described = "a gravity-gradient load"
+    reads = frozenset({"attitude"})
+
+    @classmethod
+    def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> GravityGradient:
+        """See ``SceneLoad``."""
+        strength, context = positive_strength(fields.gravitational_parameter, around), around.context
+        given = [key for key in ("orbit", "position", "ephemeris") if getattr(fields, key) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "none"
+            raise around.fault(
+                "orbit", f"given {found}; exactly one of orbit, position and ephemeris is needed"
+            )
+        if fields.orbit is not None:
+            return cls(strength, orbit=resolve_orbit(fields.orbit, strength, around))
+        if fields.position is None:
+            return cls(strength, ephemeris=fields.ephemeris)
+        position = [x.at(context) for x in fields.position]
+        if all(x == 0 for x in position):
+            raise around.fault("position", "given the origin, where the body is; another point is allowed")
+        return cls(strength, position=position)
+
+    @property
+    def conservative(self) -> bool:  # type: ignore[override]
+        """Where the source rests."""
+        return self.position is not None
+
+    @property
+    def wide(self) -> bool:  # type: ignore[override]
+        """The analytic series have thousands of terms."""
+        return self.ephemeris is not None
+
+    @property
+    def corotating_orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
+        """A circular orbit in a fixed plane."""
+        orbit = self.orbit
+        return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
+
+    def _source(self, m: Kinematics) -> SourcePosition:
+        assert self.ephemeris is not None
+        unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.time)
+        return source_position(self.ephemeris, m.number(unit) * hy.time)
+
+    def direction(self, m: Kinematics) -> list[Symbolic]:
+        """Unit vector towards the attracting body, body axes."""
+        if m.attitude is not None and m.attitude.orbital is not None:
+            return m.attitude.orbital.direction
+        if self.orbit is not None:
+            return apply(transpose(m.matrix), m.orbit(self.orbit).direction)
+        if self.ephemeris is not None:
+            return apply(transpose(m.matrix), self._source(m).direction)
+        assert self.position is not None
+        length = norm(m.scene.context, self.position)
+        fixed = [as_factor(m.number(x / length)) for x in self.position]
+        return apply(transpose(m.matrix), fixed)
+
+    def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
+        """G M / R^3 in internal units: at a constant distance (mpf), and what it varies by."""
+        context = m.scene.context
+        factor = None
+        if self.orbit is not None:
+            factor, distance = m.orbit(self.orbit).inverse_distance ** 3, self.orbit.semi_major_axis
+        elif self.ephemeris is not None:
+            factor = self._source(m).inverse_distance ** 3
+            distance = context.mpf(MEAN_DISTANCE[self.ephemeris])
+        else:
+            distance = norm(context, m.carried(self.position))
+        value = context.ldexp(self.gravitational_parameter / distance**3, 2 * m.scaling.time)
+        return value, factor
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """(3 G M / R^3) c x (I c)."""
+        return gradient_terms(m, self.direction(m), *self.strength(m))
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        """(3 G M / 2 R^3) c . I c (the part that doesn't depend on the attitude is left out)."""
+        strength, factor = self.strength(m)
+        potential = as_factor(m.number(3 * strength / 2)) * quadratic_form(m, self.direction(m))
+        return potential if factor is None else factor * potential
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """c x (I c) has no part along an axis of symmetry."""
+        return True
+
+    def amplitude(self, scene: Scene) -> Any:
+        """As of ``tidal_range`` at the least distance."""
+        context = scene.context
+        if self.ephemeris is not None:
+            distance = context.mpf(MEAN_DISTANCE[self.ephemeris])
+        elif self.orbit is not None:
+            distance = self.orbit.pericentre
+        else:
+            distance = norm(context, self.position or [])
+        return tidal_range(scene, self.gravitational_parameter, distance)
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        """At pericentre."""
+        return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
+
+    @property
+    def effect(self) -> str:
+        """See ``Load``."""
+        if self.orbit is not None:
+            where = "on a circular orbit" if self.orbit.circular else "on an eccentric orbit"
+        else:
+            where = "fixed in space" if self.ephemeris is None else f"at the {self.ephemeris.title()}'s place"
+        return f"gravity_gradient: torque of a distant body {where}"
+
+
+def positive_strength(given: Any, around: Surroundings) -> Any:
+    """A gravitational parameter, m^3/s^2 (mpf).
+
+    Raises:
+        ConfigError: it isn't positive.
+    """
+    if given.sign <= 0:
+        raise around.fault("gravitational_parameter", f"given {float(given):g}; a positive number is allowed")
+    return given.at(around.context)
+
+
+def tidal_range(scene: Scene, strength: Any, distance: Any) -> Any:
+    """(3/2) (G M / R^3) (I_max - I_min): range of the gradient's potential energy at a distance, J."""
+    moments = scene.body.principal_moments
+    return 3 * strength / distance**3 * (max(moments) - min(moments)) / 2
+
+
+def gradient_terms(
+    m: Kinematics, direction: list[Symbolic], strength: Any, factor: Symbolic | None = None
+) -> list[Term]:
+    """Torque 3 strength factor c x (I c) for a unit direction c in body axes (MacCullagh).
+
+    Args:
+        strength: constant part (mpf), which becomes one coefficient with the moments.
+        factor: what varies of it.
+    """
+    inertia = m.numbers.inertia
+    units = unit_vectors(m.scene.context)
+    columns = transpose(inertia)
+    terms: list[Term] = []
+    for a in range(3):
+        for j in range(a, 3):
+            vector = cross(units[a], columns[j])
+            if j != a:
+                vector = [x + y for x, y in zip(vector, cross(units[j], columns[a]), strict=True)]
+            if any(x != 0 for x in vector):
+                product = direction[a] * direction[j]
+                scaled = [3 * strength * x for x in vector]
+                terms.append((scaled, product if factor is None else factor * product))
+    return terms

@@ -1,0 +1,115 @@
+"""Uniform gravity: a torque about a fixed point, or free fall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import heyoka as hy
+from pydantic import Field
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.numbers import unit_vectors
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
+from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.fields import Acceleration, Triple
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
+
+
+def _standard_gravity() -> list[ExactNumber]:
+    return [parse_number(a, "m/s^2") for a in ("0", "0", "-9.80665")]
+
+
+class UniformGravityFields(LoadFields):
+    """A uniform field; a torque about the fixed point, or free fall in a scene with a position."""
+
+    kind: Literal["uniform_gravity"]
+    acceleration: Triple[Acceleration] = Field(default_factory=_standard_gravity)
+
+
+@register_load
+@dataclass(frozen=True)
+class UniformGravity(Load):
+    """The sum of all uniform fields: a torque com x M R^T g about a fixed point, or free fall.
+
+    Attributes:
+        acceleration: space axes, m/s^2 (mpf).
+        pivoted: whether it turns the body about a fixed point.
+    """
+
+    acceleration: Vector
+    pivoted: bool = False
+    Fields = UniformGravityFields
+    title = "uniform_gravity"
+    conservative = True
+    about_vertical = False
+
+    @classmethod
+    def resolve(cls, fields: UniformGravityFields, around: Surroundings) -> UniformGravity:
+        """See ``SceneLoad``."""
+        return cls([a.at(around.context) for a in fields.acceleration])
+
+    @classmethod
+    def of(cls, scene: Scene) -> list[UniformGravity]:
+        """All uniform fields of a scene as one load; none where it has none."""
+        return [] if scene.gravity is None else [cls(scene.gravity, scene.torque_arm is not None)]
+
+    @property
+    def uniform_field(self) -> Vector:  # type: ignore[override]
+        """Space axes, m/s^2."""
+        return self.acceleration
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        """The vertical, about a fixed point."""
+        return frozenset({"vertical"} if self.pivoted else ())
+
+    def amplitude(self, scene: Scene) -> Any:
+        """M g l: half the range of the potential energy about a fixed point; free fall turns nothing."""
+        arm = scene.torque_arm
+        if arm is None:
+            return scene.context.zero
+        return norm(scene.context, arm) * norm(scene.context, self.acceleration)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """vertical x arm: the weight pulls the centre of mass down."""
+        if m.vertical is None or m.numbers.arm is None:
+            return []
+        units = unit_vectors(m.scene.context)
+        return [(cross(units[a], m.numbers.arm), m.vertical[a]) for a in range(3)]
+
+    def force(self, m: Kinematics) -> list[Term]:
+        """Free fall."""
+        if m.velocity is None or m.scene.gravity is None:
+            return []
+        context, scaling = m.scene.context, m.scaling
+        pull = [context.ldexp(g, scaling.time - scaling.speed) for g in m.scene.gravity]
+        return [(pull, hy.expression(1.0))]
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        """M g l above the fixed point, or -M g . x in free flight."""
+        context, scene, scaling = m.scene.context, m.scene, m.scaling
+        if m.vertical is not None and m.numbers.arm is not None:
+            return hy.sum([m.number(a) * v for a, v in zip(m.numbers.arm, m.vertical, strict=True) if a])
+        mass = scene.body.mass
+        if m.position is None or scene.gravity is None or mass is None:
+            return None
+        weights = [context.ldexp(-mass * g, scaling.length - scaling.energy) for g in scene.gravity]
+        terms = [m.number(k) * x for k, x in zip(weights, m.position, strict=True) if k]
+        return hy.sum(terms) if terms else None
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """Where the centre of mass lies on the axis."""
+        arm = m.numbers.arm
+        if arm is None:
+            return True
+        context = m.scene.context
+        return bool(norm(context, cross(arm, axis)) <= norm(context, arm) * negligible(context))
+
+    @property
+    def effect(self) -> str:
+        """See ``Load``."""
+        return "uniform_gravity: " + ("its torque about the fixed point" if self.pivoted else "free fall")

@@ -1,0 +1,64 @@
+"""Viscous torque: damping in proportion to each body rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.fields import Damping, Triple
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
+
+
+class ViscousTorqueFields(LoadFields):
+    """A torque -c_i w_i about each body axis."""
+
+    kind: Literal["viscous_torque"]
+    coefficients: Triple[Damping]
+
+
+@register_load
+@dataclass(frozen=True)
+class ViscousTorque(Load):
+    """Torque -c_i w_i about the body axes; ``coefficients`` in kg m^2/s (mpf)."""
+
+    coefficients: Vector
+    Fields = ViscousTorqueFields
+    title = "viscous_torque"
+    described = "a viscous torque"
+
+    @classmethod
+    def resolve(cls, fields: ViscousTorqueFields, around: Surroundings) -> ViscousTorque:
+        """See ``SceneLoad``."""
+        for i, coefficient in enumerate(fields.coefficients):
+            if coefficient.sign < 0:
+                given = f"given {float(coefficient):g}; zero or more is allowed"
+                raise around.fault(f"coefficients[{i}]", given)
+        return cls([c.at(around.context) for c in fields.coefficients])
+
+    def acts(self) -> bool:
+        """Where any coefficient isn't zero."""
+        return any(c != 0 for c in self.coefficients)
+
+    def amplitude(self, scene: Scene) -> Any:
+        """It only takes."""
+        return scene.context.zero
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """One term for each axis with damping."""
+        context = m.scene.context
+        terms: list[Term] = []
+        for i, coefficient in enumerate(self.coefficients):
+            if coefficient != 0:
+                scaled = context.ldexp(coefficient, -m.scaling.momentum)
+                vector = [-scaled * m.numbers.rate_units[i] if i == j else context.zero for j in range(3)]
+                terms.append((vector, m.rate_states[i]))
+        return terms
+
+    @property
+    def effect(self) -> str:
+        """See ``Load``."""
+        return "viscous_torque: damping of the body rates"

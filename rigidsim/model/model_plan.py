@@ -1,0 +1,73 @@
+"""What is decided about a scene's equations before any number is rounded: loads, states, units, orbits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from rigidsim.model.load import Load
+from rigidsim.model.load_estimate import estimate_drive
+from rigidsim.model.loads.uniform_gravity import UniformGravity
+from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
+from rigidsim.model.orbital_frame import corotating_orbit
+from rigidsim.model.scaling import Scaling, choose_scaling
+from rigidsim.model.state_selection import Requirements, choose_requirements
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class ModelPlan:
+    """The decisions; a system of equations in any precision follows from them.
+
+    Attributes:
+        scene: with the loads that were given from Python among its own.
+        loads: all that act, all uniform fields as one.
+        orbit_tags: of each prescribed orbit, what makes the names of its states unique.
+        frame_orbit: the orbit in whose frame the attitude is carried; None where that is space.
+    """
+
+    scene: Scene
+    loads: Sequence[Load]
+    requirements: Requirements
+    scaling: Scaling
+    numbers: ScaledNumbers
+    orbit_tags: Mapping[KeplerOrbit, str]
+    frame_orbit: KeplerOrbit | None
+
+    @property
+    def wide(self) -> bool:
+        """Whether the equations are too long to be compiled unrolled."""
+        return any(load.wide for load in self.loads)
+
+
+def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
+    """Decide on the least system that a scene needs.
+
+    Args:
+        extra_loads: given from Python, beside those of the config.
+
+    Raises:
+        ConfigError: a record that the scene or the formulation can't give.
+    """
+    if extra_loads:
+        scene = replace(scene, loads=(*scene.loads, *extra_loads))
+    loads: list[Load] = [*UniformGravity.of(scene), *scene.loads]  # type: ignore[list-item]
+    requirements = choose_requirements(scene, loads)
+    unknown = [load for load in loads if load.amplitude(scene) is None]
+    scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
+    if requirements.canonical:
+        scaling = replace(scaling, rates=(0, 0, 0))
+    tags: dict[KeplerOrbit, str] = {}
+    for number, load in enumerate(scene.loads, start=1):
+        if getattr(load, "orbit", None) is not None:
+            tags.setdefault(load.orbit, str(number))  # type: ignore[attr-defined]
+    return ModelPlan(
+        scene,
+        loads,
+        requirements,
+        scaling,
+        scaled_numbers(scene, scaling),
+        tags,
+        corotating_orbit(scene, loads, requirements.formulation),
+    )

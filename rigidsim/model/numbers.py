@@ -1,0 +1,61 @@
+"""A scene's constants in internal units, and the rounding that brings them to the working precision.
+
+Every coefficient is worked out in the scene's arithmetic (mpmath with guard bits) and rounded once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.model.scaling import Scaling
+from rigidsim.scene.arithmetic import Matrix, Vector, norm
+from rigidsim.scene.scene import Scene
+
+Rounder = Callable[[Any], Any]
+"""From an mpf to the working precision's scalar, rounded once."""
+
+
+@dataclass(frozen=True)
+class ScaledNumbers:
+    """The scene's constants in internal units (see ``Scaling``), as mpf.
+
+    Attributes:
+        inertia, inverse_inertia: 3x3.
+        rate_units: the three rates' own units.
+        arm: M com |g|, body axes: the potential energy is ``arm . vertical``; None without a torque.
+        up: unit vector against gravity, space axes; None without gravity.
+    """
+
+    inertia: Matrix
+    inverse_inertia: Matrix
+    rate_units: Vector
+    arm: Vector | None
+    up: Vector | None
+
+
+def scaled_numbers(scene: Scene, scaling: Scaling) -> ScaledNumbers:
+    """Bring the scene's constants to internal units; powers of two only, so nothing is rounded."""
+    context = scene.context
+    one = context.one
+    up = arm = None
+    if scene.gravity is not None and any(g != 0 for g in scene.gravity):
+        strength = norm(context, scene.gravity)
+        up = [-g / strength for g in scene.gravity]
+    if scene.torque_arm is not None:
+        assert scene.gravity is not None
+        strength = norm(context, scene.gravity)
+        arm = [context.ldexp(a * strength, -scaling.energy) for a in scene.torque_arm]
+    return ScaledNumbers(
+        [[context.ldexp(x, -scaling.inertia) for x in row] for row in scene.body.inertia],
+        [[context.ldexp(x, scaling.inertia) for x in row] for row in scene.inverse_inertia],
+        [context.ldexp(one, e) for e in scaling.rates],
+        arm,
+        up,
+    )
+
+
+def unit_vectors(context: Any) -> Matrix:
+    """The three axes."""
+    return [[context.one if i == j else context.zero for j in range(3)] for i in range(3)]

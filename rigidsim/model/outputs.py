@@ -1,0 +1,168 @@
+"""What of a scene is recorded, what of it is conserved, and the drifts that are watched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.numbers import Rounder
+from rigidsim.model.observables import Observable
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.registry import OBSERVABLES
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One variable of the dataset.
+
+    Attributes:
+        first, count: its components among ``System.outputs``.
+        exponents: binary exponents that bring the components to SI.
+        continuity: how samples are joined: "" (as they are), "wrapped" (angles that are states),
+            "unwrap" (angles found from another formulation), "parity" and "nearest" (quaternion signs).
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    frame: str
+    first: int
+    count: int
+    exponents: list[int]
+    invariant: bool
+    continuity: str = ""
+
+
+@dataclass(frozen=True)
+class Invariant:
+    """Something that the motion conserves, and the drift that is watched.
+
+    Attributes:
+        why: the reason that it is conserved.
+        expressions: its components, in internal units.
+        exponents: binary exponents of the components' units.
+        scale: what drifts are relative to, SI (mpf); ``scale_name`` says what it is.
+        numerical: True for what only the numerical representation has (a quaternion's norm).
+    """
+
+    name: str
+    why: str
+    units: str
+    long_name: str
+    expressions: list[Symbolic]
+    exponents: list[int]
+    scale: Any
+    scale_name: str
+    numerical: bool = False
+
+
+def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list[Recorded], list[Symbolic]]:
+    """The variables of the dataset, and the expressions of all their components.
+
+    Args:
+        record: names that were asked for; None for all that a scene of this kind records by default.
+
+    Raises:
+        ConfigError: something was asked for that the scene hasn't got.
+    """
+    recorded: list[Recorded] = []
+    outputs: list[Symbolic] = []
+    for observable in _observables():
+        wanted = observable.by_default(m) if record is None else observable.name in record
+        if not wanted:
+            continue
+        if not observable.available(m):
+            if record is not None:
+                what = f'given "{observable.name}": this scene has none; leave it out'
+                raise ConfigError(Problem("[output] record", what))
+            continue
+        components = observable.expressions(m)
+        recorded.append(
+            Recorded(
+                observable.name,
+                observable.dims,
+                observable.units,
+                observable.long_name,
+                observable.frame,
+                len(outputs),
+                len(components),
+                observable.unit_exponents(m, len(components)),
+                observable.conserved(m) is not None,
+                observable.continuity(m),
+            )
+        )
+        outputs += components
+    return recorded, outputs
+
+
+def _observables() -> list[Observable]:
+    return list(OBSERVABLES.values())
+
+
+def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
+    """All that the scene conserves, with reasons.
+
+    Args:
+        norms: expressions that stay 1 by construction (of orbits carried as states).
+    """
+    found = []
+    for observable in _observables():
+        if observable.drift_scale is None or not observable.available(m):
+            continue
+        why = observable.conserved(m)
+        if why is None:
+            continue
+        scale, scale_name = observable.drift_scale(m)
+        expressions = observable.expressions(m)
+        found.append(
+            Invariant(
+                observable.name,
+                why,
+                observable.units,
+                observable.long_name,
+                expressions,
+                observable.unit_exponents(m, len(expressions)),
+                scale,
+                scale_name,
+            )
+        )
+    for number, expression in enumerate(norms):
+        found.append(
+            Invariant(f"orbit_norm_{number + 1}", "it is so by definition", "1",
+                      "norm of a cosine and sine that an orbit is carried by", [expression], [0],
+                      m.scene.context.one, "1", numerical=True)
+        )  # fmt: skip
+    if m.attitude is not None and m.attitude.defect is not None:
+        name, long_name, expression = m.attitude.defect
+        found.append(
+            Invariant(name, "it is so by definition", "1", long_name, [expression], [0],
+                      m.scene.context.one, "1", numerical=True)
+        )  # fmt: skip
+    if m.attitude is None and m.vertical is not None:
+        norm = hy.sqrt(hy.sum([v * v for v in m.vertical]))
+        found.append(
+            Invariant("vertical_norm", "it is so by definition", "1", "norm of the vertical in body axes",
+                      [norm], [0], m.scene.context.one, "1", numerical=True)
+        )  # fmt: skip
+    return found
+
+
+def drift_outputs(invariants: list[Invariant], context: Any, number: Rounder) -> list[Symbolic]:
+    """(value - initial) / scale; of a vector, the norm of the difference over the scale."""
+    drifts = []
+    first = 0
+    for invariant in invariants:
+        inverse = number(context.ldexp(1, invariant.exponents[0]) / invariant.scale)
+        differences = [x - hy.par[first + n] for n, x in enumerate(invariant.expressions)]
+        first += len(differences)
+        if len(differences) == 1:
+            drifts.append(inverse * differences[0])
+        else:
+            drifts.append(inverse * hy.sqrt(hy.sum([d * d for d in differences])))
+    return drifts

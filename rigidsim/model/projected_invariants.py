@@ -1,0 +1,93 @@
+"""Which of a scene's invariants are projected onto their initial values during a run, and why not the rest.
+
+An invariant that follows from others would only make the correction ill-determined, so each set is a small
+one: L in space axes stands for its norm, six products of rows for a matrix's orthogonality. Norms are taken
+squared, since a root has no gradient where it vanishes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.system import System
+
+
+@dataclass(frozen=True)
+class ProjectedScalar:
+    """One scalar that is projected.
+
+    Attributes:
+        name: of the invariant that it belongs to.
+        expression: of the states, internal units.
+        scale: what its drift is relative to, internal units (mpf).
+    """
+
+    name: str
+    expression: Symbolic
+    scale: Any
+
+
+# invariant: (present beside it, why it needn't be projected itself)
+_FOLLOWS = {
+    "angular_momentum_norm": ("angular_momentum", "its three components are projected"),
+    "energy": ("rotational_energy", "its rotational part is projected; nothing turns the flight's velocity"),
+}
+_NEVER = {"energy_balance": "it checks a work that is integrated beside the motion and doesn't act on it"}
+
+
+def _squared_rows(m: Mechanics) -> list[Symbolic]:
+    r = m.matrix
+    return [hy.sum([r[i][k] * r[j][k] for k in range(3)]) for i in range(3) for j in range(i + 1)]
+
+
+# What stands for a root that can vanish: its scalars, and their relative drift over the root's
+_SQUARES: dict[str, tuple[Callable[[Mechanics], list[Symbolic]], int]] = {
+    "angular_momentum_norm": (lambda m: [hy.sum([x * x for x in m.momentum_body])], 2),
+    "quaternion_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.attitude).variables])], 2),
+    "vertical_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.vertical)])], 2),
+    "orthogonality_defect": (_squared_rows, 1),
+}
+
+
+def projected_invariants(system: System) -> tuple[list[ProjectedScalar], list[tuple[str, str]]]:
+    """The scalars to project, and (invariant, why) for those that are not projected themselves.
+
+    Raises:
+        ConfigError: nothing is conserved.
+    """
+    m = system.mechanics
+    context = m.scene.context
+    present = {invariant.name for invariant in system.invariants}
+    projected: list[ProjectedScalar] = []
+    left_out: list[tuple[str, str]] = []
+    for invariant in system.invariants:
+        name = invariant.name
+        scale = context.ldexp(invariant.scale, -invariant.exponents[0])
+        stand_in, why = _FOLLOWS.get(name, ("", ""))
+        if stand_in in present:
+            left_out.append((name, why))
+        elif name in _NEVER:
+            left_out.append((name, _NEVER[name]))
+        elif name in _SQUARES:
+            expressions, factor = _SQUARES[name]
+            projected += [
+                ProjectedScalar(name, expression, factor * scale * scale) for expression in expressions(m)
+            ]
+        else:
+            projected += [ProjectedScalar(name, expression, scale) for expression in invariant.expressions]
+    if not projected:
+        raise ConfigError(
+            Problem(
+                "[integrator] hold_invariants",
+                f"given true, but the loads leave nothing constant that {system.requirements.formulation} "
+                'carries; set it to false, or choose formulation = "quaternion", whose norm can be projected',
+            )
+        )
+    return projected, left_out

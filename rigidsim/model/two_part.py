@@ -1,0 +1,87 @@
+"""Coefficients in two parts: what the working precision can't hold of them is not lost.
+
+A coefficient rounded once is wrong to one side, and so are the motion's frequencies: its phase by some eps t.
+Where invariants are projected nothing else grows as fast, so there each product c x becomes hi x + lo x.
+
+``hi`` has half the digits, not all: beside a product rounded to the last bit a part below half of that bit
+would always be rounded away again. With half the digits lo x reaches well into the sum, hi + lo is c to half
+as many digits again as the working precision has, and what is rounded is the product alone, to either side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.scene.arithmetic import negligible
+
+
+@dataclass(frozen=True)
+class TwoPart:
+    """A constant that is written out in two parts wherever it multiplies an expression.
+
+    Attributes:
+        high, low: the parts.
+        single: the nearest scalar, for sums: these are rounded to either side each time anyway.
+    """
+
+    high: Any
+    low: Any
+    single: Any
+
+    def __mul__(self, other: Any) -> Any:
+        if not isinstance(other, hy.expression):
+            return TwoPart(self.high * other, self.low * other, self.single * other)
+        return hy.sum([self.high * other, self.low * other])
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> TwoPart:
+        return TwoPart(-self.high, -self.low, -self.single)
+
+    def __add__(self, other: Any) -> Any:
+        return self.single + other
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return self.single - other
+
+    def __rsub__(self, other: Any) -> Any:
+        return other - self.single
+
+
+def as_factor(constant: Any) -> Any:
+    """A constant that only ever multiplies: in two parts, or an expression (0 and 1 vanish from products)."""
+    return constant if isinstance(constant, TwoPart) else hy.expression(constant)
+
+
+def rounded(constant: Any) -> Any:
+    """A constant of any use, as one scalar."""
+    return constant.single if isinstance(constant, TwoPart) else constant
+
+
+def in_two_parts(
+    number: Callable[[Any], Any], exact: Callable[[Any], Any], bits: int, context: Any
+) -> Callable[[Any], Any]:
+    """``number`` for coefficients in two parts; what it holds exactly stays a plain scalar.
+
+    Args:
+        number: from an mpf to the working precision's scalar, rounded once.
+        exact: from such a scalar to the mpf of the same value.
+        bits: of the working precision.
+        context: arithmetic with more than twice the working precision's digits.
+    """
+
+    def split(value: Any) -> Any:
+        single = number(value)
+        if abs(value - context.mpf(exact(single))) <= abs(value) * negligible(context):
+            return single  # exact, up to the scene's own rounding
+        mantissa, exponent = context.frexp(value)
+        high = context.ldexp(context.nint(context.ldexp(mantissa, bits // 2)), exponent - bits // 2)
+        return TwoPart(number(high), number(value - high), single)
+
+    return split

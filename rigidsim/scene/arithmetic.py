@@ -1,0 +1,105 @@
+"""The arithmetic in which a scene is worked out: mpmath, well past the run's own precision.
+
+Everything derived from the config (principal axes, normalised quaternions, pi, coefficients) is computed
+here and rounded once, to the working precision, where it enters the equations.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mpmath
+
+WORKING_BITS = {"single": 24, "double": 53, "extended": 64, "quadruple": 113}
+# Enough that cancellation in a derived constant (a difference of moments of 1e-15) still leaves every bit.
+GUARD_BITS = 128
+
+_LOST_BITS = 24
+"""Of the scene's precision, which a derived constant may have lost on its way: what is smaller than that
+beside its own terms is what rounding left of a zero. Far fewer than the guard bits: nothing real is lost."""
+
+Vector = list[Any]
+Matrix = list[list[Any]]
+
+
+def working_bits(precision: str | int) -> int:
+    """Bits of the significand of a precision's name, or of a number of decimal digits."""
+    if isinstance(precision, str):
+        return WORKING_BITS[precision]
+    return math.ceil(precision * math.log2(10)) + 2
+
+
+def context_for(precision: str | int) -> Any:
+    """An mpmath context of its own (never the global one) with guard bits."""
+    context = mpmath.MPContext()
+    context.prec = working_bits(precision) + GUARD_BITS
+    return context
+
+
+def negligible(context: Any) -> Any:
+    """The part of a quantity's size below which a difference of it is nothing but rounding."""
+    return context.mpf(2) ** (_LOST_BITS - context.prec)
+
+
+def dot(a: Vector, b: Vector) -> Any:
+    """Sum of products."""
+    return sum((x * y for x, y in zip(a, b, strict=True)), a[0] * 0)
+
+
+def norm(context: Any, a: Vector) -> Any:
+    """Euclidean length."""
+    return context.sqrt(dot(a, a))
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+
+
+def apply(matrix: Matrix, a: Vector) -> Vector:
+    """Matrix times vector."""
+    return [dot(row, a) for row in matrix]
+
+
+def transpose(matrix: Matrix) -> Matrix:
+    """Rows become columns."""
+    return [list(column) for column in zip(*matrix, strict=True)]
+
+
+def multiply(a: Matrix, b: Matrix) -> Matrix:
+    """Matrix product."""
+    columns = transpose(b)
+    return [[dot(row, column) for column in columns] for row in a]
+
+
+def diagonal(entries: Vector) -> Matrix:
+    """The 3x3 matrix with these on its diagonal."""
+    zero = entries[0] * 0
+    return [[entries[i] if i == j else zero for j in range(3)] for i in range(3)]
+
+
+def eigen(context: Any, matrix: Matrix) -> tuple[Vector, Matrix]:
+    """Principal values and axes of a symmetric 3x3 matrix.
+
+    Returns:
+        The values and, as rows, the right-handed unit axes. A diagonal matrix keeps its order and axes;
+        otherwise the values ascend and the first two axes have a positive largest component.
+    """
+    if all(matrix[i][j] == 0 for i in range(3) for j in range(3) if i != j):
+        one = context.one
+        return [matrix[i][i] for i in range(3)], diagonal([one, one, one])
+    scale = max(abs(x) for row in matrix for x in row)
+    values, vectors = context.eigsy(context.matrix(matrix) / scale)
+    axes = []
+    for k in range(2):
+        axis = [vectors[i, k] for i in range(3)]
+        largest = max(axis, key=abs)
+        length = norm(context, axis)
+        axes.append([x / length if largest > 0 else -x / length for x in axis])
+    axes.append(cross(axes[0], axes[1]))
+    return [values[k] * scale for k in range(3)], axes

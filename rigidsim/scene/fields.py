@@ -1,0 +1,79 @@
+"""The building blocks of the config's schema: exact quantities with units, vectors, and tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from rigidsim.scene.exact import ExactNumber, parse_number
+
+
+def refuse(text: str) -> PydanticCustomError:
+    """The error by which a validator refuses a value; the text is shown as it is."""
+    return PydanticCustomError("rigidsim", "{text}", {"text": text})
+
+
+def quantity(unit: str) -> Any:
+    """The annotated type of a number in the SI unit ``unit`` (see ``parse_number``)."""
+
+    def validate(value: Any) -> ExactNumber:
+        try:
+            return parse_number(value, unit)
+        except ValueError as error:
+            raise refuse(str(error)) from None
+
+    shown = {"anyOf": [{"type": "number"}, {"type": "string"}], "description": f"number, in {unit}"}
+    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(shown)]
+
+
+def _exactly(count: int) -> BeforeValidator:
+    def validate(value: Any) -> Any:
+        if isinstance(value, list) and len(value) != count:
+            raise refuse(f"given {len(value)} {'entry' if len(value) == 1 else 'entries'}; "
+                          f"exactly {count} are needed")  # fmt: skip
+        return value
+
+    return BeforeValidator(validate)
+
+
+T = TypeVar("T")
+Triple = Annotated[list[T], Field(min_length=3, max_length=3), _exactly(3)]
+"""A vector of three."""
+Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
+"""A quaternion."""
+
+
+if TYPE_CHECKING:
+    Dimensionless: TypeAlias = ExactNumber
+    Metre: TypeAlias = ExactNumber
+    Kilogram: TypeAlias = ExactNumber
+    Second: TypeAlias = ExactNumber
+    Moment: TypeAlias = ExactNumber
+    Rate: TypeAlias = ExactNumber
+    Angle: TypeAlias = ExactNumber
+    Momentum: TypeAlias = ExactNumber
+    Speed: TypeAlias = ExactNumber
+    Acceleration: TypeAlias = ExactNumber
+    GravitationalParameter: TypeAlias = ExactNumber
+    Damping: TypeAlias = ExactNumber
+else:
+    Dimensionless = quantity("1")
+    Metre = quantity("m")
+    Kilogram = quantity("kg")
+    Second = quantity("s")
+    Moment = quantity("kg m^2")
+    Rate = quantity("rad/s")
+    Angle = quantity("rad")
+    Momentum = quantity("kg m^2/s")
+    Speed = quantity("m/s")
+    Acceleration = quantity("m/s^2")
+    GravitationalParameter = quantity("m^3/s^2")
+    Damping = quantity("kg m^2/s")
+
+
+class ConfigTable(BaseModel):
+    """A TOML table: unknown keys are errors, values never change after reading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)

@@ -1,0 +1,63 @@
+"""A scene's expressions at its start: one without a finite value there is refused before anything runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene import attitude
+from rigidsim.scene.expressions import (
+    ATTITUDE_NAMES,
+    FLIGHT_NAMES,
+    RATE_NAMES,
+    Expression,
+    ExpressionError,
+    evaluate,
+    names_used,
+)
+from rigidsim.scene.scene import Scene
+
+
+def start_values(scene: Scene) -> dict[str, Any]:
+    """Values (mpf, SI) at the start of all names that expressions may use."""
+    sequence = scene.config.integrator.euler_sequence
+    angles = scene.euler_angles
+    if angles is None:
+        matrix = attitude.rotation_matrix(scene.quaternion)
+        angles = attitude.euler_from_matrix(scene.context, matrix, sequence)
+    found = {"t": scene.start}
+    found |= zip(RATE_NAMES, scene.angular_velocity, strict=True)
+    found |= zip(ATTITUDE_NAMES, [*scene.quaternion, *angles], strict=True)
+    if scene.position is not None and scene.velocity is not None:
+        found |= zip(FLIGHT_NAMES, [*scene.position, *scene.velocity], strict=True)
+    return found
+
+
+def check_start(scene: Scene) -> None:
+    """Evaluate the components of loads and the events once.
+
+    Raises:
+        ConfigError: some have no finite value; all of them are named.
+    """
+    values = start_values(scene)
+    problems = []
+    for load in scene.loads:
+        for where, expression in load.formulas():
+            problems += _check(where, expression, values, scene.context)
+    for number, event in enumerate(scene.events):
+        where = f"[[events]] number {number + 1} expression"
+        problems += _check(where, event.expression, values, scene.context)
+    if problems:
+        raise ConfigError(problems)
+
+
+def _check(where: str, expression: Expression, values: dict[str, Any], context: Any) -> list[Problem]:
+    try:
+        evaluate(expression, values, context)
+    except ExpressionError as error:
+        names = [name for name in values if name in names_used(expression)]
+        given = ", ".join(f"{name} = {context.nstr(values[name], 8)}" for name in names)
+        return [
+            Problem(where, f"no finite value at the start ({given}); start elsewhere or rewrite it: {error}")
+        ]
+    return []

@@ -1,0 +1,133 @@
+"""Kepler orbits that a config prescribes: their keys, and the elements worked out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.scene.exact import ZERO
+from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
+from rigidsim.scene.registry import Surroundings
+
+
+class Orbit(ConfigTable):
+    """A Kepler orbit of the attracting body, whose node and periapsis may move uniformly.
+
+    Angles are those at time zero of the scene, as classical elements in space axes. ``period`` replaces
+    the one of Kepler's third law.
+    """
+
+    semi_major_axis: Metre
+    eccentricity: Dimensionless = ZERO
+    inclination: Angle = ZERO
+    ascending_node: Angle = ZERO
+    periapsis: Angle = ZERO
+    mean_anomaly: Angle = ZERO
+    node_rate: Rate = ZERO
+    periapsis_rate: Rate = ZERO
+    period: Second | None = None
+
+
+@dataclass(frozen=True)
+class KeplerOrbit:
+    """Where an attracting body is, as elements at time zero (radians, m, rad/s) with secular rates.
+
+    A circle has no periapsis: what is given of it and of its motion is part of the anomaly and of the mean
+    motion here, and so is the node where the orbit lies in the plane from which inclinations count.
+
+    Attributes:
+        mean_motion: rad/s, from Kepler's third law or from the period that was given.
+    """
+
+    semi_major_axis: Any
+    eccentricity: Any
+    inclination: Any
+    ascending_node: Any
+    periapsis: Any
+    mean_anomaly: Any
+    node_rate: Any
+    periapsis_rate: Any
+    mean_motion: Any
+
+    def eccentric_anomaly(self, context: Any, time: Any) -> Any:
+        """Solution of Kepler's equation M = E - e sin E at a time, to the context's precision."""
+        mean = self.mean_anomaly + self.mean_motion * time
+        e = self.eccentricity
+        anomaly = mean + e * context.sin(mean)
+        # Newton converges quadratically; the count covers any precision from a start that is good to e^2
+        for _ in range(12 + int(context.prec).bit_length()):
+            step = (anomaly - e * context.sin(anomaly) - mean) / (1 - e * context.cos(anomaly))
+            anomaly -= step
+            if abs(step) <= context.ldexp(1, -context.prec // 2 - 2):
+                break
+        return anomaly
+
+    @property
+    def circular(self) -> bool:
+        """Whether the distance is constant."""
+        return bool(self.eccentricity == 0)
+
+    @property
+    def fixed_plane(self) -> bool:
+        """Whether neither node nor periapsis moves (a circle's periapsis never does)."""
+        return bool(self.node_rate == 0 and self.periapsis_rate == 0)
+
+    @property
+    def pericentre(self) -> Any:
+        """Least distance, m."""
+        return self.semi_major_axis * (1 - self.eccentricity)
+
+    def fastest_rate(self, context: Any) -> Any:
+        """Angular rate of the direction at pericentre, rad/s."""
+        e = self.eccentricity
+        return abs(self.mean_motion) * context.sqrt(1 - e * e) / (1 - e) ** 2
+
+
+def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> KeplerOrbit:
+    """Work out the elements.
+
+    Args:
+        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None where none is known.
+
+    Raises:
+        ConfigError: no such orbit.
+    """
+    context = around.context
+    axis, eccentricity = table.semi_major_axis.at(context), table.eccentricity.at(context)
+    if not axis > 0:
+        raise around.fault(
+            "orbit.semi_major_axis", f"given {context.nstr(axis, 8)} m; a positive length is allowed"
+        )
+    if not 0 <= eccentricity < 1:
+        raise around.fault(
+            "orbit.eccentricity",
+            f"given {context.nstr(eccentricity, 8)}; 0 (a circle) to below 1 is allowed",
+        )
+    if table.period is not None:
+        if table.period.sign <= 0:
+            raise around.fault("orbit.period", f"given {float(table.period):g} s; a positive time is allowed")
+        motion = 2 * context.pi / table.period.at(context)
+    elif strength is None:
+        raise around.fault(
+            "orbit.period", "missing; give it, or gravitational_parameter for the one of Kepler's third law"
+        )
+    else:
+        motion = context.sqrt(strength / axis**3)
+    node, node_rate = table.ascending_node.at(context), table.node_rate.at(context)
+    periapsis, periapsis_rate = table.periapsis.at(context), table.periapsis_rate.at(context)
+    anomaly, zero = table.mean_anomaly.at(context), context.zero
+    if table.inclination.sign == 0:  # node and periapsis turn about the same axis
+        periapsis, periapsis_rate, node, node_rate = periapsis + node, periapsis_rate + node_rate, zero, zero
+    if eccentricity == 0:
+        anomaly, motion, periapsis, periapsis_rate = anomaly + periapsis, motion + periapsis_rate, zero, zero
+    return KeplerOrbit(
+        semi_major_axis=axis,
+        eccentricity=eccentricity,
+        inclination=table.inclination.at(context),
+        ascending_node=node,
+        periapsis=periapsis,
+        mean_anomaly=anomaly,
+        node_rate=node_rate,
+        periapsis_rate=periapsis_rate,
+        mean_motion=motion,
+    )

@@ -1,0 +1,132 @@
+"""What can be named in a config beyond the schema itself: kinds of loads and observables.
+
+Both registries are empty here. The files of ``rigidsim.model`` that define a load or an observable enter it,
+so that a config, a schema or a message never needs a second list of names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions import Expression
+from rigidsim.scene.fields import ConfigTable
+
+
+class LoadFields(ConfigTable):
+    """Base of the keys that one kind of load takes; each adds ``kind: Literal["name"]``."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What the keys of a load are worked out against.
+
+    Attributes:
+        number: place of the load in the config, counted from 0.
+        context: arithmetic of the scene.
+        parameters: named constants of expressions.
+        center_of_mass: of the body, from its reference point, body axes, m (mpf).
+        free_flight: whether the body has a position.
+    """
+
+    number: int
+    context: Any
+    parameters: Mapping[str, ExactNumber]
+    center_of_mass: Vector
+    free_flight: bool
+
+    def fault(self, key: str, text: str) -> ConfigError:
+        """The error that names a key of this load."""
+        return ConfigError(Problem(f"[[loads]] number {self.number + 1} {key}".rstrip(), text))
+
+
+class SceneLoad:
+    """What a scene knows of a load; ``rigidsim.model.load.Load`` adds the mechanics.
+
+    Attributes:
+        Fields: its keys in a config; None for a load that only Python gives.
+        described: with an article, for sentences.
+        uniform_field: acceleration (mpf, m/s^2, space axes) of a field that is the same everywhere; such
+            loads add up to the scene's gravity. None for all others.
+    """
+
+    Fields: ClassVar[type[LoadFields] | None] = None
+    described: str = "a load"
+    uniform_field: Vector | None = None
+
+    @classmethod
+    def resolve(cls, fields: Any, around: Surroundings) -> SceneLoad:
+        """The load that the keys describe, every number worked out.
+
+        Args:
+            fields: an instance of ``Fields``.
+
+        Raises:
+            ConfigError: a contradiction or a value out of range.
+        """
+        raise NotImplementedError
+
+    def acts(self) -> bool:
+        """False for a load that is zero whatever happens."""
+        return True
+
+    def check(self, number: int, position: Vector | None) -> None:
+        """Refuse a load that this scene can't have.
+
+        Args:
+            number: its place in the config, counted from 0.
+            position: of the body's centre of mass; None where it has none.
+
+        Raises:
+            ConfigError: says what to do instead.
+        """
+
+    def formulas(self) -> Iterator[tuple[str, Expression]]:
+        """Where its expressions stand in the config, and the expressions, to be tried at the start."""
+        yield from ()
+
+
+class Named(Protocol):
+    """An observable, as far as a config needs to know it."""
+
+    @property
+    def name(self) -> str:
+        """By which a config asks for it."""
+
+
+LOAD_KINDS: dict[str, type[SceneLoad]] = {}
+"""Kinds of ``[[loads]]`` by name."""
+
+OBSERVABLES: dict[str, Any] = {}
+"""What can be recorded, by name, in the order in which a dataset holds it (``Named``)."""
+
+
+def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
+    """Enter a kind of load, so that ``[[loads]] kind = "..."`` finds it (usable as a class decorator).
+
+    Raises:
+        ValueError: it has no ``Fields``, or its name is taken.
+    """
+    if kind.Fields is None:
+        raise ValueError(f"{kind.__name__} has no Fields; a load of a config declares its keys there")
+    annotation = kind.Fields.model_fields["kind"].annotation
+    (name,) = annotation.__args__  # type: ignore[union-attr]
+    if LOAD_KINDS.get(name, kind).__qualname__ != kind.__qualname__:
+        raise ValueError(f'a load of kind "{name}" is registered already ({LOAD_KINDS[name].__name__})')
+    LOAD_KINDS[name] = kind
+    return kind
+
+
+def register_observable(observable: Named) -> None:
+    """Enter an observable, so that ``[output] record`` finds it.
+
+    Raises:
+        ValueError: its name is taken.
+    """
+    if observable.name in OBSERVABLES:
+        raise ValueError(f'an observable named "{observable.name}" is registered already')
+    OBSERVABLES[observable.name] = observable

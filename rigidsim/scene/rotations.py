@@ -1,0 +1,163 @@
+"""Rotations over any arithmetic: numbers of mpmath, numpy arrays, expressions of heyoka.
+
+Conventions: quaternions [w, x, y, z] and matrices R (lists of rows) rotate body axes to space axes; intrinsic
+Euler angles (a, b, c) of the sequence ijk mean R = R_i(a) R_j(b) R_k(c). No sequence is written out
+by hand. Every sum is taken in the order in which it stands here: results depend on it in their last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+from typing import Any, TypeAlias
+
+from rigidsim.scene.arithmetic import Matrix, Vector, transpose
+
+AXES = "xyz"
+Scalar: TypeAlias = Any  # whatever has +, -, * and /
+Sum = Callable[[Sequence[Scalar]], Scalar]
+
+
+def from_left(terms: Sequence[Scalar]) -> Scalar:
+    """Sum, one term after the other."""
+    return reduce(add, terms)
+
+
+def parity(i: int, j: int) -> int:
+    """+1 where axis j follows axis i cyclically (xy, yz, zx), else -1."""
+    return 1 if (j - i) % 3 == 1 else -1
+
+
+def product(p: Sequence[Scalar], q: Sequence[Scalar], total: Sum = from_left) -> Vector:
+    """Hamilton product p q (first q, then p, as rotations body to space)."""
+    pw, px, py, pz = p
+    qw, qx, qy, qz = q
+    return [
+        total([pw * qw, -(px * qx), -(py * qy), -(pz * qz)]),
+        total([pw * qx, px * qw, py * qz, -(pz * qy)]),
+        total([pw * qy, -(px * qz), py * qw, pz * qx]),
+        total([pw * qz, px * qy, -(py * qx), pz * qw]),
+    ]
+
+
+def rotation_matrix(q: Sequence[Scalar]) -> Matrix:
+    """R of a unit quaternion."""
+    w, x, y, z = q
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    return [
+        [ww + xx - yy - zz, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), ww - xx + yy - zz, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), ww - xx - yy + zz],
+    ]
+
+
+def shepperd(r: Matrix) -> tuple[Vector, dict[tuple[int, int], Scalar]]:
+    """4 q_n^2 and, for m < n, 4 q_m q_n of the quaternion q of R.
+
+    Shepperd 1978, J. Guidance and Control 1, 223: divided by the root of the largest square, no digits are
+    lost.
+    """
+    trace = r[0][0] + r[1][1] + r[2][2]
+    squares = [1.0 + trace] + [1.0 - trace + 2.0 * r[n][n] for n in range(3)]
+    pairs: dict[tuple[int, int], Scalar] = {}
+    for n in range(3):
+        j, k = (n + 1) % 3, (n + 2) % 3
+        pairs[0, n + 1] = r[k][j] - r[j][k]
+        pairs[min(n, j) + 1, max(n, j) + 1] = r[n][j] + r[j][n]
+    return squares, pairs
+
+
+@dataclass(frozen=True)
+class Rotations:
+    """Rotations in one arithmetic, which is known by its functions.
+
+    Attributes:
+        hypot: length of a vector of two.
+        constant: a small whole number.
+        negligible: whether a ``hypot`` of components of unit vectors is but rounding.
+        total: sum of some terms.
+    """
+
+    sin: Callable[[Scalar], Scalar]
+    cos: Callable[[Scalar], Scalar]
+    atan2: Callable[[Scalar, Scalar], Scalar]
+    hypot: Callable[[Scalar, Scalar], Scalar]
+    constant: Callable[[float], Scalar]
+    negligible: Callable[[Scalar], bool]
+    total: Sum = from_left
+
+    def multiply(self, a: Matrix, b: Matrix) -> Matrix:
+        """Matrix product."""
+        return [[self.total([a[i][m] * b[m][j] for m in range(3)]) for j in range(3)] for i in range(3)]
+
+    def apply(self, matrix: Matrix, vector: Vector) -> Vector:
+        """Matrix times vector."""
+        return [self.total([row[m] * vector[m] for m in range(3)]) for row in matrix]
+
+    def product(self, p: Vector, q: Vector) -> Vector:
+        """Hamilton product p q."""
+        return product(p, q, self.total)
+
+    def elementary(self, axis: int, angle: Scalar) -> Matrix:
+        """R_axis(angle), body to space: a right-handed turn of the body by ``angle`` about ``axis``."""
+        cosine, sine = self.cos(angle), self.sin(angle)
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        matrix = [[self.constant(float(r == c)) for c in range(3)] for r in range(3)]
+        matrix[j][j], matrix[j][k] = cosine, -sine
+        matrix[k][j], matrix[k][k] = sine, cosine
+        return matrix
+
+    def euler_matrix(self, sequence: str, angles: Vector) -> Matrix:
+        """R of intrinsic Euler angles (radians), body to space."""
+        axes = map(AXES.index, sequence)
+        return reduce(self.multiply, [self.elementary(*turn) for turn in zip(axes, angles, strict=True)])
+
+    def euler_rates(self, sequence: str, angles: Vector, rates: Vector) -> tuple[Vector, Scalar]:
+        """Time derivatives of Euler angles from body rates, and the factor that vanishes when they can't be.
+
+        With v = R_k(c) w, the rates w = R_k^T R_j^T e_i a' + R_k^T e_j b' + e_k c' become
+        v = R_j(b)^T e_i a' + e_j b' + e_k c'. The first term has no part along j; its part along the axis p
+        that is neither j nor k gives a', then b' and c' follow.
+
+        Returns:
+            (a', b', c') and the singular factor: +-sin(b) for proper sequences, +-cos(b) for the others.
+        """
+        i, j, k = map(AXES.index, sequence)
+        p = 3 - j - k
+        turned = self.apply(self.elementary(k, angles[2]), rates)
+        axis = transpose(self.elementary(j, angles[1]))
+        first = turned[p] / axis[p][i]
+        return [first, turned[j], turned[k] - axis[k][i] * first], axis[p][i]
+
+    def euler_from_matrix(self, sequence: str, r: Matrix) -> Vector:
+        """Intrinsic Euler angles of R: outer ones in (-pi, pi], the middle one in [0, pi] (proper) or
+        [-pi/2, pi/2], from its sine and cosine, so that no digits are lost near its ends.
+
+        In the singularity, where only a sum or difference of the outer angles is defined, the last is zero.
+        """
+        i, j, k = map(AXES.index, sequence)
+        m, e = 3 - i - j, parity(i, j)
+        atan2 = self.atan2
+        if i == k:
+            sine = self.hypot(r[i][j], r[i][m])
+            middle = atan2(sine, r[i][i])
+            if self.negligible(sine):
+                return [atan2(e * r[m][j], r[j][j]), middle, self.constant(0.0)]
+            return [atan2(r[j][i], -e * r[m][i]), middle, atan2(r[i][j], e * r[i][m])]
+        cosine = self.hypot(r[i][i], r[i][j])
+        middle = atan2(e * r[i][k], cosine)
+        if self.negligible(cosine):
+            return [atan2(e * r[k][j], r[j][j]), middle, self.constant(0.0)]
+        return [atan2(-e * r[j][k], r[k][k]), middle, atan2(-e * r[i][j], r[i][i])]
+
+    def quaternion_from_euler(self, sequence: str, angles: Vector) -> Vector:
+        """Unit quaternion of intrinsic Euler angles; it changes sign with each full turn of an angle."""
+        turns = []
+        for angle, axis in zip(angles, sequence, strict=True):
+            half = 0.5 * angle
+            turn = [self.cos(half)] + [self.constant(0.0)] * 3
+            turn[1 + AXES.index(axis)] = self.sin(half)
+            turns.append(turn)
+        return reduce(self.product, turns)

@@ -1,0 +1,83 @@
+"""Where an expression may change all at once: the parts of it that a step must not pass over.
+
+A pulse such as ``exp(-((t-50)/0.01)^2)`` or a switch such as ``tanh((t-5)/0.001)`` is flat almost everywhere:
+its Taylor series say nothing of what comes, and a step chosen by them passes over it. What happens there
+happens where the function's argument is of order one, and the argument itself isn't flat: see
+``rigidsim.model.step_limiter``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rigidsim.scene.expressions import Constant, Expression, Node, Operation, fold, operation
+
+WIDE = 4.0
+"""An argument that stays within this can't run through a function's whole transition."""
+_FLAT = frozenset({"exp", "sinh", "cosh", "tanh", "erf", "sigmoid", "atan"})
+"""Functions with an end at which they hardly change."""
+_STEEP_POWER = 8  # higher ones vanish to an order near that of the Taylor method
+_BOUNDED: Mapping[str, float] = {
+    "sin": 1, "cos": 1, "tanh": 1, "erf": 1, "sigmoid": 1, "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
+    "qw": 1, "qx": 1, "qy": 1, "qz": 1, "phi": 4, "theta": 4, "psi": 4,
+}  # fmt: skip
+
+
+def narrow_parts(expression: Expression) -> list[Expression]:
+    """Arguments of flat functions, denominators, and bases of negative or high powers, each once.
+
+    Left out are constants and what can't leave ``WIDE``, such as a sine.
+    """
+    found: dict[Node, None] = {}
+    waiting = [expression.root]
+    while waiting:
+        node = waiting.pop()
+        if not isinstance(node, Operation):
+            continue
+        waiting += node.operands
+        part: Node | None = None
+        if node.operator in _FLAT:
+            part = node.operands[0]
+        elif node.operator == "quotient":
+            part = node.operands[1]
+        elif node.operator == "power":
+            base, power = node.operands
+            exponent = abs(_bound(Expression(expression.text, power), signed=True))
+            if exponent > _STEEP_POWER and isinstance(power, Constant):  # flat to a part in n of the base
+                part = operation("product", (power, base), base.span)
+            elif not isinstance(power, Constant) or power.value.sign < 0:
+                part = base
+        if part is not None and _bound(Expression(expression.text, part)) > WIDE:
+            found[part] = None
+    return [Expression(expression.text, part) for part in found if not _constant(part)]
+
+
+def _constant(node: Node) -> bool:
+    return isinstance(node, Constant)
+
+
+def _bound(expression: Expression, *, signed: bool = False) -> float:
+    """Upper bound of the absolute value, infinite where there is none; ``signed``: a number as it is."""
+
+    def combine(node: Node, operands: list[Any]) -> float:
+        if isinstance(node, Constant):
+            value = float(node.value)
+            return value if signed else abs(value)
+        if not isinstance(node, Operation):
+            return _BOUNDED.get(node.name, math.inf)
+        if node.operator in _BOUNDED:
+            return _BOUNDED[node.operator]
+        if node.operator == "sum":
+            return float(sum(operands))
+        if node.operator == "negative":
+            return float(-operands[0] if signed else operands[0])
+        if node.operator == "product":
+            return 0.0 if 0 in operands else math.prod(operands)
+        if node.operator == "power" and isinstance(node.operands[1], Constant):
+            exponent = float(node.operands[1].value)
+            return operands[0] ** exponent if exponent > 0 and operands[0] < 1e4 else math.inf
+        return math.inf
+
+    return float(fold(expression, combine))

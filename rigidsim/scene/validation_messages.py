@@ -1,0 +1,181 @@
+"""Turns what the schema validator reports into messages that name the key and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterable, Mapping
+from decimal import Decimal
+from itertools import islice
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from rigidsim.errors import ConfigError, Problem
+
+_LATER: dict[tuple[str, ...], str] = {
+    ("sweep",): "sweeps are not in this version yet",
+}
+_TABLES = (
+    "body",
+    "initial",
+    "loads",
+    "time",
+    "integrator",
+    "output",
+    "limits",
+    "parameters",
+    "events",
+    "sweep",
+)
+_ARRAYS_OF_TABLES = ("loads", "events")
+_MOST_PROBLEMS = 200  # worth telling; a file of a million wrong keys has said enough by then
+_LONGEST_NAME = 60
+LONGEST_INTEGER = 10_000  # bits; Python refuses to write out integers not much longer
+
+
+def shown(value: Any) -> str:
+    """A value of a TOML file as the user would write it, shortened, for messages."""
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list):
+        inside = ", ".join(shown(x) for x in value[:4])
+        return f"[{inside}{', ...' if len(value) > 4 else ''}]"
+    if isinstance(value, str):
+        return f'"{value}"' if len(value) <= 60 else f'"{value[:57]}..."'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and value.bit_length() > 200:
+        if value.bit_length() > LONGEST_INTEGER:
+            return f"a whole number of {value.bit_length()} bits"
+        value = Decimal(value).normalize()
+    text = str(value).lower().replace("infinity", "inf")
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def nearest(given: str, allowed: Iterable[str]) -> str:
+    """``; did you mean "x"?`` when something close is allowed, else an empty text."""
+    if len(given) > _LONGEST_NAME:  # comparing takes time, and nothing allowed is near
+        return ""
+    close = difflib.get_close_matches(given, list(allowed), n=1, cutoff=0.6)
+    return f'; did you mean "{close[0]}"?' if close else ""
+
+
+def key_path(location: Iterable[str | int]) -> str:
+    """A key's path as it is written in TOML: ``[body] principal_moments[1]``."""
+    parts = list(location)
+    if not parts:
+        return "config"
+    if parts[0] in _TABLES:
+        head, rest = f"[{parts[0]}]", parts[1:]
+        if parts[0] in _ARRAYS_OF_TABLES:
+            head = f"[[{parts[0]}]]"
+            if rest and isinstance(rest[0], int):
+                head, rest = f"{head} number {rest[0] + 1}", rest[1:]
+    else:
+        head, rest = "", parts
+    path = "".join(f"[{p}]" if isinstance(p, int) else f".{_key(p)}" for p in rest).removeprefix(".")
+    return f"{head} {path}".strip()
+
+
+def _key(key: str) -> str:
+    """A key as it is; one that is empty, long or can't be seen stands in quotes, shortened."""
+    return key if 0 < len(key) <= 60 and key.isprintable() and key.strip() else shown(key)
+
+
+def later_features(table: Mapping[str, Any]) -> list[Problem]:
+    """Keys of the interface that this version knows of but doesn't carry out."""
+    problems = []
+    for path, why in _LATER.items():
+        if _value_at(table, path) is not None:
+            problems.append(Problem(key_path(path), why + "; remove the key"))
+    return problems
+
+
+def _value_at(table: Any, path: tuple[str, ...]) -> Any:
+    for key in path:
+        if not isinstance(table, Mapping) or key not in table:
+            return None
+        table = table[key]
+    return table
+
+
+def _model_at(
+    model: type[BaseModel], location: tuple[str | int, ...], alternatives: Collection[str]
+) -> type[BaseModel] | None:
+    """The table that holds the last key of ``location``, in which alternatives go by their ``kind``."""
+    candidates = [model]
+    for key in location[:-1]:
+        if isinstance(key, int):
+            continue
+        if key in alternatives:
+            candidates = [m for m in candidates if key in _kinds(m)] or candidates
+            continue
+        fields = [m.model_fields[key] for m in candidates if key in m.model_fields]
+        candidates = [m for field in fields for m in _models(field.annotation)]
+    return candidates[0] if candidates else None
+
+
+def _kinds(model: type[BaseModel]) -> tuple[Any, ...]:
+    field = model.model_fields.get("kind")
+    return get_args(field.annotation) if field else ()
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for argument in get_args(annotation) for model in _models(argument)]
+
+
+def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    location, given = tuple(error["loc"]), error["input"]
+    if kind == "extra_forbidden":
+        fields = sorted(table.model_fields) if table else []
+        near = nearest(str(location[-1]), fields)
+        return f"unknown key{near}; allowed: {', '.join(fields)}"
+    if kind in ("missing", "union_tag_not_found"):
+        return "missing; it must be given"
+    if kind in ("literal_error", "union_tag_invalid"):
+        allowed = context.get("expected", context.get("expected_tags", ""))
+        allowed = allowed.replace("'", "").replace(" or ", ", ")
+        names = [part.strip() for part in allowed.split(",")]
+        return f"given {shown(given)}{nearest(shown(given), names)}; allowed: {', '.join(names)}"
+    if kind == "too_short":  # arrays of fixed length report theirs themselves
+        return "given an empty array; at least one entry is needed"
+    if kind == "kind_of_value":
+        return f"given {shown(given)}; {error['msg']}"
+    if kind in ("list_type", "model_type", "model_attributes_type"):
+        wanted = "an array" if kind == "list_type" else "a table"
+        return f"given {shown(given)}; {wanted} is allowed"
+    if kind in ("int_type", "int_from_float"):
+        return f"given {shown(given)}; a whole number, without point or exponent, is allowed"
+    if kind == "string_type":
+        return f"given {shown(given)}; a string is allowed"
+    if kind == "bool_type":
+        return f"given {shown(given)}; true or false is allowed"
+    if kind == "greater_than_equal":
+        return f"given {shown(given)}; at least {context['ge']} is allowed"
+    return str(error["msg"])
+
+
+def config_error(
+    model: type[BaseModel], error: ValidationError, alternatives: Collection[str]
+) -> ConfigError:
+    """All that the validator found, one problem per key, in the words of ``Problem``.
+
+    Args:
+        alternatives: names of unions' alternatives, which are no part of the user's key.
+    """
+    problems: dict[str, Problem] = {}
+    for item in islice(error.errors(include_url=False), _MOST_PROBLEMS):
+        # the alternatives of a union each report; their names are no part of the user's key
+        location = tuple(part for part in item["loc"] if part not in alternatives)
+        given = item["input"]
+        if item["type"].startswith("union_tag"):  # a table told apart by its kind: the key at fault is kind
+            location = (*location, "kind")
+            given = _value_at(given, ("kind",))
+        where = key_path(location)
+        table = _model_at(model, tuple(item["loc"]), alternatives)
+        problem = Problem(where, _what(table, {**item, "loc": location, "input": given}))
+        problems.setdefault(where, problem)
+    return ConfigError(list(problems.values()))

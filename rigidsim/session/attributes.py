@@ -1,0 +1,87 @@
+"""The root attributes of a run's files, filled."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from rigidsim.session.timings import Effort
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.status import Status
+from rigidsim.solve.stepper import Stepper
+from rigidsim.store import provenance
+from rigidsim.store.attributes import RootAttributes
+from rigidsim.store.summary import Summary
+from rigidsim.store.variables import SCHEMA_VERSION
+
+
+def root_attributes(
+    prepared: InitialValueProblem, stepper: Stepper, run_id: str, mixed: str = ""
+) -> RootAttributes:
+    """Of segments, and of a dataset before its end is known.
+
+    Args:
+        run_id: tells this run from all others.
+        mixed: what changed in versions or machine since the run began; empty where nothing did.
+    """
+    scene, system = prepared.scene, prepared.system
+    platform: dict[str, Any] = {f"version_{k}": v for k, v in provenance.versions().items()}
+    platform |= {f"code_{k}": v for k, v in provenance.code_target(stepper.integrator).items()}
+    exponents = {
+        "time": system.scaling.time,
+        "inertia": system.scaling.inertia,
+        "states": system.state_exponents,
+    }
+    return RootAttributes(
+        Conventions="CF-1.11",
+        title=scene.name,
+        comment=scene.description,
+        source="rigidsim",
+        run_id=run_id,
+        schema_version=SCHEMA_VERSION,
+        status=Status.RUNNING.value,
+        config=prepared.experiment.text,
+        config_sha256=prepared.experiment.sha256,
+        formulation=system.requirements.formulation,
+        euler_sequence=system.sequence,
+        euler_partner_sequence="" if system.partner is None else system.partner.sequence,
+        states=" ".join(system.states),
+        precision=prepared.precision.name,
+        precision_bits=prepared.precision.bits,
+        tolerance=prepared.effective_tolerance,
+        integrator="heyoka Taylor, natural steps, dense output"
+        if prepared.closed is None
+        else prepared.closed.title,
+        method=scene.config.integrator.method,
+        hold_invariants=int(prepared.holds_invariants),
+        taylor_order=int(stepper.integrator.order),
+        compact_mode=int(prepared.precision.compact or system.wide),
+        high_accuracy=0,
+        batch_size=1,
+        unit_exponents=json.dumps(exponents),
+        principal_moments=json.dumps([float(m) for m in scene.body.principal_moments]),
+        principal_axes=json.dumps([[float(x) for x in a] for a in scene.body.principal_axes]),
+        inertia_tensor=json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
+        body_source=scene.body.source,
+        drawing=json.dumps(scene.body.drawing),
+        python_loads=" ".join(type(load).__name__ for load in prepared.python_loads),
+        cpu_model=provenance.cpu_model(),
+        started_at=provenance.now(),
+        **platform,
+        mixed_provenance=mixed or None,
+    )
+
+
+def of_complete(attributes: RootAttributes, summary: Summary, effort: Effort) -> RootAttributes:
+    """Those of the dataset of a run that ended."""
+    put_back = {name: row.put_back for name, row in summary.invariants.items()}
+    return attributes.having(
+        status=summary.status,
+        status_message=summary.message,
+        warnings="\n".join(summary.warnings),
+        steps=summary.cost.steps,
+        wall_seconds=effort.wall,
+        cpu_seconds=effort.cpu,
+        finished_at=provenance.now(),
+        put_back=json.dumps(put_back) if summary.hold_invariants else None,
+    )

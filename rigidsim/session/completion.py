@@ -1,0 +1,106 @@
+"""The end of a run's files: segments to dataset, dataset to timeline, and the summary beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigidsim.errors import StoppedWritingError
+from rigidsim.session.attributes import of_complete
+from rigidsim.session.guards import Observer
+from rigidsim.session.recorder import Recorder
+from rigidsim.session.summary import cost_so_far
+from rigidsim.session.timings import Effort, Phases
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.sampler import Sampler
+from rigidsim.solve.status import Status
+from rigidsim.store import provenance
+from rigidsim.store.attributes import RootAttributes
+from rigidsim.store.folder import RunFolder
+from rigidsim.store.segments import SegmentWriter
+from rigidsim.store.summary import Summary
+from rigidsim.store.validated_open import open_dataset
+from rigidsim.store.variables import Extra
+
+
+@dataclass
+class Completion:
+    """Completes a run that ended for good.
+
+    Attributes:
+        summary: all but the files' digests at first; replaced as they become known.
+        extras: variables with dimensions of their own.
+    """
+
+    prepared: InitialValueProblem
+    folder: RunFolder
+    writer: SegmentWriter
+    recorder: Recorder
+    loop: Sampler
+    attributes: RootAttributes
+    extras: Sequence[Extra]
+    phases: Phases
+    effort: Effort
+    observer: Observer
+    summary: Summary
+
+    def complete(self) -> Summary:
+        """Write the files; a Ctrl-C leaves what can be resumed from, and the summary returned says so.
+
+        Raises:
+            RunFolderError: the folder can't be written.
+        """
+        try:
+            self._write_dataset()
+            self._draw_timeline()
+        except KeyboardInterrupt:
+            kept = "the dataset is complete, the timeline is missing"
+            if self.folder.segments.exists():
+                self.recorder.save(self.loop.position())
+                kept = "all samples are saved as segments"
+            self.summary = self.summary.having(
+                status=Status.INTERRUPTED.value,
+                message=f"interrupted after the integration; {kept}",
+                exit_code=Status.INTERRUPTED.exit_code,
+            )
+        return self.summary
+
+    def _write_dataset(self) -> None:
+        self.observer.phase("dataset")
+        checkpoint = None
+        if self.loop.progress.status is Status.FINISHED:
+            arrays = self.recorder.packed(self.loop.position())
+            checkpoint = self.folder.checkpoint, arrays, self.recorder.all_events()
+        self.writer.complete(
+            self.folder.dataset,
+            of_complete(self.attributes, self.summary, self.effort).as_dict(),
+            self.extras,
+            checkpoint=checkpoint,
+            conclude=self._conclude,
+        )
+        self.phases.next("dataset")
+
+    def _conclude(self) -> None:
+        """The dataset is in place, the segments are still there."""
+        cost = cost_so_far(self.prepared, self.loop.progress, self.phases, self.effort)
+        self.summary = self.summary.having(cost=cost, dataset_sha256=self.writer.dataset_sha256)
+        self.folder.write_summary(self.summary)
+
+    def _draw_timeline(self) -> None:
+        output, path = self.prepared.scene.config.output, self.folder.timeline
+        if not output.timeline or not self.summary.samples:
+            return
+        from rigidsim.look.timeline import write_timeline
+
+        self.observer.phase("timeline")
+        try:
+            with open_dataset(self.folder.dataset, indexed=False) as dataset:  # memory goes with the rows
+                write_timeline(dataset, path, rows=output.timeline_rows)
+        except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
+            why = error.strerror if isinstance(error, OSError) else None
+            raise StoppedWritingError(
+                f"{path}: can't be written: {why or error}; the dataset is complete, and rigidsim view draws "
+                "the timeline once that is possible"
+            ) from None
+        self.summary = self.summary.having(timeline_sha256=provenance.file_sha256(path))
+        self.phases.next("timeline")

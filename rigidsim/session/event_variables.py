@@ -1,0 +1,58 @@
+"""Events as variables of the dataset: for each event its times and everything recorded, at full precision."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidsim.session.variables import recorded_variables
+from rigidsim.solve.evaluate import Evaluator, RecordedParts
+from rigidsim.solve.events import EventLog, samples_at
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.store.variables import Extra, Variable
+
+
+def event_variables(
+    prepared: InitialValueProblem, log: EventLog, evaluator: Evaluator, last: float
+) -> list[Extra]:
+    """``NAME_time`` and ``NAME_<variable>`` along a dimension ``NAME``, with residuals beyond double.
+
+    Args:
+        last: time of the run's last sample, internal units; steps, and crossings, go past it.
+    """
+    extras: list[Extra] = []
+    variables = recorded_variables(prepared)
+    for index, crossing in enumerate(prepared.system.crossings):
+        found = log.occurrences(index, last)
+        count = len(found)
+        values: RecordedParts = {}
+        times = prepared.clock.internal(0, 0)
+        if found:
+            block = samples_at(found, prepared.precision)
+            values, times = evaluator.evaluate_apart(block), block.times
+        exponent = prepared.clock.exponent
+        values["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]
+        for variable in variables:
+            empty = [np.zeros((0, int(np.prod(variable.shape))))] * variable.parts
+            extras += _extras(crossing.name, variable, values.get(variable.name, empty), count)
+    return extras
+
+
+def _extras(event: str, variable: Variable, parts: list[np.ndarray], count: int) -> list[Extra]:
+    dims = (event, *variable.dims)
+    return [
+        Extra(
+            f"{event}_{name}",
+            dims,
+            values.reshape(count, *variable.shape),
+            {**variable.part_attributes(part), "event": event},
+        )
+        for part, (name, values) in enumerate(zip(variable.part_names(), parts, strict=True))
+    ]
+
+
+def event_counts(prepared: InitialValueProblem, log: EventLog, last: float) -> dict[str, int]:
+    """How often each event was found."""
+    return {
+        crossing.name: len(log.occurrences(index, last))
+        for index, crossing in enumerate(prepared.system.crossings)
+    }

@@ -1,0 +1,97 @@
+"""What looks after a run between two chunks of steps: observers, signals and the guards of ``[limits]``."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rigidsim.session.statistics import SampleStatistics
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.sampler import Progress
+from rigidsim.solve.status import Status
+
+
+class Observer:
+    """Is told how a run goes; the command line draws a progress bar with it. Does nothing by itself."""
+
+    def started(self, prepared: InitialValueProblem, folder: Path) -> None:
+        """The equations are compiled; integration begins."""
+
+    def progressed(self, progress: Progress) -> None:
+        """Called between chunks, at most some tens of times per second."""
+
+    def phase(self, name: str) -> None:
+        """A new phase begins: "integrate", "lyapunov", "dataset", "timeline", "certify"."""
+
+    def choosing(self, name: str) -> None:
+        """Settings for the run of this name are about to be chosen, by trials; its integration follows."""
+
+    def trying(self, title: str, fraction: float) -> None:
+        """A trial for the choice or the certificate has come so far; some tens of times per second."""
+
+
+class Interruption:
+    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Handle the signals inside the block (in the main thread, the only one that gets them)."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def note(*_: object) -> None:
+            self.requested = True
+
+        before = {s: signal.signal(s, note) for s in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+class Guards:
+    """The checks between chunks; ``wall_time`` and ``max_steps`` count anew in each session of a run."""
+
+    def __init__(
+        self,
+        prepared: InitialValueProblem,
+        statistics: SampleStatistics,
+        interruption: Interruption,
+        observer: Observer,
+        *,
+        steps_before: int = 0,
+    ) -> None:
+        limits = prepared.scene.config.limits
+        self._wall = None if limits.wall_time is None else float(limits.wall_time)
+        self._drift = None if limits.max_drift is None else float(limits.max_drift)
+        self._steps = None if limits.max_steps is None else limits.max_steps + steps_before
+        self._statistics = statistics
+        self._interruption = interruption
+        self._observer = observer
+        self._started = time.monotonic()
+        self._reported = 0.0
+
+    def __call__(self, progress: Progress) -> Status | None:
+        """The status that ends the run now; None where nothing does."""
+        now = time.monotonic()
+        if now - self._reported > 0.05:
+            self._reported = now
+            self._observer.progressed(progress)
+        if self._interruption.requested:
+            return Status.INTERRUPTED
+        if self._wall is not None and now - self._started > self._wall:
+            return Status.WALL_TIME
+        if self._steps is not None and progress.steps >= self._steps:
+            return Status.MAX_STEPS
+        if self._drift is not None and max(self._statistics.largest.values(), default=0.0) > self._drift:
+            return Status.MAX_DRIFT
+        return None

@@ -1,0 +1,92 @@
+"""The Lyapunov spectrum of a run, saved on the way: it costs tens of times what the run does."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
+from rigidsim.session.guards import Interruption
+from rigidsim.solve.lyapunov import Convergence, LyapunovSpectrum, lyapunov_spectrum
+from rigidsim.solve.problem import InitialValueProblem, double_twin
+from rigidsim.store import atomic, netcdf
+from rigidsim.store.folder import RunFolder
+from rigidsim.store.seal import check_seal, sealed
+from rigidsim.store.variables import SCHEMA_VERSION, Extra
+
+
+def spectrum_of(
+    prepared: InitialValueProblem,
+    folder: RunFolder,
+    run_id: str,
+    interruption: Interruption,
+    save_seconds: float,
+) -> LyapunovSpectrum | None:
+    """Integrate the variational equations, or what is left of them.
+
+    Args:
+        save_seconds: between saving what is known.
+
+    Returns:
+        The spectrum; None where it was interrupted, or stopped being finite.
+
+    Raises:
+        RunFolderError: the folder can't be written.
+    """
+    clock = prepared.clock
+    system = double_twin(prepared)
+    path = folder.segments / "lyapunov.h5"
+    saved = time.monotonic()
+
+    def go_on(done: Convergence) -> bool:
+        nonlocal saved
+        stop = interruption.requested
+        if stop or time.monotonic() - saved >= save_seconds:
+            _save(path, done, run_id)
+            saved = time.monotonic()
+        return not stop
+
+    start, end = float(clock.start), float(clock.at(clock.count - 1))
+    return lyapunov_spectrum(system, start, end, go_on, _saved(path, run_id))
+
+
+def _save(path: Path, done: Convergence, run_id: str) -> None:
+    labels = {"run_id": run_id, "schema_version": SCHEMA_VERSION}
+    content = sealed(netcdf.image([], {}, 0, labels, {"lyapunov": done.arrays()}))
+    try:
+        atomic.write_bytes(path, content)
+    except OSError as error:
+        raise StoppedWritingError(
+            f"{path}: can't be written: {error.strerror or error}; all samples are saved as segments, and "
+            f"{once_mended(error)}, rigidsim resume continues with the exponents"
+        ) from None
+
+
+def _saved(path: Path, run_id: str) -> Convergence | None:
+    """What an earlier session saved; what doesn't belong to this run, or is damaged, is worked out anew."""
+    if not path.exists():
+        return None
+    try:
+        check_seal(path)
+        with netcdf.reading(path) as file:
+            if str(file.attrs.get("run_id", "")) != run_id:
+                return None
+        return Convergence.from_arrays(netcdf.read_group(path, "lyapunov"))
+    except (RunFolderError, KeyError):
+        return None
+
+
+def lyapunov_variables(spectrum: LyapunovSpectrum | None) -> list[Extra]:
+    """The convergence of the exponents, as variables of the dataset."""
+    if spectrum is None:
+        return []
+    along = {"units": "s", "long_name": "time since the run's start, of the estimates"}
+    what = {
+        "units": "s-1",
+        "long_name": "Lyapunov exponents of the scaled states so far, largest first",
+        "states": " ".join(spectrum.states),
+    }
+    return [
+        Extra("lyapunov_time", ("lyapunov_time",), spectrum.times, along),
+        Extra("lyapunov_exponents", ("lyapunov_time", "lyapunov_index"), spectrum.exponents, what),
+    ]

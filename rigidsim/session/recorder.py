@@ -1,0 +1,111 @@
+"""What becomes of a run's samples: evaluated, watched, and written to segments together with checkpoints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigidsim.session.statistics import SampleStatistics
+from rigidsim.session.timings import Effort
+from rigidsim.session.variables import drift_name, put_back_name
+from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
+from rigidsim.solve.checkpoint_arrays import pack_checkpoint, pack_events
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.events import EventLog
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.projection import put_back_by_invariant
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.store.segments import SegmentWriter
+
+Arrays = dict[str, np.ndarray]
+
+
+class Recorder(SampleReceiver):
+    """The receiver of a run's samples.
+
+    Attributes:
+        statistics: what the summary says of all samples.
+        progress: of the run; set when it begins.
+    """
+
+    progress: Progress
+
+    def __init__(
+        self,
+        prepared: InitialValueProblem,
+        evaluator: Evaluator,
+        writer: SegmentWriter,
+        log: EventLog,
+        effort: Effort,
+    ) -> None:
+        self._prepared = prepared
+        self._evaluator = evaluator
+        self._writer = writer
+        self._log = log
+        self._effort = effort
+        self._events_saved = len(log.found)
+        self.statistics = SampleStatistics()
+
+    def take(self, block: SampleBlock) -> None:
+        """Evaluate and collect samples."""
+        recorded = self._evaluator.evaluate(block)
+        exponent = self._prepared.clock.exponent
+        recorded["time"] = [np.ldexp(part, exponent) for part in self._prepared.precision.parts(block.times)]
+        for invariant in self._prepared.system.invariants:
+            self.statistics.see(invariant.name, recorded[drift_name(invariant.name)][0][:, 0])
+        for name, values in put_back_by_invariant(self._prepared.projected_scalars, block.put_back).items():
+            recorded[put_back_name(name)] = [values[:, None]]
+            self.statistics.put_back[name] = float(values[-1])
+        factors = self._evaluator.singular_factors(block.states, block.chart)
+        if factors is not None:
+            self.statistics.see_singular(factors, recorded["time"][0])
+        self._writer.add(recorded)
+
+    def due(self) -> bool:
+        """Whether what is collected is much, or the last segment old."""
+        return self._writer.due
+
+    def save(self, position: Position) -> None:
+        """Write a segment; on return all samples taken, and the way on from there, are saved."""
+        events = pack_events(self._log.found[self._events_saved :], self._prepared.precision)
+        self._writer.flush(self.packed(position), events)
+        self._events_saved = len(self._log.found)
+
+    def packed(self, position: Position) -> Arrays:
+        """The checkpoint at a position as arrays, with what the summary will say of the samples so far."""
+        seen, progress, effort = self.statistics, self.progress, self._effort
+        statistics = Statistics(
+            largest_drift=seen.largest,
+            final_drift=seen.final,
+            put_back=seen.put_back,
+            nearest_singularity=seen.nearest_singularity,
+            singularity_time=seen.singularity_time,
+            smallest_step=progress.smallest_step,
+            largest_step=progress.largest_step,
+            redone_steps=progress.redone_steps,
+            sessions=effort.sessions,
+            wall_seconds=effort.wall,
+            cpu_seconds=effort.cpu,
+            integration_seconds=progress.integration_seconds,
+        )
+        checkpoint = Checkpoint(position, self._evaluator.continuity, statistics)
+        names = [invariant.name for invariant in self._prepared.system.invariants]
+        return pack_checkpoint(checkpoint, self._prepared.precision, names)
+
+    def all_events(self) -> Arrays:
+        """Every crossing so far."""
+        return pack_events(self._log.found, self._prepared.precision)
+
+    def restore(self, statistics: Statistics) -> None:
+        """Go on counting from an earlier session's checkpoint; ``progress`` is set by then."""
+        seen, progress, effort = self.statistics, self.progress, self._effort
+        seen.largest |= statistics.largest_drift
+        seen.final |= statistics.final_drift
+        seen.put_back |= statistics.put_back
+        seen.nearest_singularity = statistics.nearest_singularity
+        seen.singularity_time = statistics.singularity_time
+        progress.smallest_step, progress.largest_step = statistics.smallest_step, statistics.largest_step
+        progress.redone_steps = statistics.redone_steps
+        progress.integration_seconds = statistics.integration_seconds
+        effort.wall_seconds, effort.cpu_seconds = statistics.wall_seconds, statistics.cpu_seconds
+        effort.sessions = statistics.sessions + 1

@@ -1,0 +1,44 @@
+"""A run's last checkpoint, restored into all that continues from it."""
+
+from __future__ import annotations
+
+from rigidsim.errors import RunFolderError
+from rigidsim.solve.checkpoint import Checkpoint
+from rigidsim.solve.checkpoint_arrays import unpack_checkpoint, unpack_events
+from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.events import EventLog
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.store import netcdf
+from rigidsim.store.segments import Chain, root_attributes
+
+
+def restore(
+    chain: Chain,
+    prepared: InitialValueProblem,
+    corrected: CorrectedStepper,
+    evaluator: Evaluator,
+    log: EventLog,
+) -> Checkpoint:
+    """Put a checkpoint into a fresh evaluator and event log; the integration and the recorder take
+    theirs from the result.
+
+    Raises:
+        RunFolderError: the checkpoint belongs to another system.
+    """
+    states = len(prepared.system.states)
+    try:
+        arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
+        names = [invariant.name for invariant in prepared.system.invariants]
+        checkpoint = unpack_checkpoint(arrays, prepared.precision, names, corrected.boundary())
+        for path in chain.paths:
+            if "previous_seal" in root_attributes(path):
+                saved = netcdf.read_group(path, "events")
+                log.found += unpack_events(saved, prepared.precision, states)
+        position = checkpoint.position
+        if position.boundary.mark.events != len(log.found) or position.next_sample != chain.rows:
+            raise ValueError("its counts don't agree with what the segments hold")
+    except (KeyError, ValueError) as error:
+        raise RunFolderError(f"{chain.paths[-1]}: cannot be resumed from: {error}") from None
+    evaluator.continuity = checkpoint.continuity
+    return checkpoint

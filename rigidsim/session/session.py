@@ -1,0 +1,121 @@
+"""One session of a run: integrate and save segments; where the run ended, complete its files; summarise."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass, field
+
+from rigidsim.accuracy.error_law import motion_growth
+from rigidsim.session.attributes import root_attributes
+from rigidsim.session.completion import Completion
+from rigidsim.session.diagnostics import Diagnostics, growth_by_spectrum
+from rigidsim.session.event_variables import event_counts, event_variables
+from rigidsim.session.guards import Guards, Interruption, Observer
+from rigidsim.session.lyapunov import lyapunov_variables, spectrum_of
+from rigidsim.session.recorder import Recorder
+from rigidsim.session.restore import restore
+from rigidsim.session.summary import chart_changes, closing_words, cost_so_far, summarise
+from rigidsim.session.timings import Effort, Phases
+from rigidsim.session.tuning import Tuning
+from rigidsim.session.variables import dataset_variables
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.status import Status
+from rigidsim.store.folder import RunFolder
+from rigidsim.store.run import Run
+from rigidsim.store.segments import Chain, SegmentWriter
+from rigidsim.store.summary import Caution
+
+
+@dataclass
+class Session:
+    """One process's work on a run: the whole of it, or what was left.
+
+    Attributes:
+        remarks: for the summary, on how the session began.
+        mixed: what changed in versions or machine since the run began; empty where nothing did.
+        effort, phases: what the run has cost, all its sessions and this one; choosing and certifying count.
+        tuning: how often it looks up and saves.
+    """
+
+    observer: Observer
+    remarks: list[Caution] = field(default_factory=list)
+    mixed: str = ""
+    effort: Effort = field(default_factory=Effort)
+    phases: Phases = field(default_factory=Phases)
+    tuning: Tuning = field(default_factory=Tuning)
+
+    def another(self) -> Session:
+        """For the next attempt where this one didn't keep the accuracy; its cost is part of that one's."""
+        return Session(
+            self.observer, effort=self.effort, phases=self.phases.begin_again(), tuning=self.tuning
+        )
+
+    def execute(self, prepared: InitialValueProblem, folder: RunFolder, chain: Chain | None = None) -> Run:
+        """Integrate to the end, or to whatever ends it, and complete the files.
+
+        Args:
+            chain: segments to resume from, with the arrays of the last one's checkpoint.
+
+        Raises:
+            RunFolderError: the folder can't be written, or the checkpoint belongs to another system.
+        """
+        clock = self.phases
+        parts = assemble(prepared)
+        log, stepper, evaluator, corrected = parts.log, parts.stepper, parts.evaluator, parts.corrected
+        growth = motion_growth(prepared)
+        resumed = None if chain is None else restore(chain, prepared, corrected, evaluator, log)
+        run_id = secrets.token_hex(8) if chain is None else chain.run
+        attributes = root_attributes(prepared, stepper, run_id, self.mixed)
+        limits = self.tuning.segments
+        variables = dataset_variables(prepared)
+        writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
+        recorder = Recorder(prepared, evaluator, writer, log, self.effort)
+        interruption = Interruption()
+        clock.next("build")
+        self.observer.started(prepared, folder.path)
+        self.observer.phase("integrate")
+        start = None if resumed is None else resumed.position
+        before = 0 if start is None else start.boundary.mark.steps
+        guards = Guards(prepared, recorder.statistics, interruption, self.observer, steps_before=before)
+        loop = sampler(prepared, parts, recorder, guards, start, self.tuning.pacing)
+        recorder.progress = loop.progress
+        if resumed is not None:
+            recorder.restore(resumed.statistics)
+        with interruption.watching():
+            progress = loop.run()
+            if not progress.status.final:
+                recorder.save(loop.position())
+            clock.next("integrate_and_record")
+            self.observer.progressed(progress)
+            spectrum = None
+            if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
+                self.observer.phase("lyapunov")
+                spectrum = spectrum_of(prepared, folder, run_id, interruption, limits.seconds)
+                clock.next("lyapunov")
+                if interruption.requested:
+                    progress.status = Status.INTERRUPTED
+                    recorder.save(loop.position())
+        clock.engine(progress.integration_seconds)
+        growth = growth_by_spectrum(growth, spectrum, float(prepared.system.rate_bound))
+        last = float(prepared.clock.at(prepared.clock.count - 1))
+        summary = summarise(
+            Diagnostics(prepared, progress, recorder.statistics, growth),
+            spectrum,
+            message=closing_words(prepared, progress, evaluator),
+            remarks=self.remarks,
+            initial=evaluator.initial_invariants(),
+            cost=cost_so_far(prepared, progress, clock, self.effort),
+            attributes=attributes,
+            events=event_counts(prepared, log, last),
+            chart_changes=chart_changes(prepared, corrected),
+        )
+        if progress.status.final:
+            extras = event_variables(prepared, log, evaluator, last) + lyapunov_variables(spectrum)
+            summary = Completion(
+                prepared, folder, writer, recorder, loop, attributes, extras, clock, self.effort,
+                self.observer, summary,
+            ).complete()  # fmt: skip
+        summary = summary.having(cost=cost_so_far(prepared, progress, clock, self.effort))
+        folder.write_summary(summary)
+        return Run(folder, summary)

@@ -1,0 +1,49 @@
+"""What is followed over all samples of a run, so that its end can be judged without reading them again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass
+class SampleStatistics:
+    """Of the samples taken so far, in all sessions.
+
+    Attributes:
+        largest, final: relative drifts by invariant.
+        put_back: of projected invariants, what was put back before the latest sample.
+        nearest_singularity: smallest absolute singular factor at a sample.
+        singularity_time: of that sample, seconds.
+    """
+
+    largest: dict[str, float] = field(default_factory=dict)
+    final: dict[str, float] = field(default_factory=dict)
+    put_back: dict[str, float] = field(default_factory=dict)
+    nearest_singularity: float = math.inf
+    singularity_time: float = math.nan
+
+    def see(self, invariant: str, drifts: np.ndarray) -> None:
+        """Follow one invariant through a block of samples.
+
+        Args:
+            drifts: relative, shape (samples,).
+        """
+        size = np.abs(drifts)
+        self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.max(size)))
+        self.final[invariant] = float(drifts[-1])
+
+    def see_singular(self, factors: np.ndarray, times: np.ndarray) -> None:
+        """Follow the distance from a formulation's singularity.
+
+        Args:
+            factors: singular ones, shape (samples,).
+            times: seconds, same shape.
+        """
+        size = np.abs(factors.astype(np.float64))
+        nearest = int(np.argmin(size))
+        if size[nearest] < self.nearest_singularity:
+            self.nearest_singularity = float(size[nearest])
+            self.singularity_time = float(times[nearest])

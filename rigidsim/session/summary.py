@@ -1,0 +1,203 @@
+"""The honest summary of a run, filled once its end is known: cost, drifts, accuracy, warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
+from rigidsim.session.timings import Effort, Phases
+from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.loop import Progress
+from rigidsim.solve.lyapunov import LyapunovSpectrum
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.status import Status
+from rigidsim.store.attributes import RootAttributes, Use
+from rigidsim.store.summary import (
+    Accuracy,
+    BitForBit,
+    Body,
+    Caution,
+    ChartChanges,
+    Cost,
+    Invariant,
+    Lyapunov,
+    Summary,
+    as_fields,
+)
+
+
+def summarise(
+    found: Diagnostics,
+    spectrum: LyapunovSpectrum | None,
+    *,
+    message: str,
+    remarks: Sequence[Caution],
+    initial: Mapping[str, list[float]],
+    cost: Cost,
+    attributes: RootAttributes,
+    events: dict[str, int],
+    chart_changes: ChartChanges | None,
+) -> Summary:
+    """All but the digests of files that are still to be written.
+
+    Args:
+        found: with the growth of errors as the spectrum shows it.
+        message: the status in words.
+        remarks: on how the session began; they stand before the warnings.
+        initial: values of the invariants, SI.
+        attributes: of the dataset.
+        events: how often each was found.
+    """
+    prepared, progress = found.prepared, found.progress
+    scene, system = prepared.scene, prepared.system
+    return Summary(
+        name=scene.name,
+        description=scene.description,
+        status=progress.status.value,
+        message=message,
+        exit_code=progress.status.exit_code,
+        **as_fields([*remarks, *found.cautions()]),
+        samples=progress.next_sample,
+        samples_planned=progress.samples,
+        time_reached=progress.time,
+        formulation=system.requirements.formulation,
+        states=tuple(system.states),
+        precision=prepared.precision.name,
+        tolerance=prepared.effective_tolerance,
+        cost=cost,
+        method=scene.config.integrator.method,
+        hold_invariants=prepared.holds_invariants,
+        invariants=_invariants(found, initial),
+        accuracy=_accuracy(found),
+        lyapunov=_lyapunov(found, spectrum),
+        body=Body(
+            source=scene.body.source,
+            principal_moments=tuple(float(m) for m in scene.body.principal_moments),
+            principal_axes=tuple(tuple(float(x) for x in axis) for axis in scene.body.principal_axes),
+            mass=None if scene.body.mass is None else float(scene.body.mass),
+        ),
+        bit_for_bit=_bit_for_bit(prepared, progress, attributes.mixed_provenance),
+        provenance=attributes.of_use(Use.REPEATED),
+        events=events,
+        chart_changes=chart_changes,
+    )
+
+
+def cost_so_far(prepared: InitialValueProblem, progress: Progress, phases: Phases, effort: Effort) -> Cost:
+    """What the run has taken up to now."""
+    exponent = prepared.system.scaling.time
+    return Cost(
+        steps=progress.steps,
+        steps_redone=progress.redone_steps,
+        smallest_step=_seconds(progress.smallest_step, exponent),
+        largest_step=_seconds(progress.largest_step, exponent),
+        seconds=dict(phases.wall),
+        cpu_seconds=effort.cpu,
+        cpu_by_phase=dict(phases.cpu),
+        sessions=effort.sessions,
+        wall_seconds=effort.wall,
+    )
+
+
+def _seconds(step: float, exponent: int) -> float | None:
+    value = math.ldexp(step, exponent) if math.isfinite(step) else math.inf
+    return value if math.isfinite(value) else None
+
+
+def closing_words(prepared: InitialValueProblem, progress: Progress, evaluator: Evaluator) -> str:
+    """The status in words, with where and why for a run that broke down."""
+    text = progress.status.message
+    if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
+        return text
+    text += f"; last good state at {progress.time:.9g} s after {progress.steps} steps"
+    if progress.last_good is None:
+        return text
+    state = np.array([progress.last_good.mark.state], dtype=prepared.precision.scalar)
+    factors = evaluator.singular_factors(state, np.array([progress.last_good.angles.chart]))
+    if factors is not None and abs(float(factors[0])) < NEAR_SINGULAR:
+        middle = float(state[0][prepared.system.states.index("theta")])
+        text += (
+            f"; the middle Euler angle theta = {middle:.9g} rad came within {abs(float(factors[0])):.2g} of "
+            f'the singularity of {prepared.system.sequence}: choose formulation = "quaternion"'
+        )
+    else:
+        largest = int(np.argmax(np.abs(state[0].astype(np.float64))))
+        text += f"; the largest state there was {prepared.system.states[largest]}"
+    return text
+
+
+def chart_changes(prepared: InitialValueProblem, corrected: CorrectedStepper) -> ChartChanges | None:
+    """How often a run in Euler angles went from one chart to the other; None for other formulations."""
+    system = prepared.system
+    if corrected.charts is None or system.partner is None:
+        return None
+    return ChartChanges(
+        count=corrected.charts.changes,
+        sequence=system.sequence,
+        partner=system.partner.sequence,
+    )
+
+
+def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[str, Invariant]:
+    statistics, table = found.statistics, {}
+    for invariant in found.prepared.system.invariants:
+        name, values = invariant.name, initial[invariant.name]
+        table[name] = Invariant(
+            initial=values[0] if len(values) == 1 else tuple(values),
+            units=invariant.units,
+            scale=float(invariant.scale),
+            scale_name=invariant.scale_name,
+            largest_drift=statistics.largest.get(name),
+            final_drift=statistics.final.get(name),
+            bound=found.drift_bound,
+            put_back=statistics.put_back.get(name),
+            why=invariant.why,
+            numerical=invariant.numerical,
+        )
+    return table
+
+
+def _accuracy(found: Diagnostics) -> Accuracy:
+    return Accuracy(
+        requested=None,
+        estimated_attitude_error=found.attitude_error,
+        estimated_how="round-off law (tolerance/2) sqrt(steps) |w| t / sqrt 3, times amplification",
+        amplification=found.amplification,
+        error_growth_rate=found.growth.rate,
+        predictable_seconds=found.predictable_seconds,
+        amplification_seconds=found.growth.seconds,
+        amplification_how="growth of small offsets over the linear growth of a stable motion, "
+        "measured on the beginning of the motion; 1 for a stable one",
+        certified=None,
+        how="not certified against an independent solution",
+    )
+
+
+def _lyapunov(found: Diagnostics, spectrum: LyapunovSpectrum | None) -> Lyapunov | None:
+    if spectrum is None:
+        return None
+    chaotic = spectrum.chaotic(float(found.prepared.system.rate_bound))
+    return Lyapunov(
+        chaotic=chaotic,
+        largest_exponent=spectrum.largest,
+        moved_over_second_half=spectrum.spread,
+        e_folding_seconds=1 / spectrum.largest if chaotic else None,
+        predictable_seconds=found.predictable_seconds,
+        exponents=tuple(float(x) for x in spectrum.exponents[-1]),
+        states=spectrum.states,
+        units="s-1",
+    )
+
+
+def _bit_for_bit(prepared: InitialValueProblem, progress: Progress, mixed: str | None) -> BitForBit:
+    holds_for = "the same config, versions and CPU features as recorded in provenance"
+    if prepared.python_loads:
+        holds_for = "nothing: loads given from Python are not in the config"
+    elif mixed:
+        holds_for = f"nothing: the run was resumed on another machine or version ({mixed})"
+    claim = progress.status in (Status.FINISHED, Status.EVENT) and not prepared.python_loads and not mixed
+    return BitForBit(claim=claim, holds_for=holds_for)

@@ -1,0 +1,72 @@
+"""Wall and CPU seconds, of the phases of one session and of all sessions of a run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from rigidsim.store.summary import ENGINE
+
+NOT_KEPT = "attempts_not_kept"
+
+
+@dataclass
+class Effort:
+    """What a run has cost over all its sessions.
+
+    Attributes:
+        sessions: this one included.
+        wall_seconds, cpu_seconds: of the sessions before this one.
+    """
+
+    sessions: int = 1
+    wall_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    started: float = field(default_factory=time.perf_counter)
+    cpu_started: float = field(default_factory=time.process_time)
+
+    @property
+    def wall(self) -> float:
+        """Of all sessions, seconds."""
+        return self.wall_seconds + time.perf_counter() - self.started
+
+    @property
+    def cpu(self) -> float:
+        """Of all sessions, seconds."""
+        return self.cpu_seconds + time.process_time() - self.cpu_started
+
+
+class Phases:
+    """Seconds by phase of one session, in the order in which the phases ended.
+
+    Attributes:
+        wall, cpu: seconds of each; the CPU's are those of all threads of this process. The engine's own
+            stand among the former.
+    """
+
+    def __init__(self) -> None:
+        self.wall: dict[str, float] = {}
+        self.cpu: dict[str, float] = {}
+        self._since = time.perf_counter(), time.process_time()
+
+    def next(self, finished: str) -> None:
+        """Close the phase that was under way since the last one; a name given again adds up."""
+        now = time.perf_counter(), time.process_time()
+        for seconds, begin, end in zip((self.wall, self.cpu), self._since, now, strict=True):
+            seconds[finished] = seconds.get(finished, 0.0) + end - begin
+        self._since = now
+
+    def engine(self, seconds: float) -> None:
+        """Note what the engine alone took, in all sessions; it is part of other phases."""
+        self.wall[ENGINE] = seconds
+
+    def begin_again(self, *, keep: Iterable[str] = ("choose",)) -> Phases:
+        """For another attempt: what this one took is one phase of it, but for those to keep."""
+        again = Phases()
+        for old, new in ((self.wall, again.wall), (self.cpu, again.cpu)):
+            kept = {name: old[name] for name in keep if name in old}
+            new |= kept
+            new[NOT_KEPT] = sum(v for name, v in old.items() if name not in kept and name != ENGINE)
+        again._since = self._since
+        return again

@@ -1,0 +1,88 @@
+"""What a run's dataset holds along time: names, labels and where each comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rigidsim.model.outputs import Invariant
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.store.variables import Variable, time_variable
+
+
+def drift_name(invariant: str) -> str:
+    """Of the variable that holds an invariant's drift; its attribute ``drift_of`` names the invariant."""
+    return f"{invariant}_drift"
+
+
+def put_back_name(invariant: str) -> str:
+    """Of what was put back of a projected invariant; its attribute ``put_back_of`` names the invariant."""
+    return f"{invariant}_put_back"
+
+
+def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
+    """Time first, then what is recorded, then each invariant's drift, and what was put back of those
+    projected.
+    """
+    system, projected = prepared.system, prepared.projected_scalars
+    return [
+        *recorded_variables(prepared),
+        *(_drift(invariant) for invariant in system.invariants),
+        *(_put_back(invariant, projected) for invariant in system.invariants if invariant.name in projected),
+    ]
+
+
+def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
+    """Time, and what is recorded; each with residuals beyond double precision."""
+    parts = prepared.precision.part_count
+    result = [time_variable(parts)]
+    for recorded in prepared.system.recorded:
+        attributes: dict[str, Any] = {"units": recorded.units, "long_name": recorded.long_name}
+        if recorded.frame:
+            attributes["frame"] = recorded.frame
+        if recorded.name == "euler_angles":
+            attributes["euler_sequence"] = prepared.system.sequence
+            attributes["convention"] = "intrinsic"
+        if recorded.invariant:
+            attributes["invariant"] = 1
+        result.append(Variable(recorded.name, recorded.dims, attributes, parts))
+    return result
+
+
+def _drift(invariant: Invariant) -> Variable:
+    several = len(invariant.expressions) > 1
+    attributes = {
+        "units": "1",
+        "long_name": f"drift of the {invariant.long_name}",
+        **_scale(invariant),
+        "definition": "norm of (value - initial) / scale" if several else "(value - initial) / scale",
+        "drift_of": invariant.name,
+    }
+    return Variable(drift_name(invariant.name), (), attributes)
+
+
+def _put_back(invariant: Invariant, projected: Sequence[str]) -> Variable:
+    """What was put back of a projected invariant, along time.
+
+    Args:
+        projected: the invariant that each projected scalar belongs to.
+    """
+    what = "norm of the sum of the changes" if projected.count(invariant.name) > 1 else "sum of the changes"
+    attributes = {
+        "units": "1",
+        "long_name": f"what was put back of the {invariant.long_name}",
+        **_scale(invariant),
+        "definition": f"{what} of (value - initial) / scale from one correction to the next, up to the "
+        "last one before each sample: to first order what the drift would have been without them",
+        "put_back_of": invariant.name,
+    }
+    return Variable(put_back_name(invariant.name), (), attributes)
+
+
+def _scale(invariant: Invariant) -> dict[str, Any]:
+    """What its drifts are relative to."""
+    return {
+        "scale": float(invariant.scale),
+        "scale_units": invariant.units,
+        "scale_name": invariant.scale_name,
+    }

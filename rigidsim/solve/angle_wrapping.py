@@ -1,0 +1,77 @@
+"""Euler angles kept small inside a run, with their full turns counted.
+
+Angles that grow without bound loosen heyoka's step control, which is relative to the largest component;
+so they are brought back into (-pi, pi] every few steps, and the turns are counted.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mpmath
+import numpy as np
+
+from rigidsim.solve.precision import Precision
+
+Angles = tuple[float, float, float]
+"""Euler angles in the order of their sequence, rad."""
+
+STEPS_BETWEEN = 32
+"""Natural steps from one wrapping to the next: a fixed count, so that bits don't depend on timing."""
+
+
+class AngleState(NamedTuple):
+    """Which angles the angle states stand for; all fields are empty or 0 without angle states.
+
+    Attributes:
+        turns: full turns of the angle states.
+        chart: 0 where they are of the asked sequence, 1 of its partner (``rigidsim.solve.charts``).
+        reference: in the partner chart the asked angles at the latest natural step, rad; zeros otherwise.
+    """
+
+    turns: tuple[int, ...] = ()
+    chart: int = 0
+    reference: tuple[float, ...] = ()
+
+
+class AngleWrapping:
+    """Counts the full turns that are taken off the angle states.
+
+    Attributes:
+        positions: of the angles among the states; empty without any.
+        angles: what the angle states stand for now.
+
+    Args:
+        context: mpmath context with more digits than the precision.
+    """
+
+    def __init__(self, positions: tuple[int, ...], precision: Precision, context: mpmath.MPContext) -> None:
+        self.positions = list(positions)
+        self.angles = AngleState((0, 0, 0), 0, (0.0, 0.0, 0.0)) if positions else AngleState()
+        self._precision = precision
+        # 2 pi in two parts: n times the first is exact for small n, the second carries what it lacks
+        pi2 = 2 * context.pi
+        bits = precision.bits - 8
+        whole = context.floor(context.ldexp(pi2, bits - 3))
+        high = context.ldexp(whole, 3 - bits)
+        self._high = precision.number(high)
+        self._low = precision.number(pi2 - high)
+
+    def wrap(self, state: np.ndarray) -> None:
+        """Bring the angles of ``state`` into (-pi, pi], in place."""
+        scalar = self._precision.scalar
+        counted = list(self.angles.turns)
+        for n, position in enumerate(self.positions):
+            turns = int(np.rint(float(state[position]) / (2 * np.pi)))
+            if turns:
+                count = self._precision.indices(turns, turns + 1)[0]
+                count = scalar(count) if self._precision.narrow else count
+                state[position] = (state[position] - count * self._high) - count * self._low
+                counted[n] += turns
+        self.angles = self.angles._replace(turns=tuple(counted))
+
+    def unwrapped(self, angles: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Angles (n, 3) plus 2 pi times turns (n, 3), rounded in the run's precision."""
+        counts = turns.astype(np.float64)
+        counts = counts if self._precision.bits == 53 else counts.astype(self._precision.scalar)
+        return (angles + counts * self._low) + counts * self._high

@@ -1,0 +1,80 @@
+"""What integrates a prepared scene, put together: stepper, corrections, evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigidsim.solve.angle_wrapping import AngleWrapping
+from rigidsim.solve.checkpoint import Position
+from rigidsim.solve.closed_form.sampler import ClosedFormSampler
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.events import EventLog
+from rigidsim.solve.loop import IntegrationLoop
+from rigidsim.solve.pacing import MEASURED, Pacing
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.projection import Projection, steps_between
+from rigidsim.solve.sampler import Check, Sampler, SampleReceiver
+from rigidsim.solve.stepper import Stepper
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """The parts of an integration.
+
+    Attributes:
+        projection: puts invariants back; None where that isn't asked for.
+    """
+
+    wrapping: AngleWrapping
+    log: EventLog
+    stepper: Stepper
+    projection: Projection | None
+    corrected: CorrectedStepper
+    evaluator: Evaluator
+
+
+def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
+    """Compile everything that a prepared scene needs to go from its start.
+
+    Args:
+        stride: natural steps between corrections at most (``CorrectedStepper``).
+
+    Raises:
+        ConfigError: invariants are to be projected where there are none.
+    """
+    system, precision, start = prepared.system, prepared.precision, prepared.clock.start
+    wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context)
+    log = EventLog([c.stop for c in system.crossings], wrapping)
+    stepper = Stepper(system, precision, prepared.tolerance, start, log)
+    projection = None
+    if prepared.holds_invariants:
+        projection = Projection(system, precision, start)
+    interval = steps_between(precision)
+    corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
+    return Assembly(wrapping, log, stepper, projection, corrected, Evaluator(system, precision, wrapping))
+
+
+def sampler(
+    prepared: InitialValueProblem,
+    parts: Assembly,
+    receiver: SampleReceiver,
+    check: Check = lambda _: None,
+    start: Position | None = None,
+    pacing: Pacing = MEASURED,
+) -> Sampler:
+    """What takes a prepared scene through its samples: its closed form where it has one, or the integration.
+
+    Args:
+        parts: assembled of it.
+        receiver: receives the samples in order.
+        check: asked again and again, with the progress; a status ends the run.
+        start: where to go on; None begins.
+    """
+    clock, precision = prepared.clock, prepared.precision
+    if prepared.closed is None:
+        return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing)
+    begin = parts.corrected.boundary()
+    return ClosedFormSampler(
+        prepared.closed, prepared.system, begin, clock, precision, receiver, check, start, pacing
+    )

@@ -1,0 +1,235 @@
+"""Checkpoints as plain arrays of numbers, exact in every bit: reading one back runs no code.
+
+A number beyond double is 2^exponent times a sum of float64 parts. Arrays without elements aren't saved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import heyoka as hy
+import mpmath
+import numpy as np
+
+from rigidsim.solve.angle_wrapping import AngleState
+from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
+from rigidsim.solve.corrected_stepper import StepBoundary
+from rigidsim.solve.evaluate import Continuity
+from rigidsim.solve.events import FoundEvent
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.stepper import Mark
+
+Arrays = dict[str, np.ndarray]
+"""Names to float64 or int64 arrays."""
+
+_STEP = 512  # a power of two that every type holds
+
+
+def pack(values: np.ndarray, precision: Precision, name: str) -> Arrays:
+    """Exact arrays ``NAME_parts`` (parts, n) and, beyond double, ``NAME_exponents`` (n,) of scalars (n,)."""
+    if precision.narrow:
+        return {f"{name}_parts": np.asarray(values, dtype=np.float64)[None, :]}
+    exponents = np.zeros(len(values), dtype=np.int64)
+    scaled = np.array(values, dtype=precision.scalar)
+    up, down = _power(precision, _STEP), _power(precision, -_STEP)
+    for i in range(len(scaled)):  # to a size whose residuals are no denormal doubles
+        while scaled[i] != 0 and abs(scaled[i]) < down:
+            scaled[i] = scaled[i] * up
+            exponents[i] -= _STEP
+    return {f"{name}_exponents": exponents, f"{name}_parts": np.stack(precision.parts(scaled))}
+
+
+def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) -> np.ndarray:
+    """The scalars that were packed.
+
+    Raises:
+        ValueError: arrays of another shape or precision.
+    """
+    if f"{name}_parts" not in arrays:
+        return precision.zeros((0,))
+    parts = np.asarray(arrays[f"{name}_parts"], dtype=np.float64)
+    if parts.ndim != 2 or len(parts) != precision.part_count:
+        raise ValueError(f"{name} has parts of shape {parts.shape}")
+    if precision.narrow:
+        return parts[0].astype(precision.scalar)
+    total = _lifted(parts[0], precision)
+    for part in parts[1:]:
+        total = total + _lifted(part, precision)
+    exponents = np.asarray(arrays[f"{name}_exponents"])
+    if exponents.shape != total.shape:
+        raise ValueError(f"{name} has exponents of shape {exponents.shape}")
+    down = _power(precision, -_STEP)
+    for i, exponent in enumerate(exponents):
+        for _ in range(-int(exponent) // _STEP):
+            total[i] = total[i] * down
+    return total
+
+
+def _lifted(part: np.ndarray, precision: Precision) -> np.ndarray:
+    """float64 numbers in the run's own type; ``astype`` makes multi-precision numbers of 53 bits."""
+    if precision.scalar is not hy.real:
+        return part.astype(precision.scalar)
+    return np.array([hy.real(float(x), precision.bits) for x in part], dtype=hy.real)
+
+
+def _power(precision: Precision, exponent: int) -> Scalar:
+    return precision.number(mpmath.mpf(2) ** exponent)
+
+
+def pack_checkpoint(checkpoint: Checkpoint, precision: Precision, invariants: Sequence[str]) -> Arrays:
+    """A checkpoint as arrays.
+
+    Args:
+        invariants: the system's, in order.
+    """
+    position, continuity, counted = checkpoint.position, checkpoint.continuity, checkpoint.statistics
+    boundary = position.boundary
+    mark = boundary.mark
+    arrays = pack(np.array(mark.time, dtype=precision.scalar), precision, "time")
+    arrays |= pack(mark.state, precision, "state")
+    arrays["counts"] = np.array([mark.steps, mark.events, position.next_sample], dtype=np.int64)
+    arrays["rhythm_turns"] = _pack_angles([boundary.angles])[0]
+    if boundary.angles.turns:
+        arrays["rhythm_chart_changes"] = np.array([boundary.chart_changes], dtype=np.int64)
+    arrays["rhythm_held"] = boundary.projection
+    arrays["joined_turns"] = continuity.turns
+    if continuity.last_angles is not None:
+        arrays["joined_angles"] = continuity.last_angles
+    if continuity.last_quaternion is not None:
+        arrays["joined_quaternion"] = continuity.last_quaternion
+    drifts = counted.largest_drift, counted.final_drift
+    arrays["watched"] = np.array([_values(found, invariants) for found in drifts])
+    arrays["put_back"] = np.array(_values(counted.put_back, invariants))
+    arrays["singularity"] = np.array([counted.nearest_singularity, counted.singularity_time])
+    arrays["steps_seen"] = np.array([counted.smallest_step, counted.largest_step])
+    arrays["effort"] = np.array([counted.wall_seconds, counted.cpu_seconds, counted.integration_seconds])
+    arrays["sessions"] = np.array([counted.sessions, counted.redone_steps], dtype=np.int64)
+    return arrays
+
+
+def unpack_checkpoint(
+    arrays: Mapping[str, np.ndarray], precision: Precision, invariants: Sequence[str], start: StepBoundary
+) -> Checkpoint:
+    """What was packed.
+
+    Args:
+        invariants: the system's, in order.
+        start: any boundary of the system that is resumed, for what it has to remember.
+
+    Raises:
+        KeyError, ValueError: it belongs to another system or precision.
+    """
+    time, state = unpack(arrays, precision, "time"), unpack(arrays, precision, "state")
+    steps, events, next_sample = _numbers(arrays, "counts", 3)
+    if time.shape != (2,) or state.shape != start.mark.state.shape:
+        raise ValueError("the checkpoint belongs to another system of equations")
+    [angles] = _unpack_angles(arrays.get("rhythm_turns", np.zeros(0, dtype=np.int64))[None, :])
+    if len(angles.turns) != len(start.angles.turns):
+        raise ValueError("the checkpoint has other angles")
+    projection = arrays.get("rhythm_held", np.zeros(0))
+    if projection.shape != start.projection.shape:
+        raise ValueError(f"the checkpoint remembers {projection.shape} numbers of projections")
+    chart_changes = int(arrays.get("rhythm_chart_changes", np.zeros(1))[0])
+    mark = Mark((time[0], time[1]), state, int(events), int(steps))
+    boundary = StepBoundary(mark, angles, chart_changes, projection)
+    continuity = Continuity(
+        np.asarray(arrays.get("joined_turns", np.zeros(3)), dtype=np.int64),
+        arrays.get("joined_angles"),
+        arrays.get("joined_quaternion"),
+    )
+    largest, final = np.reshape(arrays.get("watched", ()), (2, len(invariants)))
+    nearest, when = _numbers(arrays, "singularity", 2)
+    smallest_step, largest_step = _numbers(arrays, "steps_seen", 2)
+    wall, cpu, integration = _numbers(arrays, "effort", 3)
+    sessions, redone = _numbers(arrays, "sessions", 2)
+    statistics = Statistics(
+        largest_drift=_by_name(largest, invariants),
+        final_drift=_by_name(final, invariants),
+        put_back=_by_name(arrays.get("put_back", ()), invariants),
+        nearest_singularity=nearest,
+        singularity_time=when,
+        smallest_step=smallest_step,
+        largest_step=largest_step,
+        redone_steps=int(redone),
+        sessions=int(sessions),
+        wall_seconds=wall,
+        cpu_seconds=cpu,
+        integration_seconds=integration,
+    )
+    return Checkpoint(Position(boundary, int(next_sample)), continuity, statistics)
+
+
+def _numbers(arrays: Mapping[str, np.ndarray], name: str, count: int) -> list[float]:
+    found = np.asarray(arrays[name])
+    if found.shape != (count,):
+        raise ValueError(f"the checkpoint has {name} of shape {found.shape}, not ({count},)")
+    return [x.item() for x in found]
+
+
+def _values(found: Mapping[str, float], names: Sequence[str]) -> list[float]:
+    """In the order of the names; nan where there is none."""
+    return [found.get(name, math.nan) for name in names]
+
+
+def _by_name(values: Iterable[float], names: Sequence[str]) -> dict[str, float]:
+    """Those that are there."""
+    pairs = zip(names, map(float, values), strict=False)  # older runs have none of some
+    return {name: value for name, value in pairs if not math.isnan(value)}
+
+
+def _pack_angles(found: Sequence[AngleState]) -> np.ndarray:
+    """One row for each: turns, chart, and the bits of the reference angles; (n, 0) without angle states.
+
+    Unfinished runs have been saved in this format before ``AngleState`` was a value of its own.
+    """
+    rows = [
+        [*angles.turns, angles.chart, *np.array(angles.reference, dtype=np.float64).view(np.int64)]
+        for angles in found
+        if angles.turns
+    ]
+    return np.array(rows, dtype=np.int64).reshape(len(found), -1)
+
+
+def _unpack_angles(rows: np.ndarray) -> list[AngleState]:
+    if not rows.shape[1]:
+        return [AngleState()] * len(rows)
+    if rows.shape[1] != 7:
+        raise ValueError(f"angles of shape {rows.shape}")
+    rows = np.ascontiguousarray(rows, dtype=np.int64)
+    reference = np.ascontiguousarray(rows[:, 4:]).view(np.float64)
+    return [
+        AngleState((a, b, c), chart, tuple(angles))
+        for (a, b, c, chart, *_), angles in zip(rows.tolist(), reference.tolist(), strict=True)
+    ]
+
+
+def pack_events(found: Sequence[FoundEvent], precision: Precision) -> Arrays:
+    """Crossings as arrays."""
+    if not found:
+        return {}
+    arrays = pack(np.array([f.time for f in found], dtype=precision.scalar), precision, "time")
+    states = np.concatenate([np.asarray(f.state) for f in found]).astype(precision.scalar)
+    arrays |= pack(states, precision, "state")
+    arrays["index"] = np.array([f.index for f in found], dtype=np.int64)
+    arrays["turns"] = _pack_angles([f.angles for f in found])
+    return arrays
+
+
+def unpack_events(arrays: Mapping[str, np.ndarray], precision: Precision, states: int) -> list[FoundEvent]:
+    """What was packed.
+
+    Args:
+        states: number of them.
+
+    Raises:
+        ValueError: the arrays don't belong together.
+    """
+    times = unpack(arrays, precision, "time")
+    count = len(times)
+    values = unpack(arrays, precision, "state").reshape(count, states)
+    index = arrays.get("index", np.zeros(0, dtype=np.int64))
+    if index.shape != (count,):
+        raise ValueError("events without their kind")
+    angles = _unpack_angles(arrays.get("turns", np.zeros((count, 0), dtype=np.int64)))
+    return [FoundEvent(int(i), t, v, a) for i, t, v, a in zip(index, times, values, angles, strict=True)]

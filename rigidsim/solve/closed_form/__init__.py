@@ -1,0 +1,6 @@
+"""Solutions in closed form, at a cost that doesn't depend on the time asked for."""
+
+from rigidsim.solve.closed_form.motion import NoClosedForm, WhyNot
+from rigidsim.solve.closed_form.solution import ClosedForm, closed_form_of, find_closed_form
+
+__all__ = ["ClosedForm", "NoClosedForm", "WhyNot", "closed_form_of", "find_closed_form"]

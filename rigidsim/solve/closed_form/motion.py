@@ -1,0 +1,57 @@
+"""What every closed form of a rotation yields, and the frame that it is written in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, ClassVar
+
+from rigidsim.scene.arithmetic import Matrix, cross, dot
+from rigidsim.solve.closed_form.arithmetic import Arithmetic
+
+
+class WhyNot(Enum):
+    """Kinds of reasons why a scene has no closed form."""
+
+    PYTHON_LOAD = "a load given from Python"
+    LOAD = "a load of the config"
+    BODY = "a free body without inertia about one axis, whose other two moments differ"
+    TOP = "a heavy top that isn't symmetric about the line to its centre of mass"
+
+
+class NoClosedForm(ValueError):
+    """A scene has no closed form here; the message says why, as the rest of a sentence.
+
+    Attributes:
+        why: the kind of reason.
+    """
+
+    def __init__(self, why: WhyNot, words: str) -> None:
+        super().__init__(words)
+        self.why = why
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A rotation in closed form, in the units of time and inertia of the numbers that it was made from.
+
+    Attributes:
+        axes: rows are the axes of the frame that the motion is written in (right-handed, body axes).
+        title: what it is, for plans and summaries.
+    """
+
+    axes: Matrix
+    title: ClassVar[str] = "rotation"
+
+    def at(self, arithmetic: Arithmetic, time: Any) -> tuple[list[Any], list[Any]]:
+        """Rates along ``axes`` and a quaternion from ``axes`` to a frame fixed in space, at times after the
+        start (see ``Arithmetic`` for their type).
+        """
+        raise NotImplementedError
+
+
+def right_handed(axes: Matrix, flip: int = 1) -> Matrix:
+    """The axes, with number ``flip`` reversed where they are left-handed."""
+    if dot(cross(axes[0], axes[1]), axes[2]) > 0:
+        return axes
+    return [[-x for x in axis] if i == flip else axis for i, axis in enumerate(axes)]

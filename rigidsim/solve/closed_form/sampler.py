@@ -1,0 +1,75 @@
+"""Samples straight from a closed form: no steps, and the same cost at any horizon."""
+
+from __future__ import annotations
+
+import time
+
+from rigidsim.model.system import System
+from rigidsim.solve.checkpoint import Position
+from rigidsim.solve.closed_form.solution import ClosedForm
+from rigidsim.solve.corrected_stepper import StepBoundary
+from rigidsim.solve.pacing import MEASURED, Pacing
+from rigidsim.solve.precision import Precision
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import Check, Progress, SampleReceiver
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.status import Status
+
+
+class ClosedFormSampler:
+    """Evaluates a closed form at the samples (a ``Sampler``).
+
+    Attributes:
+        progress: how far it is; it takes no steps.
+
+    Args:
+        begin: the integration's start: the way to a sample leads over no other boundary.
+        start: where to go on; None begins.
+    """
+
+    def __init__(
+        self,
+        form: ClosedForm,
+        system: System,
+        begin: StepBoundary,
+        clock: SampleClock,
+        precision: Precision,
+        receiver: SampleReceiver,
+        check: Check,
+        start: Position | None = None,
+        pacing: Pacing = MEASURED,
+    ) -> None:
+        self._form = form
+        self._system = system
+        self._begin = begin
+        self._clock = clock
+        self._precision = precision
+        self._receiver = receiver
+        self._check = check
+        self._rows = pacing.rows_at_once if precision.narrow else pacing.wide_rows_at_once
+        self.progress = Progress(clock.count, 0 if start is None else start.next_sample)
+
+    def position(self) -> Position:
+        """The next sample is all that has to be known."""
+        return Position(self._begin, self.progress.next_sample)
+
+    def run(self) -> Progress:
+        """Go on until the last sample is recorded or something ends the run."""
+        progress, clock = self.progress, self._clock
+        while progress.next_sample < clock.count:
+            if self._receiver.due():
+                self._receiver.save(self.position())
+            stop = self._check(progress)
+            if stop is not None:
+                progress.status = stop
+                return progress
+            started = time.perf_counter()
+            first = progress.next_sample
+            times = clock.internal(first, min(first + self._rows, clock.count))
+            states = self._form.states(self._system, self._precision, times, clock.start)
+            progress.integration_seconds += time.perf_counter() - started
+            self._receiver.take(SampleBlock.of(first, times, states, self._begin.angles))
+            progress.next_sample += len(times)
+            progress.time = float(times[-1]) * 2.0**clock.exponent
+        progress.status = Status.FINISHED
+        return progress

@@ -1,0 +1,196 @@
+"""A scene's solution in closed form, and the states that it gives at any time.
+
+The cost of a state doesn't depend on its time, and nor does its accuracy: frequencies are known to three
+times the scene's digits and turns are counted exactly, so that a run is right to rounding at any horizon.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from rigidsim.model.scaling import Scaling, choose_scaling
+from rigidsim.model.system import System
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Vector, dot, norm
+from rigidsim.scene.scene import Scene
+from rigidsim.solve.closed_form.arithmetic import Arithmetic, Digits, Doubles, two_sum
+from rigidsim.solve.closed_form.classify import choose_motion
+from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot
+from rigidsim.solve.precision import Precision, Scalar
+
+_GUARD_BITS = 40  # of an evaluation beyond double, for its own rounding
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """The solution of a scene, from its start on (or back).
+
+    Attributes:
+        motion: of the body about its reference point, internal units of time.
+        scaling: those units.
+        before, after: quaternions from the motion's fixed frame to space, and from the body axes to the
+            motion's own.
+    """
+
+    scene: Scene
+    motion: Motion
+    scaling: Scaling
+    before: Vector
+    after: Vector
+
+    @property
+    def title(self) -> str:
+        """What it is, for plans and summaries."""
+        return self.motion.title + ("; parabola of the centre of mass" if self.scene.free_flight else "")
+
+    def states(self, system: System, precision: Precision, times: np.ndarray, start: Scalar) -> np.ndarray:
+        """States of a system at given times.
+
+        Args:
+            system: of this scene, in the formulation "quaternion" or "rates".
+            precision: of the run.
+            times: (n,) in internal units, in the precision (``SampleClock.internal``).
+            start: when the motion begins, a scalar of the precision, internal units.
+
+        Returns:
+            (n, states), internal units, in the precision. Double and single are evaluated in arrays of
+            doubles, other precisions number by number in mpmath.
+
+        Raises:
+            ValueError: the system has states that no closed form gives.
+        """
+        if precision.narrow:
+            # the difference of two doubles is a pair, exactly
+            elapsed = two_sum(np.asarray(times, dtype=np.float64), -float(start))
+            columns = self._columns(Doubles(), elapsed, system)
+            return np.stack(columns, axis=1).astype(precision.scalar)
+        begin = precision.exact(start)
+        late = max((abs(precision.exact(t) - begin) for t in (*times[:1], *times[-1:])), default=0)
+        arithmetic = Digits(self._context(precision.bits, late))
+        number = arithmetic.number
+        result = np.empty((len(times), len(system.states)), dtype=precision.scalar)
+        for n, time in enumerate(times):
+            elapsed = number(precision.exact(time)) - number(begin)
+            row = self._columns(arithmetic, elapsed, system)
+            result[n] = [precision.number(x) for x in row]
+        return result
+
+    def rates_and_quaternions(self, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angular velocity (n, 3), body axes, rad/s, and quaternion (n, 4), body to space, as doubles.
+
+        Args:
+            seconds: (n,) after the start.
+        """
+        high = np.ldexp(np.asarray(seconds, dtype=np.float64), -self.scaling.time)
+        rates, quaternion = self._turned(Doubles(), (high, np.zeros_like(high)))
+        return np.ldexp(np.stack(rates, axis=1), -self.scaling.time), np.stack(quaternion, axis=1)
+
+    def exactly(self, seconds: mpmath.mpf, digits: int) -> tuple[Vector, Vector]:
+        """Angular velocity and quaternion at one time, in mpmath.
+
+        Args:
+            seconds: after the start, mpf.
+            digits: to be right, relative to the largest rate.
+        """
+        elapsed = mpmath.ldexp(seconds, -self.scaling.time)
+        arithmetic = Digits(self._context(math.ceil(digits * math.log2(10)), elapsed))
+        rates, quaternion = self._turned(arithmetic, arithmetic.number(seconds) * 2**-self.scaling.time)
+        return [mpmath.ldexp(w, -self.scaling.time) for w in rates], quaternion
+
+    def _context(self, bits: int, late: mpmath.mpf) -> mpmath.MPContext:
+        """A phase costs as many bits as it has; internal units make it about the time itself."""
+        context = mpmath.MPContext()
+        context.prec = bits + _GUARD_BITS + max(0, math.ceil(mpmath.log(1 + abs(late), 2)))
+        return context
+
+    def _turned(self, arithmetic: Arithmetic, time: Any) -> tuple[Vector, Vector]:
+        """Rates in body axes, and body to space, from the motion's own frame."""
+        number = arithmetic.number
+        own, relative = self.motion.at(arithmetic, time)
+        columns = zip(*self.motion.axes, strict=True)
+        rates = [
+            dot(
+                [number(x) for x in column if x != 0], [w for x, w in zip(column, own, strict=True) if x != 0]
+            )
+            for column in columns
+        ]
+        before, after = ([number(x) for x in q] for q in (self.before, self.after))
+        return rates, attitude.product(attitude.product(before, relative), after)
+
+    def _columns(self, arithmetic: Arithmetic, time: Any, system: System) -> list[Any]:
+        scene, number = self.scene, arithmetic.number
+        context = scene.context
+        rates, quaternion = self._turned(arithmetic, time)
+        units = [number(context.ldexp(context.one, -e)) for e in system.scaling.rates]
+        values = {name: w * unit for name, w, unit in zip(("wx", "wy", "wz"), rates, units, strict=True)}
+        values |= dict(zip(("qw", "qx", "qy", "qz"), quaternion, strict=True))
+        if "gx" in system.states:
+            assert scene.gravity is not None
+            up = [number(-g / norm(context, scene.gravity)) for g in scene.gravity]
+            matrix = attitude.rotation_matrix(quaternion)
+            values |= {f"g{n}": dot([row[i] for row in matrix], up) for i, n in enumerate("xyz")}
+        if "x" in system.states:
+            values |= self._flight(arithmetic, arithmetic.elapsed(time))
+        unknown = [name for name in system.states if name not in values]
+        if unknown:
+            raise ValueError(
+                f"given a system with the states {', '.join(unknown)}; a closed form gives rates, "
+                'quaternion, position and velocity: build the system with formulation = "quaternion"'
+            )
+        return [values[name] for name in system.states]
+
+    def _flight(self, arithmetic: Arithmetic, time: Any) -> dict[str, Any]:
+        """Free fall in a uniform field, or straight on; units of length and speed."""
+        scene, scaling, number = self.scene, self.scaling, arithmetic.number
+        assert scene.position is not None
+        assert scene.velocity is not None
+        context = scene.context
+        ratio = number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
+        values = {}
+        for i, name in enumerate("xyz"):
+            field = scene.gravity[i] if scene.gravity is not None else context.zero
+            pull = number(context.ldexp(field, scaling.time - scaling.speed))
+            x = number(context.ldexp(scene.position[i], -scaling.length))
+            v = number(context.ldexp(scene.velocity[i], -scaling.speed))
+            values[name] = x + ratio * ((v + pull * time / 2) * time)
+            values[f"v{name}"] = v + pull * time
+        return values
+
+
+def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
+    """The closed form of a scene.
+
+    Args:
+        driven: whether loads act of which the scene knows nothing.
+
+    Raises:
+        NoClosedForm: it has none.
+    """
+    if driven:
+        raise NoClosedForm(WhyNot.PYTHON_LOAD, "a load given from Python has no closed form")
+    for load in scene.loads:
+        raise NoClosedForm(WhyNot.LOAD, f"{load.described} has no closed form here")
+    context = mpmath.MPContext()
+    # double roots (regular precession) keep half the digits
+    context.prec = 3 * scene.context.prec
+    scaling = choose_scaling(scene)
+    motion = choose_motion(context, scene, scaling)
+    start = attitude.unit_quaternion(context, [context.mpf(x) for x in scene.quaternion])
+    after = attitude.quaternion_from_matrix(context, motion.axes)
+    _, relative = motion.at(Digits(context), context.zero)
+    w, x, y, z = attitude.product(relative, after)
+    before = attitude.product(start, [w, -x, -y, -z])
+    return ClosedForm(scene, motion, scaling, before, after)
+
+
+def find_closed_form(scene: Scene, *, driven: bool = False) -> ClosedForm | None:
+    """As ``closed_form_of``; None where there is none."""
+    try:
+        return closed_form_of(scene, driven=driven)
+    except NoClosedForm:
+        return None

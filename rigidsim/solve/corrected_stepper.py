@@ -1,0 +1,156 @@
+"""What is done to the state at fixed counts of natural steps, so that bits depend on no clock or sampling.
+
+A step is never clamped to a sample, but some corrections have to be made along the way: angles are brought
+back into one turn, and the engine's time, which is a sum of two numbers, is put back on a single one. They
+happen at fixed counts of natural steps: on whichever path a run goes through these counts, skipping,
+recording or resumed, it does the same there. A chart of Euler angles is changed at the first step boundary
+whose state asks for it, likewise.
+
+That time is a single number at each stride's start is what lets whole strides be recorded by the engine's own
+grid output, which starts at such a time only. The move back to it is a step of some 1e-16 of the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidsim.solve.angle_wrapping import STEPS_BETWEEN, AngleState, AngleWrapping
+from rigidsim.solve.charts import Charts
+from rigidsim.solve.projection import Projection
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.stepper import Mark, Stepper
+
+STRIDE = 1024
+"""Natural steps between two corrections where only time is corrected: half a millisecond, so that the calls
+that this takes cost less than a hundredth."""
+
+_NOTHING = np.zeros(0)
+
+
+@dataclass(frozen=True)
+class StepBoundary:
+    """A natural step boundary of a run: all that the integration needs to resume with the same bits.
+
+    Attributes:
+        mark: the engine's time and state, and counts.
+        angles: what the angle states stand for.
+        chart_changes: so far.
+        projection: a copy of ``Projection.memory``; (0,) where nothing is projected.
+    """
+
+    mark: Mark
+    angles: AngleState
+    chart_changes: int
+    projection: np.ndarray
+
+
+class CorrectedStepper:
+    """Takes steps and makes the corrections when they are due.
+
+    Attributes:
+        projection: puts invariants back, where asked for.
+        stride: natural steps between corrections.
+        whole_times: whether time is a single number at each stride's start. Not where events are looked
+            for: a step back could cross one twice.
+        charts: of a run in Euler angles; None without.
+
+    Args:
+        stride: natural steps between corrections at most; results depend on it, within rounding.
+        projection_interval: natural steps between projections at most.
+    """
+
+    def __init__(
+        self,
+        stepper: Stepper,
+        wrapping: AngleWrapping,
+        projection: Projection | None = None,
+        *,
+        stride: int = STRIDE,
+        projection_interval: int = STRIDE,
+    ) -> None:
+        self.stepper = stepper
+        self.wrapping = wrapping
+        self.projection = projection
+        self.stride = min(stride, STEPS_BETWEEN) if wrapping.positions else stride
+        if projection is not None:
+            self.stride = min(self.stride, projection_interval)
+        self.whole_times = not stepper.has_events
+        self.charts: Charts | None = None
+        system = stepper.system
+        if system.partner is not None:
+            self.charts = stepper.watcher = Charts(system, system.partner, stepper.precision, wrapping)
+            if self.charts.near(stepper.state):  # no change on the way: it begins there
+                self._change_chart(self.charts)
+                self.charts.changes = 0
+
+    @property
+    def left(self) -> int:
+        """Steps until the next corrections, at least 1."""
+        return self.stride - self.stepper.steps % self.stride
+
+    def boundary(self) -> StepBoundary:
+        """Remember this boundary."""
+        return StepBoundary(
+            self.stepper.mark(),
+            self.wrapping.angles,
+            0 if self.charts is None else self.charts.changes,
+            _NOTHING if self.projection is None else self.projection.memory.copy(),
+        )
+
+    def back_to(self, boundary: StepBoundary) -> None:
+        """Return to a boundary."""
+        self.wrapping.angles = boundary.angles
+        if self.projection is not None:
+            self.projection.memory[...] = boundary.projection
+        if self.charts is not None:
+            self.charts.changes = boundary.chart_changes
+            self.stepper.use(self.charts.chart)
+            if self.projection is not None:
+                self.projection.use(self.charts.chart)
+        self.stepper.back_to(boundary.mark)
+
+    def skip(self, count: int) -> bool:
+        """``count`` steps without dense output; False when the state is no longer finite."""
+        while count > 0:
+            before = self.stepper.steps
+            if not self.stepper.skip(min(count, self.left)):
+                return False
+            count -= self.stepper.steps - before
+            self.correct()
+        return True
+
+    def samples(self, first: int, times: np.ndarray, states: np.ndarray) -> SampleBlock:
+        """Samples within the steps of the latest call, taken before the corrections that follow it.
+
+        Args:
+            first: index of the first.
+            times, states: of each, as of ``SampleBlock``.
+        """
+        reference = None if self.charts is None else self.charts.references(times)
+        # what was put back until a sample: by all corrections before its own step
+        put_back = _NOTHING if self.projection is None else self.projection.corrections
+        return SampleBlock.of(first, times, states, self.wrapping.angles, put_back, reference)
+
+    def correct(self) -> None:
+        """Make the corrections if they are due; dense output of the latest step is void then."""
+        change = self.charts is not None and self.charts.near(self.stepper.state)
+        due = self.stepper.steps % self.stride == 0
+        if not (due or change):
+            return
+        if self.whole_times:
+            self.stepper.to_whole_time()
+        if due and self.wrapping.positions:
+            self.wrapping.wrap(self.stepper.state)
+        if due and self.projection is not None:
+            self.projection.project(self.stepper.state, self.stepper.time)
+        if change and self.charts is not None:
+            self._change_chart(self.charts)
+
+    def _change_chart(self, charts: Charts) -> None:
+        state = charts.change(self.stepper.state)
+        self.stepper.use(charts.chart)
+        if self.projection is not None:
+            self.projection.use(charts.chart)
+        self.stepper.state[:] = state

@@ -1,0 +1,167 @@
+"""The four ways through the samples, and which of them costs least for the next chunk of steps.
+
+All ways give the same bits (``rigidsim.solve.stepper``), so that whatever is chosen here changes cost alone.
+Each earns its place. CPU seconds of the loop without one way, over those with all four, by steps per sample
+(free asymmetric body, two shared cores, best of three):
+
+| | 1/16 | 1 | 16 | 100 | 2000 | 20000 |
+| --- | --- | --- | --- | --- | --- | --- |
+| double, no grids | 2.2 | 2.7 | 3.0 | 3.3 | 1.05 | 1.0 |
+| double, no skips | 1.0 | 0.9 | 1.0 | 1.0 | 1.0 | 5.0 |
+| double with events (no grids there), no blocks | 9.7 | 15 | 2.5 | 1.1 | 1.0 | 1.0 |
+| double with events, no skips | 0.9 | 1.0 | 1.0 | 1.5 | 3.1 | 3.5 |
+| double, projected, no grids | 3.3 | 7.7 | 9.4 | 9.3 | 1.0 | 1.0 |
+| double, Euler angles, no grids | 5.8 | 5.0 | 1.4 | 0.9 | 1.0 | 1.0 |
+| 80 bits, no grids | 1.4 | 1.5 | 1.6 | 1.5 | 1.0 | 1.0 |
+| 80 bits with events, no blocks | 9.2 | 10 | 1.4 | 0.9 | 1.1 | 1.0 |
+
+Single steps are what remains between the others, and all that pays beyond 80 bits, where a step is dear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.sampling import SampleClock
+
+
+class Way(Enum):
+    """A way through the samples."""
+
+    SKIP = "many steps towards a sample, without dense output"
+    GRID = "whole strides, and the states at sample times known beforehand"
+    BLOCK = "many steps with dense output"
+    STEP = "single steps with dense output"
+
+
+@dataclass(frozen=True)
+class Pacing:
+    """What the choice goes by; a user waits for Ctrl-C no longer than for a chunk and what is handed over.
+
+    Attributes:
+        chunk_seconds: between two looks at guards and Ctrl-C; well below the half second that a user waits.
+        patience: seconds until samples of a slow run are handed over.
+        rows_at_once: samples in a block that is evaluated; more are no faster, and take memory.
+        wide_rows_at_once: likewise of a closed form beyond double, where a row takes about a millisecond.
+        rows_waiting: samples in memory before they are evaluated, however fast they come.
+        grid_rows: most samples in a stride, which can't be shortened, for it to be taken as a grid; bounds
+            the memory, about 8 MB in double precision.
+        grid_strides: per sample, up to which grids (20 us each) cost less than skipping to each (85 us).
+        least_grid_steps: fewer are cheaper one by one.
+        block_steps: most steps in a block.
+        block_spacing: steps per sample up to which blocks (1 ms each, and 0.8 us a step) cost less than
+            skipping to each.
+        least_block_steps: fewer are cheaper one by one.
+        look_ahead: samples over which their spacing is measured.
+        skip_from: steps to a sample from which skipping costs less than single steps.
+        skip_margin: of the predicted steps to the next sample that are skipped at once.
+        fading: of the longest step of late, per chunk.
+    """
+
+    chunk_seconds: float = 0.1
+    patience: float = 2.0
+    rows_at_once: int = 8192
+    wide_rows_at_once: int = 64
+    rows_waiting: int = 32768
+    grid_rows: int = 65536
+    grid_strides: float = 4.0
+    least_grid_steps: int = 8
+    block_steps: int = 4096
+    block_spacing: float = 64.0
+    least_block_steps: int = 64
+    look_ahead: int = 16
+    skip_from: float = 12.0
+    skip_margin: float = 0.9
+    fading: float = 0.98
+
+
+MEASURED = Pacing()
+"""The defaults, which are those that cost least where they were measured."""
+
+
+class WayFinder:
+    """Chooses the way of each chunk from the steps of late.
+
+    Attributes:
+        longest: step of late, internal units; 0 before the first.
+    """
+
+    def __init__(
+        self, corrected: CorrectedStepper, clock: SampleClock, precision: Precision, pacing: Pacing
+    ) -> None:
+        self._corrected = corrected
+        self._clock = clock
+        self._cheap = precision.cheap
+        self._pacing = pacing
+        self._last = float(clock.at(clock.count - 1))
+        self._paces: dict[Way, float] = {}  # steps per second, as measured last
+        self.longest = 0.0
+
+    @property
+    def steps_left(self) -> float:
+        """To the last sample, in steps like the longest of the latest call; infinity where it had no size."""
+        size = self._corrected.stepper.largest
+        return (self._last - float(self._corrected.stepper.time)) / size if size > 0 else float("inf")
+
+    def measured(self, way: Way, steps: int, seconds: float) -> None:
+        """So many steps took so long; single ones are to be measured before anything is chosen."""
+        self._paces[way] = max(steps, 1) / max(seconds, 1e-9)
+
+    def _most(self, way: Way) -> int:
+        """Steps in a chunk."""
+        pace = self._paces.get(way, self._paces[Way.STEP])
+        return max(1, int(pace * self._pacing.chunk_seconds))
+
+    def went_past(self) -> None:
+        """A skip went past the sample: steps are longer than they seemed."""
+        self.longest = 1.5 * max(self.longest, self._corrected.stepper.largest)
+
+    def choose(self, following: int, upcoming: Scalar) -> tuple[Way, int]:
+        """How to go on, and for how many steps at most.
+
+        Args:
+            following, upcoming: index and time of the next sample.
+        """
+        corrected, pacing, stepper = self._corrected, self._pacing, self._corrected.stepper
+        # steps of a tumbling body vary a lot: predict with the longest of late, which fades slowly
+        self.longest = size = max(stepper.largest, pacing.fading * self.longest)
+        if size <= 0:
+            return Way.STEP, self._most(Way.STEP)
+        limit = 2**62
+        if self._cheap:
+            left = int(min((self._last - float(stepper.time)) / size, limit))
+            spacing = self._spacing(following)
+            if self._suits_grids(spacing):
+                if stepper.at_whole_time and left >= pacing.least_grid_steps:
+                    return Way.GRID, self._grid_steps(left)
+                limit = corrected.left  # to where a grid can start
+            elif spacing <= pacing.block_spacing:
+                if min(left, corrected.left) >= pacing.least_block_steps:
+                    wanted = max(1, int(pacing.rows_at_once * spacing), pacing.least_block_steps)
+                    return Way.BLOCK, min(pacing.block_steps, wanted, corrected.left, left)
+                limit = corrected.left  # to where a block is worth it again
+        expected = (float(upcoming) - float(stepper.time)) / size
+        if expected > pacing.skip_from:
+            steps = min(pacing.skip_margin * expected - 2, self._most(Way.SKIP), limit)
+            return Way.SKIP, max(1, int(steps))
+        return Way.STEP, min(self._most(Way.STEP), limit)
+
+    def _spacing(self, following: int) -> float:
+        """Steps per sample, over the next samples."""
+        ahead = min(following + self._pacing.look_ahead, self._clock.count - 1)
+        span = float(self._clock.at(ahead)) - float(self._corrected.stepper.time)
+        return span / self.longest / max(ahead - following, 1)
+
+    def _suits_grids(self, spacing: float) -> bool:
+        stride, pacing = self._corrected.stride, self._pacing
+        fits = spacing * pacing.grid_rows >= stride
+        return self._corrected.whole_times and fits and spacing <= pacing.grid_strides * stride
+
+    def _grid_steps(self, left: int) -> int:
+        """Whole strides, or all that is left and more: what a grid leaves over would go step by step."""
+        stride = self._corrected.stride
+        count = min(self._most(Way.GRID), left + left // 2 + self._pacing.least_grid_steps)
+        return count - count % stride if count > stride else count

@@ -1,0 +1,86 @@
+"""A block of samples on its way from the integration to whoever keeps it: one value with named columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidsim.solve.angle_wrapping import AngleState
+
+_NOTHING = np.zeros(0)
+
+
+@dataclass(frozen=True)
+class SampleBlock:
+    """Consecutive samples; all columns have one row for each.
+
+    Attributes:
+        first: index of the first.
+        times: (n,), internal units, in the run's precision.
+        states: (n, states), internal units, in the run's precision, angles wrapped.
+        turns: (n, 3) int64, full turns of the angle states; (n, 0) without angle states.
+        chart: (n,) int64, 0 in the asked Euler sequence, 1 in its partner.
+        reference: (n, 3) float64, rad: in the partner chart the asked angles shortly before each sample, from
+            which it has its turns and its branch; zeros in the asked chart, (n, 0) without angle states.
+        put_back: (n, projected scalars) float64, what was put back of each until the sample.
+    """
+
+    first: int
+    times: np.ndarray
+    states: np.ndarray
+    turns: np.ndarray
+    chart: np.ndarray
+    reference: np.ndarray
+    put_back: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        first: int,
+        times: np.ndarray,
+        states: np.ndarray,
+        angles: AngleState,
+        put_back: np.ndarray = _NOTHING,
+        reference: np.ndarray | None = None,
+    ) -> SampleBlock:
+        """Samples between which the turns, the chart and what was put back don't change.
+
+        Args:
+            angles: of all of them.
+            put_back: (projected scalars,), likewise; not copied.
+            reference: one row for each sample; None where it doesn't change either.
+        """
+        n = len(times)
+        turns = np.array([angles.turns], dtype=np.int64)
+        if reference is None:
+            reference = np.array([angles.reference], dtype=np.float64).repeat(n, axis=0)
+        return cls(
+            first,
+            times,
+            states,
+            turns.repeat(n, axis=0),
+            np.full(n, angles.chart, dtype=np.int64),
+            reference,
+            put_back[None, :].repeat(n, axis=0),
+        )
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def _columns(self) -> tuple[np.ndarray, ...]:
+        return self.times, self.states, self.turns, self.chart, self.reference, self.put_back
+
+    def rows(self, start: int, stop: int) -> SampleBlock:
+        """Samples start ... stop-1 of the block, or as many of them as there are."""
+        return SampleBlock(self.first + start, *(column[start:stop] for column in self._columns))
+
+    @staticmethod
+    def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
+        """One block of several that follow one another, at least one."""
+        if len(blocks) == 1:
+            return blocks[0]
+        columns = zip(*(block._columns for block in blocks), strict=True)
+        return SampleBlock(blocks[0].first, *(np.concatenate(column) for column in columns))

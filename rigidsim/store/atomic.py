@@ -1,0 +1,73 @@
+"""Files and folders that take the place of others in one step, so that none is ever seen half-written.
+
+What is new comes into being under a hidden name beside its place, which no other process uses, is synced to
+disk and then renamed; so what has a final name is whole, whatever kills the process or fills the disk.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary path beside ``path`` for a file that replaces it when the block ends without an error.
+
+    Raises:
+        OSError: it can't be written.
+    """
+    temporary = _hidden(path, "partial")
+    try:
+        yield temporary
+        descriptor = os.open(temporary, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        os.replace(temporary, path)
+        sync_folder(path.parent)
+    except BaseException:
+        with suppress(OSError):  # of a file system that became read-only; what matters is the first error
+            temporary.unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """The same for a folder, in two steps where there is one: a rename can't replace a folder with files.
+
+    Raises:
+        OSError: it can't be written.
+    """
+    temporary, old = _hidden(path, "partial"), _hidden(path, "replaced")
+    try:
+        yield temporary
+        if path.exists():
+            os.replace(path, old)
+        os.replace(temporary, path)
+    finally:
+        for leftover in (temporary, old):
+            shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _hidden(path: Path, what: str) -> Path:
+    return path.with_name(f".{path.name}.{os.getpid()}.{what}")
+
+
+def sync_folder(folder: Path) -> None:
+    """Make new names in a folder outlast a loss of power."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def write_bytes(path: Path, content: bytes | memoryview) -> None:
+    """Write a small file atomically."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)

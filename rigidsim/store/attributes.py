@@ -1,0 +1,134 @@
+"""The root attributes of segments and datasets: one definition to write, read and compare them by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from rigidsim.errors import RunFolderError
+from rigidsim.store import segments
+
+
+class Use(Enum):
+    """What an attribute is for, beside being read."""
+
+    SYSTEM = "must be the same for a run to be resumed"
+    SETTING = "must be the same when a dataset is verified"
+    PLATFORM = "versions and machine features that bits can depend on"
+    REPEATED = "stands in the summary, too"
+
+
+class RootAttributes(BaseModel):
+    """Root attributes; those that are None, as some of older versions and of segments are, don't stand there.
+
+    Attributes:
+        run_id: tells this run from all others.
+        states: names, in order.
+        tolerance: effective.
+        unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back: JSON.
+        principal_moments, inertia_tensor: kg m^2.
+        python_loads: names of classes.
+        started_at, finished_at: UTC.
+        mixed_provenance: where the run was resumed with other versions or on another machine, what changed.
+        warnings: one a line.
+        wall_seconds, cpu_seconds: of all sessions.
+    """
+
+    model_config = ConfigDict(frozen=True, strict=True)
+
+    Conventions: str
+    title: str
+    comment: str
+    source: str
+    run_id: str | None = None
+    schema_version: int
+    status: Annotated[str, Use.SETTING]
+    config: str
+    config_sha256: Annotated[str, Use.REPEATED]
+    formulation: Annotated[str, Use.SYSTEM, Use.SETTING]
+    euler_sequence: Annotated[str, Use.SYSTEM]
+    euler_partner_sequence: str | None = None
+    states: Annotated[str, Use.SYSTEM, Use.SETTING]
+    precision: Annotated[str, Use.SETTING]
+    precision_bits: Annotated[int, Use.SYSTEM]
+    tolerance: Annotated[float, Use.SYSTEM, Use.SETTING]
+    integrator: str
+    method: Annotated[str | None, Use.SYSTEM] = None
+    hold_invariants: Annotated[int | None, Use.SYSTEM] = None
+    taylor_order: Annotated[int, Use.SYSTEM, Use.SETTING, Use.REPEATED]
+    compact_mode: Annotated[int, Use.SYSTEM, Use.SETTING, Use.REPEATED]
+    high_accuracy: Annotated[int, Use.SETTING]
+    batch_size: Annotated[int, Use.SETTING]
+    unit_exponents: Annotated[str, Use.SYSTEM, Use.SETTING, Use.REPEATED]
+    principal_moments: str
+    principal_axes: str
+    inertia_tensor: str
+    body_source: str
+    drawing: str
+    python_loads: str = ""
+    cpu_model: Annotated[str, Use.REPEATED]
+    started_at: Annotated[str, Use.REPEATED]
+    version_python: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    version_heyoka: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    version_numpy: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    version_rigidsim: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    version_mpmath: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    version_h5py: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    version_h5netcdf: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    code_llvm: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    code_target_cpu: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    code_target_features_sha256: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    code_optimisation_level: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    code_fast_math: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    code_slp_vectorize: Annotated[str, Use.PLATFORM, Use.REPEATED]
+    mixed_provenance: str | None = None
+    status_message: str | None = None
+    warnings: str | None = None
+    steps: Annotated[int | None, Use.SETTING] = None
+    wall_seconds: float | None = None
+    cpu_seconds: float | None = None
+    finished_at: str | None = None
+    put_back: str | None = None
+
+    def having(self, **known: Any) -> Self:
+        """A copy with what has become known since."""
+        return type(self)(**{**dict(self), **known})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Those that stand in the file."""
+        return self.model_dump(exclude_none=True)
+
+    def of_use(self, use: Use) -> dict[str, Any]:
+        """Those that are for one use."""
+        return {name: getattr(self, name) for name in _names(use)}
+
+    def changed(self, use: Use, now: RootAttributes) -> Iterator[tuple[str, Any, Any]]:
+        """Name, value here and value now of those that differ; what an older version didn't say doesn't."""
+        then, others = self.of_use(use), now.of_use(use)
+        for name, value in then.items():
+            if value is not None and value != others[name]:
+                yield name, value, others[name]
+
+
+def _names(use: Use) -> list[str]:
+    return [name for name, field in RootAttributes.model_fields.items() if use in field.metadata]
+
+
+def read_attributes(path: Path) -> RootAttributes:
+    """The root attributes of a dataset or segment.
+
+    Raises:
+        RunFolderError: it is none of rigidsim.
+    """
+    try:
+        return RootAttributes.model_validate(segments.root_attributes(path))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(step)[:40] for step in first["loc"])
+        raise RunFolderError(
+            f"{path}: is no dataset of rigidsim (attribute {where!a}: {first['msg']})"
+        ) from None

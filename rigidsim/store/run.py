@@ -1,0 +1,116 @@
+"""Runs on disk, finished or partial, opened for reading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigidsim.errors import RunFolderError
+from rigidsim.store import provenance, segments
+from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.joined_segments import join_segments
+from rigidsim.store.seal import check_whole, read_seal
+from rigidsim.store.summary import Brief
+from rigidsim.store.validated_open import open_dataset
+from rigidsim.store.variables import SCHEMA_VERSION
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run on disk, finished or partial.
+
+    Attributes:
+        folder: its files.
+        outcome: what ``summary.json`` says; a ``Summary`` where the run ended.
+    """
+
+    folder: RunFolder
+    outcome: Brief
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The content of ``summary.json``."""
+        return self.outcome.as_dict()
+
+    @property
+    def status(self) -> str:
+        """How it ended; ``"finished"`` is the only complete one."""
+        return self.outcome.status
+
+    @property
+    def saved(self) -> bool:
+        """Whether anything is on disk that ``dataset`` could read."""
+        return self.folder.dataset.exists() or bool(segments.segment_paths(self.folder.segments))
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """The dataset, read lazily; of an unfinished run what its segments hold.
+
+        Raises:
+            RunFolderError: nothing was saved, or a file is damaged.
+        """
+        return self.opened()
+
+    def opened(self, *, indexed: bool = True) -> xarray.Dataset:
+        """As ``dataset``; not ``indexed``, no sample times are held in memory, and none can be selected by.
+
+        Raises:
+            RunFolderError: nothing was saved, or a file is damaged.
+        """
+        if self.folder.dataset.exists():
+            # a run that is completed once more after a crash still has the summary of the first time, or none
+            claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest
+            return open_dataset(_whole(self.folder.dataset, claimed), indexed=indexed)
+        chain = segments.read_chain(self.folder.segments)
+        if chain.damage is not None:
+            raise RunFolderError(f"{chain.damage}; rigidsim resume sets it aside and resumes before it")
+        if not chain.paths:
+            lost = self.outcome.dataset_digest is not None
+            what = "its dataset.h5 is missing; run it again with --force" if lost else "nothing was saved"
+            raise RunFolderError(f"{self.folder.path}: {what}")
+        return join_segments(chain.paths, status=self.status, indexed=indexed)
+
+
+def _whole(path: Path, expected: str | None) -> Path:
+    """A dataset's path, after its seal was checked; datasets of the first schema version had none.
+
+    Args:
+        expected: SHA-256 of the file, where the summary beside it tells.
+
+    Raises:
+        RunFolderError: damaged, edited, exchanged, or of a version that is newer than this rigidsim.
+    """
+    try:
+        unsealed = read_seal(path) is None
+        digest = provenance.file_sha256(path) if unsealed else check_whole(path)[1]
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
+    labels = segments.root_attributes(path)
+    version = labels.get("schema_version")
+    if not isinstance(version, int) or version > SCHEMA_VERSION:
+        raise RunFolderError(
+            f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
+            "install a newer one"
+        )
+    if version > 1 and unsealed:
+        raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
+    if "segment" in labels:
+        raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
+    if expected not in (None, digest):
+        raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
+    return path
+
+
+def open_run(path: str | Path) -> Run:
+    """Open a run folder, or the dataset in one, finished or partial.
+
+    Raises:
+        RunFolderError: no run there, or a damaged summary.
+    """
+    folder = find_run(path)
+    return Run(folder, folder.read_summary())

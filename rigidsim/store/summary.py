@@ -1,0 +1,320 @@
+"""What ``summary.json`` says of a run: one definition, by which it is written, read with distrust, and shown.
+
+A field that isn't given isn't written, so that summaries of older versions, which say less, are read and
+written again as they are.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    ValidationError,
+)
+
+from rigidsim.errors import RunFolderError
+
+ENGINE = "engine"
+"""Beside the phases in ``Cost.seconds``: what the engine alone took of integrating and recording."""
+_LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Marks a field that follows from the config alone, so that running it again must confirm it.
+
+    Attributes:
+        since: schema version of the dataset from which the field means what it means now.
+        of_end: whether it says how the run ended, which an interruption changes.
+    """
+
+    since: int = 1
+    of_end: bool = False
+
+
+class WarningCode(Enum):
+    """Why a result isn't to be trusted, or not wholly; ``value`` stands in summaries."""
+
+    DRIFT = "drift"
+    SINGULARITY = "singularity"
+    NO_EFFECT = "no_effect"
+    ATTITUDE_UNCERTAIN = "attitude_uncertain"
+    RATES_UNCERTAIN = "rates_uncertain"
+    NOT_JOINED = "not_joined"
+    SET_ASIDE = "set_aside"
+    BEGUN_ANEW = "begun_anew"
+    NOT_CERTIFIED = "not_certified"
+
+
+@dataclass(frozen=True)
+class Caution:
+    """A warning: its code for decisions, its text for people."""
+
+    code: WarningCode
+    text: str
+
+
+def _with_engine(seconds: dict[str, float]) -> dict[str, float]:
+    if ENGINE not in seconds:
+        raise ValueError(f'"{ENGINE}" is missing')
+    return seconds
+
+
+FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Text = Annotated[StrictStr, Field(max_length=20_000)]
+Digest = Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")]
+Seconds = Annotated[dict[Text, FiniteNumber], AfterValidator(_with_engine)]
+
+
+class _Part(BaseModel):
+    """Immutable; what a newer version wrote beside the fields is kept."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants")
+
+    def having(self, **known: Any) -> Self:
+        """A copy with what has become known since, checked as on reading."""
+        given = {name: value for name, value in self if name in self.model_fields_set}
+        return type(self).model_validate({**given, **known})
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; nothing that wasn't given."""
+        return self.model_dump(mode="json", exclude_unset=True)
+
+
+class Cost(_Part):
+    """What a run took.
+
+    Attributes:
+        steps_redone: of the steps, those that were taken once more on the way to an event or a chart.
+        smallest_step, largest_step: seconds; None where no step was taken, or none was finite.
+        seconds, cpu_by_phase: of this session by phase, on the wall and of the CPU.
+        cpu_seconds, wall_seconds: of all sessions.
+    """
+
+    steps: Annotated[StrictInt, Claim()]
+    steps_redone: StrictInt
+    smallest_step: FiniteNumber | None
+    largest_step: FiniteNumber | None
+    seconds: Seconds
+    cpu_seconds: FiniteNumber
+    cpu_by_phase: dict[Text, FiniteNumber] = Field(default_factory=dict)
+    sessions: StrictInt = 1
+    wall_seconds: FiniteNumber | None = None
+
+
+class Invariant(_Part):
+    """How well one was kept.
+
+    Attributes:
+        initial: value, or components, in ``units``.
+        scale: what drifts are relative to, in ``units``.
+        largest_drift, final_drift: relative; None where no sample was taken.
+        bound: which rounding alone explains.
+        put_back: of a held one, what the drift would have been.
+        why: it is one.
+        numerical: whether it is kept by definition, whatever the motion.
+    """
+
+    initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Claim()]
+    units: Annotated[Text, Claim()]
+    scale: Annotated[FiniteNumber, Claim()]
+    scale_name: Annotated[Text, Claim()]
+    largest_drift: Annotated[FiniteNumber | None, Claim()]
+    final_drift: Annotated[FiniteNumber | None, Claim()]
+    bound: Annotated[FiniteNumber, Claim()]
+    put_back: Annotated[FiniteNumber | None, Claim(since=3)] = None  # from then on with its sign
+    why: Annotated[Text, Claim()]
+    numerical: Annotated[StrictBool, Claim()]
+
+
+class Accuracy(_Part):
+    """How right the attitude is at the end, rad: asked for, estimated, and certified by a reference.
+
+    Attributes:
+        amplification: of rounding errors by the motion.
+        error_growth_rate: 1/s; 0 where errors don't grow exponentially.
+        predictable_seconds: from the start, after which no digit is left; None where that is never.
+        how: the certificate came about.
+        chosen, chosen_why, forecast: the setting that was chosen for ``requested``, and its forecast.
+    """
+
+    requested: FiniteNumber | None
+    estimated_attitude_error: FiniteNumber | None
+    estimated_how: Text
+    amplification: FiniteNumber | None = 1.0
+    error_growth_rate: FiniteNumber | None = None
+    predictable_seconds: FiniteNumber | None = None
+    amplification_seconds: FiniteNumber | None = None
+    amplification_how: Text = ""
+    certified: FiniteNumber | None
+    how: Text
+    difference_at_end: FiniteNumber | None = None
+    times_compared: StrictInt = 0
+    chosen: Text = ""
+    chosen_why: Text = ""
+    forecast: FiniteNumber | None = None
+
+
+class Lyapunov(_Part):
+    """The spectrum of the motion, 1/s, with what it says of the run's digits."""
+
+    chaotic: Annotated[StrictBool, Claim()]
+    largest_exponent: Annotated[FiniteNumber, Claim()]
+    moved_over_second_half: Annotated[FiniteNumber, Claim()]
+    e_folding_seconds: FiniteNumber | None = None
+    predictable_seconds: FiniteNumber | None = None
+    exponents: Annotated[tuple[FiniteNumber, ...], Claim()] = ()
+    states: tuple[Text, ...] = ()
+    units: Text = "s-1"
+
+
+class Body(_Part):
+    """Where the inertia came from; principal moments (kg m^2) and axes, mass (kg)."""
+
+    source: Text
+    principal_moments: tuple[FiniteNumber, ...]
+    principal_axes: tuple[tuple[FiniteNumber, ...], ...]
+    mass: FiniteNumber | None
+
+
+class ChartChanges(_Part):
+    """How often a run in Euler angles went from its sequence to the partner or back."""
+
+    count: StrictInt
+    sequence: Text
+    partner: Text
+
+
+class BitForBit(_Part):
+    """Whether running again gives the same bits, and on what condition."""
+
+    claim: StrictBool
+    holds_for: StrictStr
+
+
+class Brief(_Part):
+    """What any summary says; of a run that is under way, or was killed, no more."""
+
+    name: Annotated[Text, Claim()] = ""
+    description: Annotated[StrictStr, Claim()] = ""
+    status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$"), Claim(of_end=True)]
+    message: Annotated[Text, Claim(of_end=True)] = ""
+    exit_code: Annotated[StrictInt, Claim(of_end=True)] = 0
+
+    @property
+    def dataset_digest(self) -> str | None:
+        """SHA-256 of the complete dataset; None where there was none yet."""
+        return None
+
+
+class Summary(Brief):
+    """Of a run that ended.
+
+    Attributes:
+        warnings, warning_codes: texts, and a ``WarningCode`` for each; older summaries have the texts alone.
+        time_reached: seconds.
+        provenance: attributes of the dataset that are repeated here.
+        dataset_sha256, timeline_sha256: of the files, once there are any.
+    """
+
+    warnings: tuple[Text, ...]
+    warning_codes: tuple[Text, ...] = ()
+    samples: Annotated[StrictInt, Claim()]
+    samples_planned: Annotated[StrictInt, Claim()]
+    time_reached: Annotated[FiniteNumber, Claim()]
+    formulation: Annotated[Text, Claim()]
+    states: Annotated[tuple[Text, ...], Claim()]
+    precision: Annotated[Text, Claim()]
+    tolerance: Annotated[FiniteNumber, Claim()]
+    cost: Cost
+    method: Annotated[Text, Claim()] = "taylor"
+    hold_invariants: Annotated[StrictBool, Claim()] = False
+    invariants: dict[Text, Invariant]
+    accuracy: Accuracy
+    lyapunov: Lyapunov | None = None
+    body: Annotated[Body, Claim()]
+    bit_for_bit: BitForBit
+    provenance: dict[Text, StrictStr | StrictInt]
+    events: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
+    chart_changes: Annotated[ChartChanges | None, Claim()] = None
+    dataset_sha256: Digest | None = None
+    timeline_sha256: Digest | None = None
+
+    @property
+    def dataset_digest(self) -> str | None:
+        """SHA-256 of the complete dataset; None where there was none yet."""
+        return self.dataset_sha256
+
+    @property
+    def cautions(self) -> list[Caution]:
+        """The warnings with their codes.
+
+        Raises:
+            ValueError: the summary is of another version.
+        """
+        pairs = zip(self.warning_codes, self.warnings, strict=True)
+        return [Caution(WarningCode(code), text) for code, text in pairs]
+
+    def warned(self, cautions: Iterable[Caution]) -> Self:
+        """A copy with these warnings in place of its own."""
+        return self.having(**as_fields(cautions))
+
+
+def as_fields(cautions: Iterable[Caution]) -> dict[str, Any]:
+    """The two fields of a summary that hold warnings."""
+    kept = list(cautions)
+    return {
+        "warnings": tuple(caution.text for caution in kept),
+        "warning_codes": tuple(caution.code.value for caution in kept),
+    }
+
+
+def read_summary(path: Path) -> Brief:
+    """What a ``summary.json`` says: a ``Summary`` where the run ended.
+
+    Raises:
+        RunFolderError: it can't be read, or isn't what a run writes; the text names the first thing wrong.
+    """
+    try:
+        size = path.stat().st_size
+        if path.is_symlink() or size > _LARGEST_FILE:
+            raise ValueError("a symbolic link" if path.is_symlink() else f"{size} bytes long")
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(content, dict):
+            raise ValueError("no JSON object")
+        return (Summary if "cost" in content else Brief).model_validate(_visible(content))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(step)[:40] for step in first["loc"])
+        raise RunFolderError(
+            f"{path}: is damaged or no summary of rigidsim ({where!a}: {first['msg']})"
+        ) from None
+    except RecursionError:
+        raise RunFolderError(f"{path}: is damaged or no summary of rigidsim (nested too deeply)") from None
+    except (OSError, ValueError) as error:
+        raise RunFolderError(f"{path}: is damaged or no summary of rigidsim ({str(error)[:200]})") from None
+
+
+def _visible(value: Any) -> Any:
+    """Without characters that a terminal would obey."""
+    if isinstance(value, str):
+        return "".join(
+            c if c in "\n\t" or c.isprintable() or ord(c) > 0xA0 else ascii(c)[1:-1] for c in value
+        )
+    if isinstance(value, list):
+        return [_visible(item) for item in value]
+    if isinstance(value, dict):
+        return {str(_visible(key)): _visible(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,69 @@
+"""A finished run held against an independent solution, where its config asks for an accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rigidsim.accuracy.certificate import certify, verdict
+from rigidsim.accuracy.choice import Choice
+from rigidsim.scene.config import Experiment
+from rigidsim.session.session import Session
+from rigidsim.solve.status import Status
+from rigidsim.store.run import Run
+from rigidsim.store.summary import Caution, Summary, WarningCode
+
+
+def certified(
+    result: Run,
+    experiment: Experiment,
+    choice: Choice | None,
+    session: Session,
+    loads: Sequence[Any] = (),
+) -> tuple[Run, bool]:
+    """A finished run's certificate, put into its summary, where ``accuracy`` asks for one.
+
+    Args:
+        session: that the run was made in; the certificate's cost is part of its.
+
+    Returns:
+        The run, and False where the accuracy was not kept.
+    """
+    asked, summary = experiment.config.integrator.accuracy, result.outcome
+    complete = result.status in (Status.FINISHED.value, Status.EVENT.value)
+    if asked is None or not complete or not isinstance(summary, Summary):
+        return result, True
+    session.observer.phase("certify")
+    accuracy = float(asked.rational)
+    with result.dataset as dataset:
+        found = certify(
+            dataset,
+            experiment,
+            accuracy=accuracy,
+            loads=loads,
+            known=None if choice is None else choice.known,
+            told=session.observer.trying,
+        )
+    known: dict[str, Any] = {"requested": accuracy}
+    doubt: str | None = "too little was recorded to certify the accuracy asked for"
+    if found is not None:
+        doubt = verdict(found, accuracy)
+        known |= found.as_dict()
+    if choice is not None:
+        known |= {"chosen": choice.setting.title, "chosen_why": choice.why, "forecast": choice.forecast}
+    cautions = summary.cautions
+    if doubt is None:  # what is certified needs no estimate
+        cautions = [c for c in cautions if c.code is not WarningCode.ATTITUDE_UNCERTAIN]
+    else:
+        cautions.append(Caution(WarningCode.NOT_CERTIFIED, doubt))
+    session.phases.next("certify")
+    phases, effort = session.phases, session.effort
+    cost = summary.cost.having(
+        seconds=dict(phases.wall),
+        cpu_by_phase=dict(phases.cpu),
+        cpu_seconds=effort.cpu,
+        wall_seconds=effort.wall,
+    )
+    summary = summary.warned(cautions).having(accuracy=summary.accuracy.having(**known), cost=cost)
+    result.folder.write_summary(summary)
+    return Run(result.folder, summary), doubt is None

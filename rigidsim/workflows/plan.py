@@ -1,0 +1,146 @@
+"""``rigidsim plan``: what would be integrated and why, and what it will cost, from a short pilot."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigidsim.accuracy.choice import chosen
+from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
+from rigidsim.accuracy.motion import run_pilot
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment
+from rigidsim.session.variables import dataset_variables
+from rigidsim.solve.assembly import assemble
+from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.sample_block import SampleBlock
+
+_PILOT_SECONDS = 0.5
+_LARGEST_CHUNK = 1024  # of steps: calls cost next to nothing
+_SHRINK = 0.9  # gzip on doubles whose low bits are noise; measured 0.85 to 0.95
+_TIMELINE_ROW_BYTES = 260.0  # measured; falls with repeated values
+_BASE_MEMORY = 250e6  # interpreter, libraries and compiled code
+_COMPRESSION = 2.5e-8  # seconds a byte: gzip 4 with shuffle writes about 40 MB/s
+_BUFFERING = 2e-7  # seconds a sample
+_EVALUATED = {True: 4096, False: 16}  # samples, in precisions with cheap arithmetic and without
+
+
+def plan(
+    experiment: Experiment,
+    *,
+    loads: Sequence[Load] = (),
+    pilot_seconds: float = _PILOT_SECONDS,
+) -> dict[str, Any]:
+    """Explain and predict a run; integrates for about half a second and writes nothing.
+
+    Args:
+        loads: loads of one's own, as of ``rigidsim.run``.
+        pilot_seconds: CPU seconds to integrate, at most; some thousands of steps tell the mean.
+
+    Returns:
+        A JSON-like dictionary: states, reasons, invariants, steps, seconds, bytes.
+
+    Raises:
+        ConfigError: the config can't be run.
+    """
+    experiment, choice = chosen(experiment, loads=loads)
+    prepared = prepare(experiment, loads=loads)
+    closed, why_not = closed_form_if_any(prepared.scene, driven=bool(loads))
+    started = time.perf_counter()
+    parts = assemble(prepared)
+    compile_seconds = time.perf_counter() - started
+    corrected = parts.corrected
+    pilot = run_pilot(
+        corrected.stepper,
+        prepared.clock,
+        corrected.skip,
+        seconds=pilot_seconds,
+        chunk=1,
+        largest_chunk=_LARGEST_CHUNK,
+    )
+    step = math.ldexp(pilot.step, prepared.system.scaling.time)
+    duration = float(prepared.scene.samples.last - prepared.scene.start)
+    steps = max(1.0, duration / step)
+    samples = prepared.clock.count
+    row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
+    rows_shown = min(samples, prepared.scene.config.output.timeline_rows)
+    seconds_per_sample = _seconds_per_sample(prepared, parts.corrected, parts.evaluator, row)
+    integrate = steps * pilot.seconds_per_step
+    record = samples * seconds_per_sample
+    system = prepared.system
+    rate = float(system.rate_bound)
+    growth = motion_growth(prepared)
+    return {
+        "name": prepared.scene.name,
+        "formulation": system.requirements.formulation,
+        "euler_sequence": system.sequence if system.angle_states else None,
+        "euler_partner_sequence": None if system.partner is None else system.partner.sequence,
+        "states": system.states,
+        "state_count": len(system.states),
+        "loads": [load.effect for load in system.plan.loads],
+        "reasons": [{"states": s, "why": w} for s, w in system.reasons],
+        "left_out": [{"what": s, "why": w} for s, w in system.requirements.left_out],
+        "equations": [f"{v}' = {rhs}" for v, rhs in system.equations],
+        "internal_units": {
+            "time_s": math.ldexp(1.0, system.scaling.time),
+            "inertia_kg_m2": math.ldexp(1.0, system.scaling.inertia),
+        },
+        "recorded": [v.name for v in dataset_variables(prepared)],
+        "invariants": [{"name": i.name, "why": i.why, "numerical": i.numerical} for i in system.invariants],
+        "precision": prepared.precision.name,
+        "tolerance": prepared.effective_tolerance,
+        "method": prepared.scene.config.integrator.method,
+        "closed_form": None if closed is None else closed.title,
+        "closed_form_why_not": why_not or None,
+        "hold_invariants": prepared.holds_invariants,
+        "accuracy": None
+        if choice is None
+        else {"chosen": choice.setting.title, "why": choice.why, "forecast": choice.forecast},
+        "taylor_order": int(corrected.stepper.integrator.order),
+        "pilot": {
+            "steps": float(pilot.taken),
+            "step": step,
+            "seconds_per_step": pilot.seconds_per_step,
+            "seconds_per_sample": seconds_per_sample,
+        },
+        "predicted": {
+            "steps": steps,
+            "integration_seconds": integrate,
+            "recording_seconds": record,
+            "total_seconds": compile_seconds + integrate + record,
+            "memory_bytes": _BASE_MEMORY + min(samples * row, 64e6) * 3,
+            "dataset_bytes": samples * row * _SHRINK,
+            "timeline_bytes": rows_shown * _TIMELINE_ROW_BYTES
+            if prepared.scene.config.output.timeline
+            else 0.0,
+            "attitude_error_rad": None
+            if system.requirements.formulation == "rates"
+            else attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth),
+            "amplification": growth.at(duration),
+        },
+        "body": {
+            "source": prepared.scene.body.source,
+            "principal_moments": [float(m) for m in prepared.scene.body.principal_moments],
+            "principal_axes": [[float(x) for x in a] for a in prepared.scene.body.principal_axes],
+        },
+    }
+
+
+def _seconds_per_sample(
+    prepared: InitialValueProblem, corrected: CorrectedStepper, evaluator: Evaluator, row: float
+) -> float:
+    """What a sample of so many bytes costs."""
+    count = _EVALUATED[prepared.precision.cheap]
+    states = np.repeat(prepared.precision.array(prepared.system.initial)[None, :], count, axis=0)
+    times = np.repeat(prepared.clock.internal(0, 1), count)
+    block = SampleBlock.of(0, times, states, corrected.wrapping.angles)
+    started = time.perf_counter()
+    evaluator.evaluate(block)
+    evaluation = (time.perf_counter() - started) / count
+    return evaluation + row * _COMPRESSION + _BUFFERING

@@ -1,0 +1,261 @@
+"""Resuming a run that was interrupted, killed or stopped, and prolonging a finished one, to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidsim.errors import RunFolderError
+from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.session.attributes import root_attributes as attributes_now
+from rigidsim.session.guards import Observer
+from rigidsim.session.session import Session
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.status import Status
+from rigidsim.solve.stepper import Stepper
+from rigidsim.store import atomic, netcdf
+from rigidsim.store.attributes import Use, read_attributes
+from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.run import Run, open_run
+from rigidsim.store.seal import check_seal
+from rigidsim.store.segments import Chain, read_chain, root_attributes
+from rigidsim.store.summary import Caution, WarningCode
+from rigidsim.store.variables import SCHEMA_VERSION
+from rigidsim.workflows.certify import certified
+from rigidsim.workflows.verify import text_difference
+
+if TYPE_CHECKING:
+    from rigidsim.model.load import Load
+
+_ROWS_AT_ONCE = 65536
+
+
+def resume(
+    path: str | Path,
+    *,
+    until: str | None = None,
+    overrides: Sequence[str] = (),
+    observer: Observer | None = None,
+    loads: Sequence[Load] = (),
+    tuning: Tuning | None = None,
+) -> Run:
+    """Resume a run from its last checkpoint.
+
+    Args:
+        path: run folder.
+        until: a later end, as in ``[time] end``; a finished run is prolonged to it.
+        overrides: ``limits.KEY=VALUE``: guards of this session in place of the config's.
+        observer: is told how it goes.
+        loads: those that the run was begun with.
+        tuning: as of ``rigidsim.run``.
+
+    Returns:
+        The run. Its dataset is bit for bit that of a run in one go, on the same versions and CPU features;
+        on others the summary says so.
+
+    Raises:
+        RunFolderError: no run, a finished one, one in use, one that can't be written, or one whose config or
+            segments were changed.
+        ConfigError: a bad ``until`` or override.
+    """
+    folder = find_run(path)
+    session = Session(observer or Observer(), tuning=tuning or Tuning())
+    with folder.locked():
+        _refuse_links(folder)
+        if folder.read_only is None:
+            folder.remove_torn()
+        experiment = _config(folder, overrides)
+        if until is not None:
+            experiment = _prolonged(experiment, until)
+        experiment = _guarded(experiment, overrides)
+        # a run that was killed while its dataset was completed has both, and is completed again
+        finished = folder.dataset.exists() and not folder.segments.exists()
+        if finished and until is None:
+            done = open_run(folder.path)
+            raise RunFolderError(
+                f"{folder.path}: nothing is left to do: {done.outcome.message or done.status}; "
+                "--until prolongs it to a later end"
+            )
+        folder.refuse_read_only()
+        lost = not folder.dataset.exists() and not folder.segments.exists()
+        if lost and folder.read_summary().dataset_digest is not None:
+            raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with --force")
+        chain = _of_finished(folder) if finished else read_chain(folder.segments)
+        prepared = prepare(experiment, loads=loads)
+        if chain.paths:
+            session.mixed = _compared(prepared, chain)
+        if finished:
+            folder.reopen()
+            chain = read_chain(folder.segments)
+        if chain.damage is not None:
+            session.remarks.append(_set_aside(chain, folder))
+        if until is not None:
+            atomic.write_bytes(folder.config, experiment.text.encode())
+        if not chain.paths:
+            text = "nothing had been saved, so the run began anew"
+            session.remarks.append(Caution(WarningCode.BEGUN_ANEW, text))
+        run = session.execute(prepared, folder, chain if chain.paths else None)
+        return certified(run, prepared.experiment, None, session, loads)[0]
+
+
+def _refuse_links(folder: RunFolder) -> None:
+    for place in (folder.path, folder.segments):
+        if place.is_symlink():
+            raise RunFolderError(f"{place}: is a symbolic link, which no run writes; give its target")
+        for entry in place.iterdir() if place.is_dir() else ():
+            if entry.is_symlink():
+                raise RunFolderError(f"{entry}: is a symbolic link, which no run writes; remove it")
+
+
+def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
+    foreign = [o for o in overrides if not o.strip().startswith("limits.")]
+    if foreign:
+        raise RunFolderError(
+            f"--set {foreign[0]}: would change the experiment; only limits.KEY=VALUE is allowed here"
+        )
+    try:
+        text = folder.config.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RunFolderError(f"{folder.config}: can't be read ({error})") from None
+    return parse_saved(text, source=str(folder.config))
+
+
+def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
+    """The same experiment, and text, under other guards."""
+    if not overrides:
+        return experiment
+    guarded = parse_saved(experiment.text, source=experiment.source, overrides=overrides)
+    limits = guarded.config.limits
+    return replace(experiment, config=experiment.config.model_copy(update={"limits": limits}))
+
+
+def _prolonged(experiment: Experiment, until: str) -> Experiment:
+    """The same experiment to a later end, with samples as far apart as before."""
+    from rigidsim.scene.scene import build_scene
+
+    before = build_scene(experiment).samples
+    if before.times is not None:
+        raise RunFolderError("--until: this run has a list of sample times, which no later end prolongs")
+    text = experiment.text
+    later = parse_saved(text, source=experiment.source, overrides=[f"time.end={until}"])
+    if later.config.time.every is None:
+        end = build_scene(later).samples.last
+        ratio = (end - before.start) * before.intervals / before.span
+        count = int(ratio + 0.5)
+        if abs(ratio - count) > ratio * 2.0**-100:
+            raise RunFolderError(
+                f"--until {until}: lies between two samples of the grid; give a whole number of intervals "
+                "of (end - start) / (samples - 1)"
+            )
+        overrides = [f"time.end={until}", f"time.samples={count + 1}"]
+        later = parse_saved(text, source=experiment.source, overrides=overrides)
+    after = build_scene(later).samples
+    if after.count <= before.count:
+        raise RunFolderError(f"--until {until}: no later than the run's end, or before its next sample")
+    return later
+
+
+def _of_finished(folder: RunFolder) -> Chain:
+    """A finished run's dataset and its checkpoint, as what it is prolonged from.
+
+    Raises:
+        RunFolderError: it ended otherwise than at its last sample, or a file is damaged.
+    """
+    found = read_attributes(folder.dataset)
+    if found.status != Status.FINISHED.value:
+        raise RunFolderError(f"{folder.path}: cannot be prolonged: {found.status_message}")
+    if not folder.checkpoint.exists():
+        raise RunFolderError(f"{folder.checkpoint}: is missing, so that this run cannot be prolonged")
+    last = check_seal(folder.dataset)
+    check_seal(folder.checkpoint)
+    after = root_attributes(folder.checkpoint)
+    if after.get("run_id") != found.run_id or after.get("previous_seal") != last:
+        raise RunFolderError(f"{folder.checkpoint}: doesn't belong to {folder.dataset.name} beside it")
+    rows = root_attributes(folder.dataset)["rows"]
+    return Chain([folder.dataset, folder.checkpoint], rows, found.run_id or "", last)
+
+
+def _set_aside(chain: Chain, folder: RunFolder) -> Caution:
+    """Move what doesn't belong, so that it is neither read nor lost."""
+    folder.set_aside.mkdir(exist_ok=True)
+    for path in chain.spoiled:
+        target, number = folder.set_aside / path.name, 0
+        while target.exists():
+            number += 1
+            target = folder.set_aside / f"{path.stem}-{number}{path.suffix}"
+        path.replace(target)
+    files = "file was" if len(chain.spoiled) == 1 else "files were"
+    return Caution(
+        WarningCode.SET_ASIDE,
+        f"{chain.damage}; the run was resumed from the {len(chain.paths)} segments before it "
+        f"({chain.rows} samples); {len(chain.spoiled)} {files} moved to {folder.set_aside.name}/",
+    )
+
+
+def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
+    """What differs from the run's beginning in versions or machine; empty where nothing does.
+
+    Raises:
+        RunFolderError: it is another experiment.
+    """
+    last = chain.paths[-1]
+    saved = read_attributes(last)
+    begun, text = saved.config, prepared.experiment.text
+    if not _prolongs(text, begun):
+        raise RunFolderError(
+            f"{prepared.experiment.source}: was changed since the run began "
+            f"({text_difference(text, begun)}); "
+            "put it back (the segments hold it as their attribute config), or begin a new run"
+        )
+    version, oldest = saved.schema_version, 3 if prepared.holds_invariants else 2
+    if not oldest <= version <= SCHEMA_VERSION:
+        raise RunFolderError(
+            f"{last}: has schema version {version}; only runs of versions {oldest} to {SCHEMA_VERSION} can "
+            "be resumed; begin a new run"
+        )
+    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
+    now = attributes_now(prepared, stepper, chain.run)
+    for name, then, value in saved.changed(Use.SYSTEM, now):
+        raise RunFolderError(f"{last}: cannot be resumed from: its {name} is {then}, now {value}")
+    if saved.python_loads != now.python_loads:
+        raise RunFolderError(
+            f"{last}: the run was begun with loads from Python ({saved.python_loads}); resume it from Python "
+            "with the same"
+        )
+    _same_times(prepared, chain)
+    differing = [f"{name} {then} -> {value}" for name, then, value in saved.changed(Use.PLATFORM, now)]
+    return "; ".join([x for x in [saved.mixed_provenance, *differing] if x])
+
+
+_PROLONGING = ("#:set time.end=", "#:set time.samples=")
+
+
+def _prolongs(text: str, begun: str) -> bool:
+    """Whether a config is the one that a run was begun with, up to a later end."""
+    begun = begun.rstrip("\n")
+    added = text[len(begun) :]
+    if not text.startswith(begun) or (added and not added.startswith("\n")):
+        return False
+    return all(line.startswith(_PROLONGING) for line in added.splitlines() if line)
+
+
+def _same_times(prepared: InitialValueProblem, chain: Chain) -> None:
+    """A grid to a later end must begin with the very times that are saved."""
+    first = 0
+    for path in chain.paths:
+        with netcdf.reading(path) as file:
+            saved = file["time"]
+            for start in range(0, saved.shape[0], _ROWS_AT_ONCE):
+                times = np.asarray(saved[start : start + _ROWS_AT_ONCE])
+                grid = prepared.precision.parts(prepared.clock.internal(first, first + len(times)))[0]
+                if not np.array_equal(np.ldexp(grid, prepared.clock.exponent), times):
+                    raise RunFolderError(
+                        "--until: the longer grid's first sample times differ from those saved by a "
+                        "rounding; choose an end that is a multiple of the old one, or [time] every"
+                    )
+                first += len(times)

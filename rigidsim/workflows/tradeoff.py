@@ -1,0 +1,144 @@
+"""``rigidsim tradeoff``: measure a scene's settings, save the measurement, draw it, and say what to use.
+
+The settings are compared by the attitude, which every one of them carries for that, whatever the config
+records. Of a long motion the beginning is measured, as far as a budget of time allows, and nothing is
+extrapolated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidsim.accuracy.bench.advice import Advice, advice
+from rigidsim.accuracy.bench.dataset import dataset_of
+from rigidsim.accuracy.bench.measure import measure
+from rigidsim.errors import RunFolderError
+from rigidsim.scene.config import Experiment
+
+if TYPE_CHECKING:
+    import xarray
+
+DATASET, FIGURE = "tradeoff.h5", "tradeoff.png"
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """A measurement as labelled data, and what it says.
+
+    Attributes:
+        dataset: dimension ``setting``; see ``dataset_of``.
+        folder: where it was saved; None where it wasn't.
+    """
+
+    dataset: xarray.Dataset
+    folder: Path | None = None
+
+    @property
+    def advice(self) -> list[Advice]:
+        """For each decade of accuracy that some setting reaches, the cheapest; equal neighbours joined."""
+        return advice(self.dataset)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        data = self.dataset
+        rows = []
+        for n in range(data.sizes["setting"]):
+            one = data.isel(setting=n)
+            row = {str(name): _plain(one[name].item()) for name in one.variables if not one[name].dims}
+            row["drifts"] = {
+                str(i): float(one["drift"].sel(invariant=i))
+                for i in data["invariant"].values
+                if math.isfinite(one["drift"].sel(invariant=i))
+            }
+            rows.append(row)
+        return {
+            "name": data.attrs["title"],
+            **{key: _plain(value) for key, value in data.attrs.items() if key in _TOLD},
+            "advice": [asdict(a) for a in self.advice],
+            "settings": rows,
+            "folder": None if self.folder is None else str(self.folder),
+        }
+
+
+_TOLD = (
+    "compared",
+    "reference",
+    "horizon_seconds",
+    "measured_seconds",
+    "closed_form",
+    "processes",
+    "seconds",
+)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def tradeoff(
+    experiment: Experiment,
+    *,
+    out: str | Path | None = None,
+    budget: float = 90.0,
+    repeats: int = 3,
+    full: bool = False,
+    force: bool = False,
+    told: Callable[[str], None] = lambda _: None,
+) -> Tradeoff:
+    """Measure an experiment's settings; save dataset and figure.
+
+    Args:
+        out: folder in which ``NAME_tradeoff`` is made; None saves nothing.
+        budget: seconds that it may take, roughly.
+        repeats: fresh processes in which speeds are taken.
+        full: every tolerance in every formulation and precision.
+        force: replace an earlier measurement.
+        told: called with what is being done.
+
+    Raises:
+        ConfigError: the config can't be run.
+        RunFolderError: there is an earlier measurement, or the folder can't be written.
+    """
+    folder = None
+    if out is not None:
+        folder = Path(out) / f"{experiment.config.name}_tradeoff"
+        if (folder / DATASET).exists() and not force:
+            raise RunFolderError(
+                f"{folder / DATASET}: there is an earlier measurement; give --force to replace it, "
+                "or another --out"
+            )
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RunFolderError(f"{folder}: can't be made: {error.strerror or error}") from None
+    dataset = dataset_of(measure(experiment, budget=budget, repeats=repeats, full=full, told=told))
+    result = Tradeoff(dataset, folder)
+    if folder is not None:
+        save(dataset, folder)
+    return result
+
+
+def save(dataset: xarray.Dataset, folder: Path) -> None:
+    """Write dataset and figure, each visible only when it is whole.
+
+    Raises:
+        RunFolderError: they can't be written.
+    """
+    from rigidsim.look.work_precision import save_work_precision
+    from rigidsim.store import atomic
+
+    try:
+        with atomic.replacing(folder / DATASET) as temporary:
+            dataset.to_netcdf(temporary, engine="h5netcdf")
+        with atomic.replacing(folder / FIGURE) as temporary:
+            save_work_precision(dataset, temporary)
+    except OSError as error:
+        raise RunFolderError(f"{folder}: can't be written: {error.strerror or error}") from None

@@ -1,0 +1,241 @@
+"""Is a run what its config gives, bit for bit? Integrated again and compared, number by number."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rigidsim.errors import RunFolderError
+from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.session.guards import Observer
+from rigidsim.store import netcdf, provenance
+from rigidsim.store.attributes import Use, read_attributes
+from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.run import Run, open_run
+from rigidsim.store.seal import check_seal, read_seal
+from rigidsim.store.segments import root_attributes
+from rigidsim.workflows.run import run
+from rigidsim.workflows.verify_summary import summary_problems, timeline_problems
+
+_ROWS_AT_ONCE = 65536
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The first place where two datasets differ.
+
+    Attributes:
+        sample: along the variable's first dimension.
+        saved, again: the values there; size: their distance.
+    """
+
+    variable: str
+    sample: int
+    saved: float
+    again: float
+
+    @property
+    def size(self) -> float:
+        """Absolute difference."""
+        return abs(self.saved - self.again)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a verification found.
+
+    Attributes:
+        identical: every number of every variable agrees in every bit, the files are whole, and the summary's
+            claims hold.
+        problems: what is wrong with the files themselves, or with what the summary claims, in words.
+        difference: the first one, or None.
+        differing: names of all variables that differ.
+        environment: versions and machine features that changed since, which can explain it.
+        samples: compared.
+    """
+
+    path: str
+    identical: bool
+    problems: list[str] = field(default_factory=list)
+    difference: Difference | None = None
+    differing: list[str] = field(default_factory=list)
+    environment: list[str] = field(default_factory=list)
+    samples: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        found = None
+        if self.difference is not None:
+            d = self.difference
+            found = {"variable": d.variable, "sample": d.sample, "saved": d.saved, "again": d.again,
+                     "size": d.size}  # fmt: skip
+        return {
+            "path": self.path,
+            "identical": self.identical,
+            "problems": self.problems,
+            "first_difference": found,
+            "differing_variables": self.differing,
+            "environment": self.environment,
+            "samples": self.samples,
+        }
+
+
+def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
+    """Integrate a run's embedded config again and compare everything recorded, and what the summary claims.
+
+    Args:
+        path: run folder with a dataset, or a dataset alone.
+        observer: is told how the integration goes.
+
+    Raises:
+        RunFolderError: no dataset there, or one that no config can reproduce.
+        ConfigError: the embedded config isn't one.
+    """
+    dataset, folder = _dataset(Path(path))
+    problems = _file_problems(dataset, folder)
+    saved = read_attributes(dataset)
+    if saved.python_loads:
+        raise RunFolderError(
+            f"{dataset}: the run had loads from Python ({saved.python_loads}), which its config lacks"
+        )
+    experiment = embedded(dataset)
+    with _scratch() as scratch:
+        quiet = experiment.config.output.model_copy(update={"timeline": False})
+        unguarded = type(experiment.config.limits)()
+        plain = experiment.config.integrator.model_copy(update={"accuracy": None})
+        replaced = {"output": quiet, "limits": unguarded, "integrator": plain}
+        config = experiment.config.model_copy(update=replaced)
+        again = run(Experiment(experiment.text, config, experiment.source), out=scratch, observer=observer)
+        if not again.folder.dataset.exists():
+            raise RunFolderError(f"{dataset}: the second run {again.outcome.message}; nothing was compared")
+        differing, first, samples = _compare(dataset, again.folder.dataset, saved.schema_version)
+        now = read_attributes(again.folder.dataset)
+    if folder is not None and not folder.summary.exists():
+        problems.append(f"{folder.summary}: is missing; it was written with the dataset")
+    elif folder is not None:
+        claimed = folder.read_summary()
+        problems += summary_problems(claimed, again.outcome, folder, saved.schema_version)
+        problems += timeline_problems(claimed, folder)
+    for name, then, value in saved.changed(Use.SETTING, now):
+        problems.append(f"{name} is {then} in the dataset, {value} when run again")
+    changed = [f"{name} {then} -> {value}" for name, then, value in saved.changed(Use.PLATFORM, now)]
+    if saved.mixed_provenance:
+        changed.append(f"the run itself was put together on different machines: {saved.mixed_provenance}")
+    return Verdict(str(dataset), not problems and not differing, problems, first, differing, changed, samples)
+
+
+def _scratch() -> tempfile.TemporaryDirectory[str]:
+    try:
+        return tempfile.TemporaryDirectory(prefix="rigidsim-verify-")
+    except OSError as error:
+        why = error.strerror or error
+        raise RunFolderError(
+            f"{error.filename or 'the temporary folder'}: can't be written: {why}; set TMPDIR to a folder "
+            "with room for the run again"
+        ) from None
+
+
+def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
+    """The experiment that a dataset was made by; ``overrides`` as in ``rigidsim.load``.
+
+    Raises:
+        RunFolderError: it is no dataset of rigidsim.
+        ConfigError: the config in it isn't one.
+    """
+    text = root_attributes(dataset).get("config")
+    if not isinstance(text, str):
+        raise RunFolderError(f"{dataset}: embeds no config; it is no dataset of rigidsim")
+    return parse_saved(text, source=f"{dataset} (embedded config)", overrides=overrides)
+
+
+def _dataset(path: Path) -> tuple[Path, RunFolder | None]:
+    if path.is_file() and path.name != "dataset.h5":
+        return path, None
+    folder = find_run(path)
+    if not folder.dataset.exists():
+        raise RunFolderError(f"{path}: holds no finished dataset; rigidsim resume completes it")
+    alone = path.is_file() and not folder.config.exists()
+    return folder.dataset, None if alone else folder
+
+
+def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
+    """What the files themselves tell, before anything is integrated."""
+    problems = []
+    try:
+        if read_seal(dataset) is not None or root_attributes(dataset).get("schema_version", 1) > 1:
+            check_seal(dataset)
+    except RunFolderError as error:
+        problems.append(str(error))
+    if folder is None:
+        return problems
+    opened: Run = open_run(folder.path)
+    claimed = opened.outcome.dataset_digest
+    if claimed is not None and claimed != provenance.file_sha256(dataset):
+        problems.append(f"{folder.summary}: was written for another dataset than this one")
+    try:
+        text = folder.config.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        return [*problems, f"{folder.config}: can't be read ({error})"]
+    if text != root_attributes(dataset).get("config"):
+        line = text_difference(text, str(root_attributes(dataset).get("config")))
+        problems.append(f"{folder.config}: isn't the config that the dataset was made by ({line})")
+    return problems
+
+
+def text_difference(one: str, other: str) -> str:
+    """The first line in which two texts differ, in words."""
+    first, second = one.splitlines(), other.splitlines()
+    for number, (a, b) in enumerate(zip(first, second, strict=False), start=1):
+        if a != b:
+            return f'line {number} is "{a.strip()[:60]}", it was "{b.strip()[:60]}"'
+    return f"{len(first)} lines, it had {len(second)}"
+
+
+def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Difference | None, int]:
+    """Names of the variables that differ, the earliest difference, and the number of samples."""
+    differing: list[str] = []
+    earliest: Difference | None = None
+    with netcdf.reading(saved) as one, netcdf.reading(again) as other:
+        names = {*_numbers(one), *_numbers(other)}
+        if version < 3:  # nothing put back along time
+            names -= {n for n in names if n not in one and "put_back_of" in other[n].attrs}
+        samples = int(one["time"].shape[0])
+        for name in sorted(names):
+            if name not in one or name not in other or one[name].shape != other[name].shape:
+                differing.append(name)
+                continue
+            found = _first_difference(name, one[name], other[name])
+            if found is not None:
+                differing.append(name)
+                if earliest is None or found.sample < earliest.sample:
+                    earliest = found
+    return differing, earliest, samples
+
+
+def _numbers(file: h5py.File) -> Iterator[str]:
+    for name, item in file.items():
+        if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not _bare(item):
+            yield name
+
+
+def _bare(item: h5py.Dataset) -> bool:
+    """A dimension without values, as netCDF-4 stores it."""
+    return b"This is a netCDF dimension but not a netCDF variable" in bytes(item.attrs.get("NAME", b""))
+
+
+def _first_difference(name: str, one: h5py.Dataset, other: h5py.Dataset) -> Difference | None:
+    for first in range(0, one.shape[0] if one.ndim else 1, _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE) if one.ndim else ()
+        a, b = np.asarray(one[rows], dtype="<f8"), np.asarray(other[rows], dtype="<f8")
+        unequal = (a.view(np.int64) != b.view(np.int64)).reshape(max(len(a), 1) if a.ndim else 1, -1)
+        if unequal.any():
+            row, column = (int(i) for i in np.argwhere(unequal)[0])
+            x, y = a.reshape(len(unequal), -1)[row, column], b.reshape(len(unequal), -1)[row, column]
+            return Difference(name, first + row, float(x), float(y))
+    return None

@@ -1,0 +1,295 @@
+"""``accuracy``: the choice is cheap and says why, and the certificate tells the truth about the run."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import xarray
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from support import same_bits  # noqa: E402
+
+import rigidsim  # noqa: E402
+from experiments.random_scenes import KINDS, random_scene  # noqa: E402
+from rigidsim.accuracy.certificate import certify  # noqa: E402
+from rigidsim.accuracy.choice import choose, chosen  # noqa: E402
+from rigidsim.accuracy.comparison import angles_between  # noqa: E402
+from rigidsim.accuracy.cost import cost  # noqa: E402
+from rigidsim.accuracy.forecast import Forecasts  # noqa: E402
+from rigidsim.accuracy.setting import Setting  # noqa: E402
+from rigidsim.accuracy.trial import try_setting  # noqa: E402
+from rigidsim.errors import ConfigError  # noqa: E402
+from rigidsim.model.loads import LoadModel  # noqa: E402
+
+pytestmark = pytest.mark.compact
+
+FREE = """name = "free"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.3, 1.0, 0.5]
+euler_angles = [0.2, 1.1, 0.7]
+"""
+CHAOTIC = """name = "chaotic"
+[body]
+principal_moments = [1, 1.4, 2]
+mass = 1
+center_of_mass = [0.3, 0.2, 0.5]
+[initial]
+angular_velocity = [0.3, 1.0, 0.5]
+euler_angles = [0.2, 1.1, 0.7]
+[[loads]]
+kind = "uniform_gravity"
+acceleration = [0, 0, -3]
+"""
+PULSE = (
+    FREE
+    + '[[loads]]\nkind = "torque"\ncomponents = ["3*exp(-(4*(t - 90))^2)", "0", "5*exp(-(4*(t - 90))^2)"]\n'
+)
+
+
+def experiment(text: str, accuracy: Any, end: Any, *more: str, samples: int = 5) -> rigidsim.Experiment:
+    settings = [f"time.end={end}", f"time.samples={samples}", f"integrator.accuracy={accuracy}"]
+    return rigidsim.parse(text, overrides=[*settings, "output.timeline=false", *more])
+
+
+def true_error(run: rigidsim.Run, of: rigidsim.Experiment) -> float:
+    """Largest attitude error over all samples, against thirty digits or sixty."""
+    with run.dataset as dataset:
+        names = [n for n in ("quaternion", "quaternion_lo", "quaternion_lo2") if n in dataset]
+        parts = [dataset[n].values for n in names]
+        clock = [dataset[n.replace("quaternion", "time")].values for n in names]
+    times = [mpmath.mpf(0) + sum(mpmath.mpf(float(x)) for x in row) for row in zip(*clock, strict=True)]
+    truth = try_setting(of, Setting("quadruple", 1e-30), times, compact=True)
+    return float(angles_between(parts, truth.attitudes).max())
+
+
+@pytest.mark.parametrize("number", range(len(KINDS)), ids=list(KINDS))
+def test_every_kind_of_scene_is_certified_to_what_is_true(number: int, tmp_path: Path) -> None:
+    scene = random_scene(number, seed=1)
+    asked = 10 ** (-5 - number % 6)
+    whole = rigidsim.parse(scene.text)
+    end = float(whole.config.time.end.rational) * min(1.0, 20 / scene.radians)  # type: ignore[union-attr]
+    short = experiment(scene.text, asked, repr(end))
+    run = rigidsim.run(short, out=tmp_path)
+    summary = run.summary["accuracy"]
+    assert true_error(run, short) <= summary["certified"] <= asked == summary["requested"]
+    assert summary["times_compared"] == 5
+    assert summary["how"].startswith("against")
+    assert summary["chosen"]
+    assert run.summary["cost"]["seconds"]["certify"] > 0
+    assert run.summary["cost"]["seconds"]["choose"] > 0
+
+
+def test_a_choice_is_the_same_each_time_and_dearer_for_more_accuracy() -> None:
+    of = experiment(FREE, 1e-6, 60)
+    first, again = (choose(of, 1e-6) for _ in range(2))
+    assert first == again
+    steps = experiment(FREE, 1e-6, 60, 'integrator.method="taylor"')
+    costs = [cost(choose(steps, 10.0**-n).setting, 100, 5) for n in (4, 8, 12, 16, 25)]
+    assert costs == sorted(costs)
+    assert costs[0] < costs[-1] / 100
+
+
+def test_what_was_chosen_runs_again_from_the_dataset_without_choosing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = rigidsim.run(experiment(FREE, 1e-8, 60), out=tmp_path / "first")
+    monkeypatch.setattr("rigidsim.accuracy.choice.choose", None)  # to call it would be an error
+    saved = rigidsim.load(run.folder.config)
+    again = rigidsim.run(saved, out=tmp_path / "again")
+    same_bits(run, again)
+    assert again.summary["accuracy"]["certified"] == run.summary["accuracy"]["certified"]
+
+
+def test_a_resumed_run_is_certified_too(tmp_path: Path) -> None:
+    of = experiment(FREE, 1e-8, 4000, "limits.max_steps=500", 'integrator.method="taylor"')
+    run = rigidsim.run(of, out=tmp_path)
+    assert run.status != "finished"
+    assert run.summary["accuracy"]["certified"] is None
+    resumed = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000000"])
+    assert resumed.status == "finished"
+    assert true_error(resumed, of) <= resumed.summary["accuracy"]["certified"] <= 1e-8
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("precision", '"single"'),
+        ("precision", '"extended"'),
+        ("tolerance", "1e-13"),
+        ("formulation", '"euler_angles"'),
+        ("formulation", '"rotation_matrix"'),
+        ("hold_invariants", "true"),
+        ("method", '"taylor"'),
+        ("method", '"closed_form"'),
+    ],
+)
+def test_keys_that_are_given_stay(key: str, value: str) -> None:
+    of = experiment(FREE, 1e-4, 20, f"integrator.{key}={value}")
+    setting, choice = chosen(of)
+    assert choice is not None
+    kept, asked = (getattr(e.config.integrator, key) for e in (setting, of))
+    assert kept == asked
+
+
+def test_what_no_setting_reaches_is_refused_with_what_can_be_met(tmp_path: Path) -> None:
+    of = experiment(FREE, 1e-9, 1000, 'integrator.precision="single"')
+    with pytest.raises(ConfigError) as refusal:
+        rigidsim.run(of, out=tmp_path)
+    text = str(refusal.value)
+    assert "[integrator] accuracy" in text
+    assert "given 1e-09 rad at the end, which no setting open to it reaches" in text
+    assert "would be right to about" in text
+    assert " s; ask for less, or leave precision, tolerance and method open" in text
+    assert not list(tmp_path.iterdir())
+
+
+def test_chaos_is_refused_where_no_digit_would_be_left_and_takes_digits_where_they_help(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(
+        ConfigError, match=r"would keep no digit.*errors here grow e-fold every .* nearer end"
+    ):
+        rigidsim.run(experiment(CHAOTIC, 1e-6, 400, 'integrator.precision="double"'), out=tmp_path)
+    assert not list(tmp_path.iterdir())
+    choice = choose(experiment(CHAOTIC, 1e-6, 60), 1e-6)
+    stable = choose(experiment(FREE, 1e-6, 60, 'integrator.method="taylor"'), 1e-6)
+    assert cost(choice.setting, 1, 1) > cost(stable.setting, 1, 1)
+
+
+def forged(run: rigidsim.Run, change: Any) -> Any:
+    """A finished run whose dataset says something else."""
+    with run.dataset as dataset:
+        other: xarray.Dataset = dataset.load().copy(deep=True)
+    change(other["quaternion"].values)
+    return SimpleNamespace(dataset=other)
+
+
+def turned(angle: float, rows: slice) -> Any:
+    """Quaternions turned about the body's x axis, in place."""
+
+    def change(q: np.ndarray) -> None:
+        w, x, y, z = q[rows].T
+        s, c = math.sin(angle / 2), math.cos(angle / 2)
+        q[rows] = np.array([c * w - s * x, c * x + s * w, c * y + s * z, c * z - s * y]).T
+
+    return change
+
+
+@pytest.mark.parametrize("rows", [slice(None), slice(1234, 1235)], ids=["all", "one sample of 2000"])
+def test_a_wrong_run_gets_no_certificate(rows: slice, tmp_path: Path) -> None:
+    of = experiment(FREE, 1e-9, 60, samples=2000)
+    run = rigidsim.run(of, out=tmp_path)
+    saved = rigidsim.load(run.folder.config)
+    sound = certify(forged(run, lambda _: None).dataset, saved, accuracy=1e-9)
+    assert sound is not None
+    assert sound.error <= 1e-9
+    wrong = certify(forged(run, turned(1e-6, rows)).dataset, saved, accuracy=1e-9)
+    assert wrong is not None
+    assert 1e-6 <= wrong.error <= 2e-6  # its safety is 1.25
+
+
+def test_a_wrong_run_warns_in_its_summary(tmp_path: Path) -> None:
+    settings = ['integrator.precision="double"', "integrator.tolerance=1e-4", 'integrator.method="taylor"']
+    of = experiment(FREE, 1e-9, 60, *settings)
+    run = rigidsim.run(of, out=tmp_path)
+    certified = run.summary["accuracy"]["certified"]
+    assert true_error(run, of) <= certified
+    assert certified > 1e-9
+    (warning,) = [w for w in run.summary["warnings"] if "could be certified" in w]
+    assert "accuracy = 1e-09 rad was asked for, but only" in warning
+
+
+def test_digits_lost_to_chaos_are_certified_as_lost(tmp_path: Path) -> None:
+    settings = ['integrator.precision="double"', 'integrator.tolerance="auto"', 'integrator.method="taylor"']
+    run = rigidsim.run(experiment(CHAOTIC, 1e-6, 400, *settings, samples=50), out=tmp_path)
+    assert run.summary["accuracy"]["certified"] == math.pi
+
+
+def test_a_pulse_that_the_beginning_knows_nothing_of_is_in_the_certificate(tmp_path: Path) -> None:
+    of = experiment(PULSE, 1e-9, 200, samples=50)
+    run = rigidsim.run(of, out=tmp_path)
+    assert true_error(run, of) <= run.summary["accuracy"]["certified"] <= 1e-9
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        ['output.record=["angular_velocity"]'],
+        ["time.samples=2"],
+        ["time.times=[0, 7, 19.3]"],
+        ['integrator.precision="single"', "integrator.accuracy=1e-3"],
+        ["integrator.precision=40", "integrator.accuracy=1e-30"],
+        ['events=[{name = "flip", expression = "wz"}]'],
+        ['events=[{name = "flip", expression = "wy - 0.99", action = "stop"}]'],
+    ],
+    ids=["no attitude recorded", "two samples", "times", "single", "40 digits", "events", "a stop"],
+)
+def test_odd_runs_are_certified(more: list[str], tmp_path: Path) -> None:
+    keys = [m for m in more if not m.startswith("time.")]
+    text = FREE
+    if "events" in more[0]:
+        table = more[0].partition("{")[2].rstrip("}]").replace(", ", "\n")
+        text, keys = f"{FREE}[[events]]\n{table}\n", []
+    time = [m for m in more if m.startswith("time.")]
+    overrides = [*(time or ["time.samples=5"]), "integrator.accuracy=1e-9", "output.timeline=false", *keys]
+    if not any("times" in t for t in time):
+        overrides.append("time.end=20")
+    of = rigidsim.parse(text, overrides=overrides)
+    run = rigidsim.run(of, out=tmp_path)
+    asked = float(of.config.integrator.accuracy.rational)  # type: ignore[union-attr]
+    assert run.summary["accuracy"]["certified"] <= asked
+    if "record" not in more[0] and "40" not in more[0]:
+        assert true_error(run, of) <= run.summary["accuracy"]["certified"]
+
+
+class Magnet(LoadModel):
+    """A dipole along the body's z in a field along the space axis X; nothing else tells of it."""
+
+    title = "magnet"
+    reads = frozenset({"attitude"})
+    conservative = True
+
+    def torque(self, m: Any) -> Any:
+        field, size = m.matrix[0], m.scene.context.ldexp(m.scene.context.mpf("0.3"), -m.scaling.energy)
+        return [([-size, 0, 0], field[1]), ([0, size, 0], field[0])]
+
+    def potential(self, m: Any) -> Any:
+        size = m.scene.context.ldexp(m.scene.context.mpf("0.3"), -m.scaling.energy)
+        return -m.number(size) * m.matrix[0][2]
+
+
+def test_loads_from_python_are_part_of_the_certificate(tmp_path: Path) -> None:
+    of = experiment(FREE, 1e-9, 20)
+    run = rigidsim.run(of, out=tmp_path, loads=[Magnet()])
+    certificate = certify(run.dataset, rigidsim.load(run.folder.config), accuracy=1e-9, loads=[Magnet()])
+    assert certificate is not None
+    assert certificate.error == run.summary["accuracy"]["certified"] <= 1e-9
+    without = certify(run.dataset, rigidsim.load(run.folder.config), accuracy=1e-9)
+    assert without is not None
+    assert without.error > 0.1  # another motion
+
+
+def test_errors_far_below_a_double_are_told_apart() -> None:
+    one = [np.array([[1.0, 0, 0, 0]]), np.array([[2.0**-54, 0, 0, 0]]), np.array([[0, 2.0**-120, 0, 0]])]
+    other = [np.array([[1.0, 0, 0, 0]]), np.array([[2.0**-54, 0, 0, 0]]), np.array([[0, 0.0, 0, 0]])]
+    assert angles_between(one, other)[0] == pytest.approx(2 * 2.0**-120, rel=1e-12)
+
+
+def test_forecasts_of_what_was_not_tried_follow_epsilon_and_tolerance() -> None:
+    """Rounding errors are in proportion to epsilon; those of the series, to the tolerance."""
+    forecasts = Forecasts(experiment(FREE, 1e-20, 60, 'integrator.method="taylor"'), 1e-20)
+    double, quadruple = (forecasts.error(Setting(p)) for p in ("double", "quadruple"))
+    assert quadruple == pytest.approx(double * 2.0**-60)
+    loose, tight = (forecasts.error(Setting("quadruple", t)) for t in (1e-18, 1e-22))
+    assert loose == pytest.approx(1e4 * tight)

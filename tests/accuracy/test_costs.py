@@ -1,0 +1,201 @@
+"""What ``accuracy`` costs is told: CPU seconds of choosing and certifying, and progress while they go on."""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+import rigidsim
+from rigidsim.accuracy.certificate import Certificate, certify
+from rigidsim.accuracy.choice import choose
+from rigidsim.accuracy.setting import Setting
+from rigidsim.cli import tables as report
+from rigidsim.cli.progress import LineObserver, TerminalObserver
+from rigidsim.session.guards import Observer
+from rigidsim.session.timings import NOT_KEPT, Phases
+from rigidsim.solve.loop import Progress
+
+FREE = """name = "free"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.3, 1.0, 0.5]
+[time]
+end = 300
+samples = 50
+[output]
+timeline = false
+"""
+
+
+def scene(*more: str) -> rigidsim.Experiment:
+    return rigidsim.parse(FREE, overrides=['integrator.method="taylor"', *more])
+
+
+def burn(seconds: float) -> None:
+    """CPU, not waiting."""
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+class Slow(Observer):
+    """Burns CPU while settings are chosen and while the run is certified; notes what it is told."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self.told: list[str] = []
+
+    def choosing(self, name: str) -> None:
+        self.told.append(f"choosing {name}")
+        burn(self.seconds)
+
+    def phase(self, name: str) -> None:
+        self.told.append(name)
+        if name == "certify":
+            burn(self.seconds)
+
+    def trying(self, title: str, fraction: float) -> None:
+        assert 0 <= fraction <= 1
+        self.told.append(f"{title}: {fraction:.0%}")
+
+
+def test_choosing_and_certifying_are_in_the_cpu_seconds(tmp_path: Path) -> None:
+    began = time.process_time()
+    slow = Slow(0.5)
+    run = rigidsim.run(scene("integrator.accuracy=1e-9"), out=tmp_path, observer=slow)
+    everything = time.process_time() - began
+    cost = json.loads(run.folder.summary.read_text())["cost"]
+    by_phase = cost["cpu_by_phase"]
+    assert list(by_phase) == ["choose", "build", "integrate_and_record", "dataset", "certify"]
+    assert set(by_phase) == set(cost["seconds"]) - {"engine"}
+    assert min(by_phase["choose"], by_phase["certify"]) > 0.5
+    # what is neither: reading the clocks, and writing the summary twice
+    assert sum(by_phase.values()) == pytest.approx(cost["cpu_seconds"], abs=0.1)
+    assert cost["cpu_seconds"] == pytest.approx(everything, abs=0.1)
+    assert cost["wall_seconds"] > 1.0
+    assert slow.told[0] == "choosing free"
+    assert any(told.startswith("double") for told in slow.told[1 : slow.told.index("integrate")])
+    assert any(told.startswith("extended") for told in slow.told[slow.told.index("certify") :])
+
+
+def test_a_plain_run_has_neither(tmp_path: Path) -> None:
+    slow = Slow(0.5)
+    run = rigidsim.run(scene(), out=tmp_path, observer=slow)
+    assert list(run.summary["cost"]["cpu_by_phase"]) == ["build", "integrate_and_record", "dataset"]
+    assert slow.told == ["integrate", "dataset"]
+
+
+def test_the_summary_table_tells_of_each_phase(tmp_path: Path) -> None:
+    run = rigidsim.run(scene("integrator.accuracy=1e-9"), out=tmp_path)
+    out = io.StringIO()
+    report.print_summary(run.outcome, "runs/free", Console(file=out, width=200))
+    (line,) = [line for line in out.getvalue().splitlines() if line.startswith("CPU")]
+    for phase in ("choose ", "build ", "integrate and record ", "dataset ", "certify "):
+        assert phase in line
+
+
+def test_an_interrupted_run_remembers_what_choosing_took(tmp_path: Path) -> None:
+    run = rigidsim.run(
+        scene("integrator.accuracy=1e-9", "time.end=4000", "limits.max_steps=500"),
+        out=tmp_path,
+        observer=Slow(1.0),
+    )
+    assert run.status == "stopped: max_steps"
+    resumed = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=1000000"])
+    cost = resumed.summary["cost"]
+    assert "choose" not in cost["cpu_by_phase"]  # nothing was chosen in this session
+    assert cost["cpu_by_phase"]["certify"] > 0
+    assert cost["cpu_seconds"] > 1.0  # of all sessions
+
+
+def test_an_attempt_that_did_not_keep_the_accuracy_is_part_of_the_cost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A first certificate that fails has a dearer setting run; the summary has the cost of both."""
+    asked = []
+
+    def first_fails(*given: Any, **more: Any) -> Any:
+        found = certify(*given, **more)
+        assert found is not None
+        asked.append(found)
+        if len(asked) > 1:
+            return found
+        burn(0.5)
+        return Certificate(1.0, found.end, found.how, found.times)
+
+    monkeypatch.setattr("rigidsim.workflows.certify.certify", first_fails)
+    began = time.process_time()
+    run = rigidsim.run(scene("integrator.accuracy=1e-9"), out=tmp_path)
+    everything = time.process_time() - began
+    assert len(asked) == 2
+    assert run.summary["accuracy"]["certified"] <= 1e-9
+    cost = run.summary["cost"]
+    assert cost["cpu_by_phase"][NOT_KEPT] > 0.5
+    assert cost["cpu_seconds"] == pytest.approx(everything, abs=0.1)
+    assert sum(cost["cpu_by_phase"].values()) == pytest.approx(cost["cpu_seconds"], abs=0.1)
+
+
+def test_phases_given_again_add_up() -> None:
+    phases = Phases()
+    for name in ("choose", "build", "build"):
+        burn(0.05)
+        phases.next(name)
+    assert phases.cpu["build"] > 0.1 > 0.05 < phases.cpu["choose"]
+    again = phases.begin_again()
+    assert again.cpu == {"choose": phases.cpu["choose"], NOT_KEPT: phases.cpu["build"]}
+    assert again.wall[NOT_KEPT] == phases.wall["build"]
+
+
+def test_piped_lines_say_what_is_tried_and_compared_with(capsys: pytest.CaptureFixture[str]) -> None:
+    with LineObserver() as observer:
+        observer.choosing("free")
+        observer.trying("double, quaternion", 0.0)
+        observer.trying("double, quaternion", 0.3)  # too soon for another line
+        observer._latest -= 10
+        observer.trying("double, quaternion", 0.6)
+        observer.phase("certify")
+        observer.trying("double, quaternion", 0.0)
+    assert capsys.readouterr().err.splitlines() == [
+        "free: choosing settings by short trials",
+        "free: trying double, quaternion",
+        "free: trying double, quaternion: 60.0 %",
+        "free: certifying",
+        "free: comparing with double, quaternion",
+    ]
+
+
+def test_a_terminal_shows_one_bar_at_a_time(tmp_path: Path) -> None:
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=True, width=120, height=20, color_system=None)
+    with TerminalObserver(console) as observer:
+        observer.choosing("free")
+        observer.trying("extended, quaternion, held", 0.25)
+        observer._bar.refresh()
+        assert "free: choosing" in out.getvalue()
+        assert "25.0 %  extended, quaternion, held" in out.getvalue()
+        rigidsim.run(scene(), out=tmp_path, observer=observer)
+        observer.progressed(Progress(50, steps=1000, time=150.0))  # no bar of integration is left
+        observer.phase("certify")
+        observer.trying("extended, quaternion", 0.5)
+        observer._bar.refresh()
+        assert "certifying" in out.getvalue()
+        assert "50.0 %  extended, quaternion" in out.getvalue()
+        assert len(observer._bar.tasks) == 1
+
+
+def test_trials_look_at_no_clock() -> None:
+    """Being watched, however slowly, changes no choice."""
+
+    def slowly(title: str, fraction: float) -> None:
+        burn(0.1)
+
+    of = scene("integrator.accuracy=1e-9")
+    assert choose(of, 1e-9) == choose(of, 1e-9, told=slowly)
+    assert choose(of, 1e-9).setting != Setting()

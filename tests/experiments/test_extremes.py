@@ -1,0 +1,122 @@
+"""At the edges of what numbers hold, a run is right, says how wrong it is, or is refused with a message."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from support import config, run_text
+
+import rigidsim
+from rigidsim.accuracy.error_law import motion_growth
+from rigidsim.errors import ConfigError
+from rigidsim.solve.problem import prepare
+
+
+def scene(
+    moments: str = "[1, 2, 3]",
+    rates: str = "[0.3, 1, 0.2]",
+    end: str = "20",
+    integrator: str = "",
+    record: str = "quaternion",
+) -> str:
+    return config(
+        f"principal_moments = {moments}",
+        f"angular_velocity = {rates}\nquaternion = [4, 3, 2, 1]",
+        time=f"end = {end}\nsamples = 3",
+        integrator=integrator,
+        output=f'record = ["{record}"]',
+    )
+
+
+@pytest.mark.parametrize(("offset", "digits"), [("1e-4", 8), ("1e-6", 12), ("1e-9", 18), ("1e-15", 30)])
+def test_growth_beside_the_middle_axis_is_that_of_the_elliptic_parameter(offset: str, digits: int) -> None:
+    """With I = (1, 2, 3) and rates (d, 1, d) 1 - m = 2 d^2 (2 for two components), whatever the precision
+    can resolve, and errors grow by up to 1 / (1 - m).
+    """
+    prepared = prepare(rigidsim.parse(scene(rates=f"[{offset}, 1, {offset}]", end="400")))
+    growth = motion_growth(prepared)
+    assert growth.rate == 0  # an integrable motion
+    assert growth.factor == pytest.approx(10.0**digits / 2, rel=0.01)
+
+
+def test_growth_is_no_faster_than_time_allows() -> None:
+    """exp(p t) with p^2 = (I2 - I1) (I3 - I2) / (I1 I3) on the separatrix itself."""
+    prepared = prepare(rigidsim.parse(scene(rates="[1e-15, 1, 1e-15]", end="60")))
+    assert math.log(motion_growth(prepared).factor) == pytest.approx(60 / math.sqrt(3), rel=0.01)
+
+
+def test_rates_without_an_attitude_say_that_their_digits_are_gone(runs: Path) -> None:
+    text = scene(rates="[1e-15, 1, 1e-15]", end="400", record="angular_velocity")
+    run = run_text(text, runs, 'integrator.formulation="rates"')
+    assert any("angular velocity is uncertain" in warning for warning in run.summary["warnings"])
+    assert run.summary["accuracy"]["estimated_attitude_error"] is None
+    stable = run_text(scene(record="angular_velocity"), runs, 'integrator.formulation="rates"')
+    assert not stable.summary["warnings"]
+
+
+def test_canonical_momenta_of_a_thin_rod_lose_the_ratio_of_its_moments(runs: Path) -> None:
+    """A rounded momentum is divided by the smallest moment to give a rate."""
+    text = scene("[1e-12, 1, 1]", "[0.1, 1, 0.5]", end="50")
+    canonical = run_text(text, runs, 'integrator.formulation="canonical"').summary
+    quaternion = run_text(text, runs).summary
+    lost = canonical["accuracy"]["estimated_attitude_error"]
+    assert lost > 1e12 * quaternion["accuracy"]["estimated_attitude_error"]
+    assert any("digits are gone" in warning for warning in canonical["warnings"])
+    assert not quaternion["warnings"]
+
+
+def test_a_tolerance_below_epsilon_promises_no_more_than_epsilon(runs: Path) -> None:
+    below = run_text(scene(), runs, "integrator.tolerance=1e-25").summary
+    auto = run_text(scene(), runs).summary
+    ratio = below["accuracy"]["estimated_attitude_error"] / auto["accuracy"]["estimated_attitude_error"]
+    # the same epsilon; steps may be longer with the higher order, by less than the orders' ratio of 2
+    assert 0.5 < ratio < 2
+    assert not below["warnings"]
+
+
+@pytest.mark.parametrize("tolerance", ["1e-33", "1e-100", "1e-300"])
+def test_a_tolerance_far_below_epsilon_is_refused(tolerance: str) -> None:
+    with pytest.raises(ConfigError, match=r"tolerances below that gain nothing; 4.93e-32 or more"):
+        prepare(rigidsim.parse(scene(integrator=f"tolerance = {tolerance}")))
+    prepare(rigidsim.parse(scene(integrator=f'precision = "quadruple"\ntolerance = {tolerance[:4]}')))
+
+
+@pytest.mark.parametrize("end", ["1e3", "1e9"])
+def test_the_error_of_a_closed_form_knows_no_horizon(end: str, runs: Path) -> None:
+    run = run_text(scene(end=end, integrator='method = "closed_form"'), runs)
+    assert run.summary["accuracy"]["estimated_attitude_error"] == 50 * 2.0**-52
+    assert not run.summary["warnings"]
+
+
+@pytest.mark.parametrize(
+    "formulation", ["rates", "quaternion", "euler_angles", "rotation_matrix", "canonical"]
+)
+@pytest.mark.parametrize(
+    "rates", ['["5e-324", 1, 0.2]', '["1e-400", 1, "1e-400"]', '["5e-324", "5e-324", 1]']
+)
+def test_numbers_beyond_doubles_are_refused_in_every_formulation(formulation: str, rates: str) -> None:
+    record = "angular_velocity"
+    text = scene(rates=rates, integrator=f'formulation = "{formulation}"', record=record)
+    with pytest.raises(ConfigError, match=r"too large, too small or too far apart .*check the units"):
+        motion_growth(prepare(rigidsim.parse(text)))
+
+
+@pytest.mark.parametrize("rate", ["1e-46", "1e-60"])
+def test_numbers_beyond_single_precision_are_refused_there(rate: str) -> None:
+    """A zero in their place would stay zero, where the rate itself grows beside the middle axis."""
+    text = scene(rates=f'["{rate}", 1, 0]', integrator='precision = "{}"')
+    prepare(rigidsim.parse(text.replace("{}", "double")))
+    with pytest.raises(ConfigError, match="span more than single precision can hold"):
+        prepare(rigidsim.parse(text.replace("{}", "single")))
+
+
+@pytest.mark.parametrize("power", [-200, 200])
+def test_the_unit_of_inertia_changes_no_bit(power: int, runs: Path) -> None:
+    """Powers of two: scaling rounds nothing."""
+    plain = run_text(scene(), runs).dataset
+    moments = [f'"{m * 2 ** abs(power)}"' if power > 0 else f'"{m}/{2 ** abs(power)}"' for m in (1, 2, 3)]
+    scaled = run_text(scene(f"[{', '.join(moments)}]"), runs).dataset
+    with plain, scaled:
+        assert (plain["quaternion"].values == scaled["quaternion"].values).all()

@@ -1,0 +1,42 @@
+"""Which variables of a recorded run are shown as variables of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import rigidsim
+from rigidsim.look.plots import plan_plots
+from rigidsim.look.roles import drifts, put_backs
+from rigidsim.look.thinning import thin
+from rigidsim.store.variables import parts_in
+
+
+@pytest.mark.parametrize(("digits", "parts"), [("50", 4), ("120", 8)])
+def test_no_residual_is_a_variable_of_its_own(
+    digits: str, parts: int, free_body: Callable[..., str], tmp_path: Path
+) -> None:
+    """However many float64 numbers a value takes: 50 digits are 169 bits, four times 53 with room."""
+    run = rigidsim.run(rigidsim.parse(free_body("end = 1\nsamples = 4", precision=digits)), out=tmp_path)
+    with run.dataset as dataset:
+        assert len(parts_in(dataset, "angular_velocity")) == parts
+        shown = thin(dataset, 10)
+        assert {"angular_velocity", "quaternion", "energy", "energy_drift"} <= set(shown)
+        assert not any("_lo" in str(name) for name in shown)
+        plotted = [series.name for plot in plan_plots(shown) for series in plot.series]
+        assert sorted(plotted) == sorted(map(str, shown))
+
+
+def test_drifts_and_what_was_put_back_go_by_their_invariant(
+    free_body: Callable[..., str], tmp_path: Path
+) -> None:
+    text = free_body().replace("[integrator]", "[integrator]\nhold_invariants = true")
+    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
+        assert set(put_backs(dataset)) <= set(drifts(dataset))
+        assert drifts(dataset)["energy"].name == "energy_drift"
+        assert put_backs(dataset)["energy"].name == "energy_put_back"
+        labels = [s.labels for p in plan_plots(thin(dataset, 10)) if p.key == "drift" for s in p.series]
+        assert ["energy"] in labels
+        assert ["energy put back"] in labels

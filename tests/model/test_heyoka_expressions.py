@@ -1,0 +1,251 @@
+"""Compiled expressions against mpmath's values, within the rounding that their operations allow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import heyoka as hy
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.scene import expressions
+from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.expression_parser import parse_expression
+from rigidsim.scene.expressions import Expression, ExpressionError, evaluate, fold, operate
+from rigidsim.solve.precision import Precision, precision_of
+
+NAMES = ("t", "wx", "wy")
+VALUES = {"t": 1.5, "wx": -0.6875, "wy": 2.25}
+VARIABLES = dict(zip(NAMES, hy.make_vars(*NAMES), strict=True))
+PRECISIONS = ["single", "double", "extended", "quadruple", 50]
+
+
+def compiled(expression: Expression, precision: Precision, values: dict[str, Any] = VALUES) -> Any:
+    """The value by heyoka, as an mpf."""
+    context = context_for(50)
+    formula = to_heyoka(expression, VARIABLES, precision.number, context)
+    function = hy.cfunc([formula], list(VARIABLES.values()), compact_mode=True, **precision.options)
+    point = precision.array([mpmath.mpf(values[name]) for name in NAMES])
+    return precision.exact(function(point)[0])
+
+
+# ---- random expressions -----------------------------------------------------------------------------------
+
+texts = st.recursive(
+    st.sampled_from([*NAMES, "2", "0.1", "1/3", "1e-3", "pi", "e", "7.25"]),
+    lambda inner: st.one_of(
+        st.tuples(inner, st.sampled_from("+-*/"), inner).map("".join),
+        inner.map(lambda a: f"({a})"),
+        inner.map(lambda a: f"-{a}"),
+        st.tuples(inner, st.sampled_from(["2", "3", "-1", "5", "-2", "(1/3)", "0.5", "sqrt(2)"])).map(
+            "({0[0]})^{0[1]}".format
+        ),
+        st.tuples(st.sampled_from(sorted(set(expressions.FUNCTIONS) - {"atan2"})), inner).map(
+            "{0[0]}({0[1]})".format
+        ),
+        st.tuples(inner, inner).map("atan2({0[0]}, {0[1]})".format),
+    ),
+    max_leaves=8,
+)
+
+SLOPES = {
+    "sin": mpmath.cos, "cos": mpmath.sin, "tan": lambda x: 1 + mpmath.tan(x) ** 2,
+    "asin": lambda x: (1 - x * x) ** -0.5, "acos": lambda x: (1 - x * x) ** -0.5, "atan": lambda x: 1,
+    "sinh": mpmath.cosh, "cosh": mpmath.sinh, "tanh": lambda x: 1, "exp": mpmath.exp, "log": lambda x: 1 / x,
+    "sqrt": lambda x: x**-0.5 / 2, "erf": lambda x: 2, "sigmoid": lambda x: 1,
+}  # fmt: skip
+EDGES = {"asin": (-1, 1), "acos": (-1, 1), "log": (0,), "sqrt": (0,)}
+
+
+def value_and_bound(expression: Expression, epsilon: float) -> tuple[Any, Any]:
+    """The value, and the error that rounding of relative size epsilon in every operation can add up to.
+
+    Running error analysis (Higham, Accuracy and Stability of Numerical Algorithms, section 3.3), with
+    four roundings for a division and sixteen for a library function.
+    """
+    context = context_for(50)
+
+    def combine(node: Any, operands: list[tuple[Any, Any]]) -> tuple[Any, Any]:
+        if isinstance(node, expressions.Name):
+            return context.mpf(VALUES[node.name]), context.zero
+        if isinstance(node, expressions.Constant):
+            number = node.value.at(context)
+            return number, abs(number) * epsilon
+        value = operate(expression, node, [v for v, _ in operands], context)
+        assume(value == 0 or 1e-200 < abs(value) < 1e200)
+        sizes = [abs(v) for v, _ in operands]
+        errors = [e for _, e in operands]
+        x, e = sizes[0], errors[0]
+        edges = EDGES.get(node.operator, ())
+        assume(all(abs(operands[0][0] - edge) > 1000 * e + 1e-6 for edge in edges))
+        if node.operator == "negative":
+            return value, e
+        if node.operator == "sum":
+            return value, sum(errors) + len(sizes) * epsilon * sum(
+                s + e for s, e in operands_of(sizes, errors)
+            )
+        if node.operator == "product":
+            whole = context.one
+            for s, error in operands_of(sizes, errors):
+                whole *= s + error
+            return value, whole - abs(value) + len(sizes) * epsilon * whole
+        if node.operator == "quotient":
+            assume(2 * errors[1] < sizes[1])
+            whole = (x + e) / (sizes[1] - errors[1])
+            return value, whole - abs(value) + 4 * epsilon * whole
+        if node.operator == "power":
+            exponent = operands[1][0]
+            if exponent < 0 or exponent != int(exponent):
+                assume(1000 * e < x)
+            whole = (x + e if exponent > 0 else x - e) ** abs(exponent)
+            whole = whole if exponent > 0 else 1 / whole
+            digits = 16 + 2 * abs(exponent) + abs(exponent * context.log(x) if x else 0)
+            return value, abs(whole - abs(value)) + digits * epsilon * whole
+        if node.operator == "atan2":
+            radius = context.hypot(*sizes)
+            assume(1000 * sum(errors) < radius)
+            assume(operands[0][0] == 0 or sizes[0] > 1000 * errors[0])  # else it may jump by 2 pi
+            assume(operands[0][0] != 0 or operands[1][0] > 0)
+            return value, 2 * sum(errors) / radius + 16 * epsilon * abs(value)
+        assume(e < 1e-4)
+        slope = max(abs(SLOPES[node.operator](operands[0][0] + d)) for d in (-e, 0, e))
+        return value, 2 * slope * e + 16 * epsilon * abs(value)
+
+    return fold(expression, combine)
+
+
+def operands_of(sizes: list[Any], errors: list[Any]) -> Any:
+    return zip(sizes, errors, strict=True)
+
+
+def read(text: str) -> Expression:
+    try:
+        return parse_expression(text, NAMES)
+    except ExpressionError:
+        assume(False)
+        raise
+
+
+def check_random(text: str, precision: Precision) -> None:
+    expression = read(text)
+    epsilon = float(precision.epsilon)
+    try:
+        value, bound = value_and_bound(expression, epsilon)
+    except ExpressionError:
+        assume(False)
+        raise
+    got = compiled(expression, precision)
+    assert abs(got - value) <= 2 * bound + 1e-290, (text, got, value, bound)
+
+
+@settings(max_examples=40, deadline=None)
+@given(texts)
+def test_double_is_mpmaths_value_within_rounding(text: str) -> None:
+    check_random(text, precision_of("double"))
+
+
+@settings(max_examples=20, deadline=None)
+@given(texts)
+def test_quadruple_is_mpmaths_value_within_rounding(text: str) -> None:
+    check_random(text, precision_of("quadruple"))
+
+
+# ---- chosen ones ------------------------------------------------------------------------------------------
+
+CHOSEN = [
+    "0.1",
+    "wx",
+    "wx/3 - 2*wy/7",
+    "0.1*wx + 0.2*wy - t/10",
+    "sin(0.1*t)^2*exp(-wx)/sqrt(wy)",
+    "wy^(1/3) + wy^-2.5 + wx^-3",
+    "wx^64*1e10 + wx^7",
+    "atan2(wx, wy) + atan2(0.1, wx) + erf(wx/3) + sigmoid(wx)",
+    "acos(wx) + asin(0.3) + tanh(wx) + cosh(t)*sinh(t) + tan(t/10) + atan(wy) + log(wy)",
+    "cos(pi/7)*wx/sqrt(2) + e",
+    "1/(0.1 + wx^2)/wy",
+]
+
+
+@pytest.mark.parametrize("text", CHOSEN)
+@pytest.mark.parametrize("name", PRECISIONS)
+def test_every_precision_is_reached(text: str, name: str | int) -> None:
+    """No more than some tens of roundings of numbers of order one, in the precision asked for."""
+    precision = precision_of(name)
+    expression = parse_expression(text, NAMES)
+    context = context_for(50)
+    value = evaluate(expression, VALUES, context)
+    error = abs(compiled(expression, precision) - value)
+    assert error <= 256 * precision.epsilon * max(1, abs(value))
+    if name == "quadruple":
+        assert error < 1e-30
+
+
+@pytest.mark.parametrize("name", PRECISIONS)
+def test_a_constant_is_rounded_once(name: str | int) -> None:
+    """0.1 and constants of many operations are the nearest numbers; 2*wx/3 has one factor."""
+    precision = precision_of(name)
+    context = context_for(50)
+    for text, value in [
+        ("0.1", context.mpf(1) / 10),
+        ("sin(0.1)^2 + log(3)/7", context.sin(context.mpf(1) / 10) ** 2 + context.log(3) / 7),
+        ("2*wx/3", context.mpf(2) / 3),
+        ("wx/sqrt(2)", 1 / context.sqrt(2)),
+    ]:
+        got = compiled(parse_expression(text, NAMES), precision, {**VALUES, "wx": 1.0})
+        assert got == precision.exact(precision.number(value)), text
+
+
+def test_t_is_heyokas_time_unless_it_is_given() -> None:
+    number, context = precision_of("double").number, context_for("double")
+    expression = parse_expression("t", NAMES)
+    assert to_heyoka(expression, {}, number, context) == hy.time
+    assert to_heyoka(expression, VARIABLES, number, context) == VARIABLES["t"]
+
+
+def test_squares_are_written_as_heyoka_likes_them() -> None:
+    number, context = precision_of("double").number, context_for("double")
+    wx, wy = VARIABLES["wx"], VARIABLES["wy"]
+
+    def of(text: str) -> Any:
+        return to_heyoka(parse_expression(text, NAMES), VARIABLES, number, context)
+
+    assert of("wx^2") == wx**2.0
+    assert of("wx**2 - wy") == wx**2.0 - wy
+    assert of("wx^1") == wx
+    assert of("wx^0") == hy.expression(1.0)
+    assert of("wx/wy") == wx / wy
+    assert of("-wx^2") == -(wx**2.0)
+
+
+@pytest.mark.parametrize("power", [1, 2, 3, 4, 5, 7, 8, 15, 16])
+def test_whole_powers_have_a_taylor_series_at_zero(power: int) -> None:
+    """x' = 1, y' = x^n from zero gives y(1) = 1/(n+1); heyoka's own x**n is NaN there for n > 2.
+
+    Powers up to the method's order, 20 in double: from zero it can't see the first n derivatives vanish.
+    """
+    number, context = precision_of("double").number, context_for("double")
+    x, y = hy.make_vars("x", "y")
+    slope = to_heyoka(parse_expression(f"x^{power}", ["x"]), {"x": x}, number, context)
+    integrator = hy.taylor_adaptive([(x, hy.expression(1.0)), (y, slope)], [0.0, 0.0], compact_mode=True)
+    assert integrator.propagate_until(1.0)[0] == hy.taylor_outcome.time_limit
+    assert abs(integrator.state[1] * (power + 1) - 1) < 64 * np.finfo(float).eps
+
+
+def test_a_constant_beyond_the_range_is_refused() -> None:
+    number, context = precision_of("double").number, context_for("double")
+    for text in "1e400*wx", "wx/1e400", "wx + 1e-400", "exp(-exp(40))*wx":
+        with pytest.raises(ExpressionError, match="beyond the range of the working precision") as caught:
+            to_heyoka(parse_expression(text, NAMES), VARIABLES, number, context)
+        assert caught.value.column is not None
+
+
+def test_a_long_chain_compiles() -> None:
+    expression = parse_expression("+".join(["wx*t"] * 400), NAMES)
+    assert abs(compiled(expression, precision_of("double")) / (400 * -0.6875 * 1.5) - 1) < 400 * 2.0**-52
+    expression = parse_expression("/".join(["t"] * 1000), NAMES)
+    assert compiled(expression, precision_of("double"), {**VALUES, "t": 1.0}) == 1

@@ -1,0 +1,146 @@
+"""On a circular orbit the attitude is carried in the frame that turns with it, and recorded in space."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from equations import EPS, derivative, prepared
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import law, run_text, tried
+
+from rigidsim.accuracy.comparison import angles_between
+from rigidsim.model.system import System
+
+pytestmark = pytest.mark.compact
+
+BODY = "principal_moments = [1, 1.75, 2]"
+SPIN = "angular_velocity = [0.4, 0.9, 0.3]\nquaternion = [0.5, 0.1, -0.3, 0.7]"
+TEXT = """name = "orbit"
+[body]
+principal_moments = [1, 1.75, 2]
+[initial]
+angular_velocity = {rates}
+quaternion = {quaternion}
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = {strength}
+orbit = {{semi_major_axis = 1, {orbit}}}
+{more}
+[time]
+start = {start}
+end = {end}
+samples = 33
+[integrator]
+formulation = "{formulation}"
+precision = "{precision}"
+[output]
+timeline = false
+"""
+ANGLE = st.floats(-3.0, 3.0).map(lambda x: round(x, 3))
+
+
+def orbit_load(elements: str = "") -> str:
+    orbit = f"{{semi_major_axis = 1{', ' if elements else ''}{elements}}}"
+    return f'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {orbit}'
+
+
+def initial(system: System) -> np.ndarray:
+    """In SI, float64."""
+    return np.ldexp([float(x) for x in system.initial], system.state_exponents)
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    rates=st.lists(ANGLE, min_size=3, max_size=3),
+    quaternion=st.lists(ANGLE, min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1),
+    node=ANGLE,
+    inclination=ANGLE.map(abs),
+    anomaly=ANGLE,
+    start=st.sampled_from([0, -7.5, 1000]),
+)
+def test_the_attitude_in_space_is_that_of_nine_direction_cosines(
+    rates: list[float],
+    quaternion: list[float],
+    node: float,
+    inclination: float,
+    anomaly: float,
+    start: float,
+) -> None:
+    """Two sets of equations with nothing in common but the body, in 128-bit arithmetic."""
+    orbit = f"ascending_node = {node}, inclination = {inclination}, mean_anomaly = {anomaly}"
+    text = TEXT.format(
+        rates=rates, quaternion=quaternion, orbit=orbit, strength=1.1, more="", start=start,
+        end=start + 4, formulation="auto", precision="quadruple",
+    )  # fmt: skip
+    frame, cosines = (tried(text, "quadruple", f) for f in ("quaternion", "rotation_matrix"))
+    assert frame.rows == cosines.rows == 33
+    # unstable starts amplify by at most e^(2 n t): the largest rate of a tumbling body here is below 2 n
+    rate = float(np.linalg.norm(rates)) + 2
+    allowed = 10 * law(2.0**-112, cosines.steps, rate, 4) * np.exp(8)
+    assert angles_between(frame.attitudes, cosines.attitudes).max() <= allowed
+
+
+def test_at_rest_in_the_orbital_frame_it_stays_bit_for_bit() -> None:
+    """Principal axes along those of the frame and w = n e_z: every derivative but the orbit's is zero."""
+    system = prepared(BODY, "angular_velocity = [0, 0, 1]\nquaternion = [1, 0, 0, 0]", orbit_load()).system
+    moving = derivative(system, initial(system), 0.0)
+    carried = dict(zip(system.states, moving, strict=True))
+    assert [carried[name] for name in ("wx", "wy", "wz", "pw", "px", "py", "pz")] == [0.0] * 7
+    assert carried["sin_half_anomaly1"] == 0.5
+
+
+def test_the_dataset_starts_with_the_attitude_that_was_given(runs: Path) -> None:
+    """Rounding of a product of two rotations: a few units in the last place of 1."""
+    text = TEXT.format(
+        rates=[0.1, 0.2, 0.3], quaternion=[0.5, -0.5, 0.5, 0.5], strength=1, start=0, end=4, more="",
+        orbit="inclination = 0.7, ascending_node = 2, mean_anomaly = 1", formulation="auto",
+        precision="double",
+    )  # fmt: skip
+    first = run_text(text, runs).dataset["quaternion"].values[0]
+    np.testing.assert_allclose(first, [0.5, -0.5, 0.5, 0.5], rtol=0, atol=4 * EPS)
+
+
+def test_events_read_the_attitude_in_space(runs: Path) -> None:
+    """A body that turns about the orbit's normal, in a gradient too weak to be felt."""
+    text = TEXT.format(
+        rates=[0, 0, 2], quaternion=[1, 0, 0, 0], strength=1e-12, start=0, end=3, orbit="mean_anomaly = 0",
+        more='[[events]]\nname = "half"\nexpression = "qw"', formulation="auto", precision="double",
+    )  # fmt: skip
+    dataset = run_text(text, runs).dataset
+    # the torque turns the body by some 1e-11 rad at most, and q_w = cos(t)
+    assert dataset["half_time"].values == pytest.approx([np.pi / 2], abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("loads", "integrator"),
+    [
+        (orbit_load("eccentricity = 0.1"), ""),
+        (orbit_load("inclination = 0.4, node_rate = 0.1"), ""),
+        (orbit_load() + "\n[[loads]]\n" + orbit_load("mean_anomaly = 2"), ""),
+        (orbit_load(), 'formulation = "rotation_matrix"'),
+        (orbit_load(), 'formulation = "euler_angles"'),
+        (orbit_load() + '\n[[loads]]\nkind = "torque"\nframe = "space"\ncomponents = [1, 0, 0]', ""),
+    ],
+    ids=["eccentric", "moving plane", "two sources", "matrix", "angles", "torque in space"],
+)
+def test_elsewhere_the_attitude_in_space_is_carried(loads: str, integrator: str) -> None:
+    system = prepared(BODY, SPIN, loads, integrator=integrator).system
+    assert "pw" not in system.states
+
+
+def test_a_load_in_body_axes_leaves_the_orbital_frame() -> None:
+    """Damping reads the rates alone."""
+    loads = orbit_load() + '\n[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.1, 0, 0]'
+    assert "pw" in prepared(BODY, SPIN, loads).system.states
+
+
+def test_only_the_orbits_own_states_know_the_orbit() -> None:
+    """The motion in the orbital frame doesn't depend on the orbit's phase: shifted, it is the same."""
+    system = prepared(BODY, SPIN, orbit_load("inclination = 1.0")).system
+    start = initial(system)
+    other = start.copy()
+    other[-2:] = [np.cos(1.0), np.sin(1.0)]
+    np.testing.assert_array_equal(derivative(system, start, 0.0)[:7], derivative(system, other, 5.0)[:7])

@@ -1,0 +1,64 @@
+"""An observable of one's own: the README's example is recorded by its name like those of rigidsim."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigidsim
+from rigidsim.scene.registry import OBSERVABLES
+
+pytestmark = pytest.mark.compact
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[rigidsim.Run]:
+    """What the README's example leaves behind, run in an empty folder; the observable is gone afterwards."""
+    (code,) = re.findall(
+        r"<!-- test: own observable -->\n```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S
+    )
+    (tmp_path / "configs").symlink_to(ROOT / "configs")
+    monkeypatch.chdir(tmp_path)
+    known = dict(OBSERVABLES)
+    with redirect_stdout(StringIO()):
+        exec(compile(code, "README.md", "exec"), {})
+    yield rigidsim.open_run("runs/asymmetric_top")
+    OBSERVABLES.clear()
+    OBSERVABLES.update(known)
+
+
+def test_the_example_of_the_readme(run: rigidsim.Run) -> None:
+    dataset = run.dataset
+    axis = dataset["figure_axis"]
+    assert axis.dims == ("time", "space_axis")
+    assert (axis.attrs["units"], axis.attrs["long_name"], axis.attrs["frame"]) == (
+        "1",
+        "body axis z",
+        "space axes",
+    )
+    # its length is the square of the quaternion's norm, which drifts like sqrt(steps)
+    allowed = 2 * run.summary["invariants"]["quaternion_norm"]["bound"]
+    assert np.abs(np.linalg.norm(axis.values, axis=1) - 1).max() <= allowed
+    assert set(dataset.data_vars) - {n for n in dataset.data_vars if "drift_of" in dataset[n].attrs} == {
+        "figure_axis"
+    }
+
+
+def test_it_is_recorded_only_where_it_is_named(run: rigidsim.Run, tmp_path: Path) -> None:
+    plain = rigidsim.load(ROOT / "configs/asymmetric_top.toml", overrides=["time.samples=3", "time.end=1"])
+    assert "figure_axis" not in rigidsim.run(plain, out=tmp_path / "plain").dataset
+
+
+def test_a_name_that_is_taken_is_refused() -> None:
+    from rigidsim.scene.registry import register_observable
+
+    with pytest.raises(ValueError, match='"energy" is registered already'):
+        register_observable(OBSERVABLES["energy"])

@@ -1,0 +1,171 @@
+"""Pulses and switches far shorter than the motion: no step passes over them."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from equations import EPS, prepared
+from scipy.integrate import quad
+from support import EPSILON
+
+import rigidsim
+from rigidsim.model.loads import LoadModel, seconds
+from rigidsim.scene.expression_parser import parse_expression
+from rigidsim.scene.transitions import narrow_parts
+
+pytestmark = pytest.mark.compact
+
+SPUN = """name = "spun"
+[parameters]
+w = "{width}"
+[body]
+principal_moments = [1, 1.5, 2]
+[initial]
+angular_velocity = [0, 0, {spin}]
+[[loads]]
+kind = "torque"
+components = [0, 0, "{torque}"]
+[time]
+end = 100
+samples = 11
+[integrator]
+precision = "{precision}"
+[output]
+record = ["angular_velocity", "work"]
+"""
+
+
+def spun(torque: str, runs: Path, *, width: str = "1", spin: str = "0.5", precision: str = "double",
+         more: str = "", loads: Any = ()) -> rigidsim.Run:  # fmt: skip
+    text = SPUN.format(width=width, torque=torque, spin=spin, precision=precision) + more
+    experiment = rigidsim.parse(text, overrides=["output.timeline=false"])
+    return rigidsim.run(experiment, out=runs, force=True, loads=loads)
+
+
+@pytest.mark.parametrize(
+    ("form", "precision", "width"),
+    [
+        *(("exp(-((t-50)/w)^2)/w", "double", width) for width in ("1e-1", "1e-2", "1e-3", "1e-4")),
+        ("exp(-((t-50)/w)^2)/w", "extended", "1e-3"),
+        ("exp(-(t-50)^2/w^2)/w", "double", "1e-4"),
+        ("sigmoid((t-50)/w)*sigmoid((50-t)/w)/w", "double", "1e-1"),
+        ("sigmoid((t-50)/w)*sigmoid((50-t)/w)/w", "double", "1e-4"),
+    ],
+)
+def test_a_pulse_gives_its_whole_impulse_and_work(form: str, width: str, precision: str, runs: Path) -> None:
+    """Whatever its width: sqrt(pi) or 1 N m s, and the balance of energy holds."""
+    run = spun(form, runs, width=width, precision=precision)
+    impulse = 1.0 if "sigmoid" in form else math.sqrt(math.pi)
+    spin = run.dataset["angular_velocity"].values[:, 2]
+    steps = run.summary["cost"]["steps"]
+    # t is known to eps * 50 s, which is that over w of the pulse's argument; float64 is what is compared
+    blur = EPSILON[precision] * 50 / float(width) * math.sqrt(steps)
+    bound = 4 * EPS + 50 * EPSILON[precision] * math.sqrt(steps) + blur
+    assert spin[-1] - 0.5 == pytest.approx(impulse / 2, rel=bound)
+    work = run.dataset["work"].values[-1]
+    assert work == pytest.approx((0.5 + impulse / 2) ** 2 - 0.25, rel=3 * bound)
+    row = run.summary["invariants"]["energy_balance"]
+    assert row["largest_drift"] <= row["bound"]
+    assert not run.summary["warnings"]
+    # the way there and back costs steps in proportion to the logarithm of the width alone
+    assert steps < 150 + 20 * math.log2(100 / float(width))
+
+
+@pytest.mark.parametrize(
+    "torque",
+    [
+        "tanh((t-5)/0.001)", "erf((t-5)/0.001)", "atan((t-5)/0.001)", "sigmoid(100*(sin(t)-0.5))",
+        "cos(t)^64", "(2+cos(t))^-64", "exp(-50*cos(t)^2)", "exp(-1000*sin(t/7)^2)",
+        "1/(1+((t-50)/1e-3)^2)^4", "(t/100)^40", "1/cosh(3*(t-50))",
+    ],
+)  # fmt: skip
+def test_switches_and_combs(torque: str, runs: Path) -> None:
+    """Against quadrature in pieces."""
+    functions = {name: getattr(math, name) for name in ["sin", "cos", "exp", "erf", "tanh", "atan", "cosh"]}
+
+    def value(t: float) -> float:
+        sigmoid = lambda x: 0.5 * (1 + math.tanh(x / 2))  # noqa: E731
+        return float(eval(torque.replace("^", "**"), functions | {"t": t, "sigmoid": sigmoid}))
+
+    near = (c + s * 2.0**-k for c in (5, 50) for s in (-1, 1) for k in range(14))
+    pieces = sorted({*np.linspace(0, 100, 401), *near})
+    expected = math.fsum(quad(value, a, b, epsabs=1e-15)[0] for a, b in pairwise(pieces))
+    run = spun(torque, runs)
+    gained = 2 * (run.dataset["angular_velocity"].values[-1, 2] - 0.5)
+    blur = 1e3 * 50 * EPS  # of t, over the shortest width
+    assert gained == pytest.approx(expected, rel=blur + 50 * EPS * math.sqrt(run.summary["cost"]["steps"]))
+
+
+@pytest.mark.parametrize("width", ["1e-1", "1e-4"])
+def test_an_event_on_a_narrow_function_of_time(width: str, runs: Path) -> None:
+    """Both crossings of half its height, at t0 -+ w sqrt(ln 2)."""
+    event = '[[events]]\nname = "peak"\nexpression = "exp(-((t-50)/w)^2) - 1/2"\n'
+    run = spun("0.001*sin(t)", runs, width=width, more=event)
+    found = run.dataset["peak_time"].values
+    reach = float(width) * math.sqrt(math.log(2))
+    assert found == pytest.approx([50 - reach, 50 + reach], abs=20 * 50 * EPS)
+
+
+def test_a_narrow_function_of_the_state_switches_too(runs: Path) -> None:
+    """A brake that sets in at a spin of 1 rad/s: reached at 5 s, and held from there on."""
+    run = spun("0.2 - 0.2*sigmoid(1e6*(wz-1))", runs)
+    spin = run.dataset["angular_velocity"].values[:, 2]
+    np.testing.assert_allclose(spin[0], 0.5)
+    assert np.all(np.abs(spin[1:] - 1) < 1e-4)
+
+
+class Kick(LoadModel):
+    """A pulse about z given from Python."""
+
+    title = "kick"
+
+    def __init__(self, width: float) -> None:
+        self.width = width
+
+    def narrow(self, m: Any) -> list[Any]:
+        return [(seconds(m) - 50.0) * (1 / self.width)]
+
+    def torque(self, m: Any) -> list[Any]:
+        import heyoka as hy
+
+        context = m.scene.context
+        size = context.ldexp(1 / context.mpf(self.width), -m.scaling.energy)
+        (u,) = self.narrow(m)
+        return [([0, 0, size], hy.exp(-(u * u)))]
+
+
+def test_a_load_of_ones_own_says_where_it_is_narrow(runs: Path) -> None:
+    run = spun("0", runs, loads=[Kick(2.0**-10)])
+    gained = run.dataset["angular_velocity"].values[-1, 2] - 0.5
+    assert gained == pytest.approx(math.sqrt(math.pi) / 2, rel=2.0**10 * 50 * EPS * 20)
+    assert run.summary["states"][-1] == "pace"
+
+
+def test_what_is_smooth_has_no_extra_state() -> None:
+    """Sine drives, polynomials and springs cost nothing."""
+    smooth = ("sin(3*t)", "k*sin(t)^2", "t^2 - 3*t", "-0.1*wx", "exp(-cos(t)^2)", "qw*qx + sin(phi)")
+    for torque in smooth:
+        load = f'kind = "torque"\ncomponents = ["{torque}", 0, 0]'
+        spin = "angular_velocity = [0, 0, 1]"
+        system = prepared("principal_moments = [1, 2, 2.5]", spin, load, parameters="k = 2").system
+        assert "pace" not in system.states
+    flat = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [0, 0, 1]",
+                    'kind = "torque"\ncomponents = ["exp(-t^2)", 0, 0]').system  # fmt: skip
+    assert flat.states[-1] == "pace"
+    assert dict(flat.reasons)["pace"].startswith("torque: no step may pass over")
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("exp(-((t-50)/0.01)^2)", 1), ("tanh(100*t) + tanh(100*t)", 1), ("1/(1+t^2)", 1), ("t^9", 1),
+        ("t^8", 0), ("t^-1", 1), ("cos(t)^64", 1), ("tanh(sin(t))", 0), ("exp(1)*t", 0), ("tanh(5*qw)", 1),
+    ],
+)  # fmt: skip
+def test_narrow_parts(text: str, parts: int) -> None:
+    assert len(narrow_parts(parse_expression(text, ("t", "qw")))) == parts

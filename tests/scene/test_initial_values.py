@@ -1,0 +1,97 @@
+"""Expressions without a value at the start of a run are refused, with the place and the values there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import heyoka as hy
+import pytest
+from support import run_text
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.model.loads import LoadModel
+from rigidsim.solve.problem import prepare
+
+SCENE = """name = "start"
+[body]
+principal_moments = [1, 2, 3]
+mass = 1
+[initial]
+angular_velocity = [0, 0.5, 1]
+euler_angles = [0.25, 1, 0]
+{initial}
+{loads}
+[time]
+start = 2
+end = 10
+[integrator]
+precision = "{precision}"
+"""
+
+
+def refused(loads: str, initial: str = "", precision: str = "double") -> str:
+    with pytest.raises(ConfigError) as caught:
+        prepare(rigidsim.parse(SCENE.format(initial=initial, loads=loads, precision=precision)))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("precision", ["double", "quadruple"])
+@pytest.mark.parametrize(
+    ("expression", "says"),
+    [
+        ("1/wx", "(wx = 0.0)"),
+        ("1/(t-2)", "(t = 2.0)"),
+        ("log(wy - 1)", "(wy = 0.5)"),
+        ("sqrt(-wz)", "(wz = 1.0)"),
+        ("wx^-2", "(wx = 0.0)"),
+        ("1/psi", "(psi = 0.0)"),
+        ("log(phi - 1/4)", "(phi = 0.25)"),
+        ("exp(wy*1e6)", "(wy = 0.5)"),
+        ("atan2(wx, psi)", "(wx = 0.0, psi = 0.0)"),
+    ],
+)
+def test_components(expression: str, says: str, precision: str) -> None:
+    for frame in ("body", "space"):
+        load = f'[[loads]]\nkind = "viscous_torque"\ncoefficients = [1, 1, 1]\n[[loads]]\nkind = "torque"\n' \
+               f'components = [1, "{expression}", 0]\nframe = "{frame}"'  # fmt: skip
+        text = refused(load, precision=precision)
+        assert "[[loads]] number 2 components[1]: no finite value at the start" in text
+        assert says in text
+        assert "column" in text
+
+
+def test_places_and_velocities_of_a_flight() -> None:
+    force = '[[loads]]\nkind = "force"\ncomponents = ["1/x", "log(vy)", "z"]'
+    text = refused(force, "position = [0, 1, 2]\nvelocity = [0, -3, 0]")
+    assert "components[0]" in text
+    assert "components[1]" in text  # all of them at once
+    assert "(vy = -3.0)" in text
+    assert "components[2]" not in text
+
+
+def test_events() -> None:
+    event = '[[events]]\nname = "fine"\nexpression = "wy"\n[[events]]\nname = "lost"\nexpression = "wy/wx"'
+    assert "[[events]] number 2 expression: no finite value at the start" in refused(event)
+
+
+def test_a_value_that_is_lost_later_is_no_matter_of_the_start(runs: Path) -> None:
+    load = '[[loads]]\nkind = "torque"\ncomponents = ["1/(t-5)", 0, 0]'
+    run = run_text(SCENE.format(initial="", loads=load, precision="double"), runs)
+    assert run.status in ("stopped: non-finite state", "stopped: step size collapsed")
+    assert 4 < run.summary["time_reached"] <= 5
+
+
+@pytest.mark.parametrize("precision", ["double", "extended", "quadruple"])
+def test_loads_from_python(precision: str) -> None:
+    class Pole(LoadModel):
+        title = "pole"
+
+        def torque(self, m: Any) -> list[Any]:
+            one = m.scene.context.one
+            return [([one, 0, 0], hy.log(m.rates[0]))]
+
+    experiment = rigidsim.parse(SCENE.format(initial="", loads="", precision=precision))
+    with pytest.raises(ConfigError, match="derivatives of wx, work aren't finite at the start"):
+        prepare(experiment, loads=[Pole()])

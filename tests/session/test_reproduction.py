@@ -1,0 +1,199 @@
+"""Bit for bit: twice the same config, however it is driven, and one bare call of heyoka."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import heyoka as hy
+import numpy as np
+import pytest
+import xarray
+from support import same_bits
+
+import rigidsim
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.evaluate import Evaluator, evaluate_rows
+from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.status import Status
+
+RUNS = [
+    ('"single"', "quaternion"),
+    ('"double"', "rates"),
+    ('"double"', "quaternion"),
+    ('"double"', "euler_angles"),
+    ('"double"', "rotation_matrix"),
+    ('"extended"', "quaternion"),
+    ('"extended"', "euler_angles"),
+    ('"quadruple"', "quaternion"),
+    ('"quadruple"', "euler_angles"),
+    ("30", "rotation_matrix"),
+]
+GRIDS = {
+    "dense": "end = 40\nsamples = 641",
+    "a sample per step": "end = 40\nsamples = 81",
+    "sparse": "end = 200\nsamples = 4",
+    "uneven": "times = [0, 0.01, 0.02, 7, 7.001, 30, 90, 90.5]",
+}
+
+
+def run(text: str, out: Path) -> xarray.Dataset:
+    with rigidsim.run(rigidsim.parse(text), out=out).dataset as dataset:
+        return dataset.load()
+
+
+@pytest.mark.parametrize(("precision", "formulation"), RUNS)
+def test_twice_the_same_config(
+    precision: str, formulation: str, tmp_path: Path, free_body: Callable[..., str]
+) -> None:
+    output = 'record = ["angular_velocity"]' if formulation == "rates" else ""
+    text = free_body("end = 4\nsamples = 33", precision=precision, formulation=formulation, output=output)
+    first, second = run(text, tmp_path / "a"), run(text, tmp_path / "b")
+    same_bits(first, second)
+    moved = text.replace("[0.3, 1.0, 0.5]", "[0.3, 1.0, 0.500001]")
+    with pytest.raises(AssertionError):  # and the comparison does see a change
+        same_bits(first, run(moved, tmp_path / "c"))
+
+
+DRIVES = {
+    "one step at a time": Pacing(chunk_seconds=0.0, grid_rows=0, least_block_steps=10**9),
+    "grids of one step": Pacing(chunk_seconds=0.0),
+    "few rows": Pacing(rows_at_once=7, block_steps=13, least_block_steps=1, grid_rows=0),
+    "blocks of three": Pacing(block_steps=3, least_block_steps=1, skip_from=1e9, grid_rows=0),
+    "skips wherever it can": Pacing(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0),
+    "skips too far": Pacing(skip_from=2.0, skip_margin=1.7, grid_rows=0),
+    "skips mixed with grids": Pacing(skip_from=1.0, grid_strides=0.01),
+    "impatient": Pacing(chunk_seconds=1e-7, patience=0.0),
+}
+
+
+class Collected(SampleReceiver):
+    """Everything recorded, in memory."""
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self.evaluator = evaluator
+        self.blocks: list[dict[str, list[np.ndarray]]] = []
+
+    def take(self, block: SampleBlock) -> None:
+        self.blocks.append(self.evaluator.evaluate(block) | {"time": [block.times]})
+
+
+def driven(text: str, pacing: Pacing, stride: int) -> dict[str, np.ndarray]:
+    prepared = prepare(rigidsim.parse(text))
+    parts = assemble(prepared, stride=stride)
+    collected = Collected(parts.evaluator)
+    progress = sampler(prepared, parts, collected, pacing=pacing).run()
+    assert progress.status is Status.FINISHED
+    return {
+        f"{name}, part {n}": np.concatenate([block[name][n] for block in collected.blocks])
+        for name, pieces in collected.blocks[0].items()
+        for n in range(len(pieces))
+    }
+
+
+@pytest.mark.parametrize(
+    ("formulation", "grid"),
+    [
+        *(("quaternion", grid) for grid in GRIDS),
+        ("euler_angles", "a sample per step"),
+        ("euler_angles", "sparse"),
+    ],
+)
+def test_the_bits_do_not_depend_on_how_it_is_driven(
+    formulation: str, grid: str, free_body: Callable[..., str]
+) -> None:
+    record = 'record = ["angular_velocity", "quaternion", "euler_angles", "energy"]'
+    text = free_body(GRIDS[grid], formulation=formulation, output=record)
+    plain = driven(text, Pacing(), stride=8)  # many strides in a short run
+    for name, pacing in DRIVES.items():
+        other = driven(text, pacing, stride=8)
+        assert list(plain) == list(other)
+        for column in plain:
+            assert plain[column].tobytes() == other[column].tobytes(), (name, column)
+
+
+@pytest.mark.parametrize("precision", ['"quadruple"', "30"])
+def test_the_bits_of_wide_numbers_do_not_depend_on_it_either(
+    precision: str, tmp_path: Path, free_body: Callable[..., str]
+) -> None:
+    text = free_body("end = 20\nsamples = 21", precision=precision, formulation="euler_angles")
+    tuning = Tuning(Pacing(rows_at_once=3, chunk_seconds=1e-7, skip_from=4.0))
+    again = rigidsim.run(rigidsim.parse(text), out=tmp_path / "driven", tuning=tuning)
+    with again.dataset as dataset:
+        same_bits(run(text, tmp_path / "plain"), dataset.load())
+
+
+def test_the_sample_grid_does_not_change_the_motion(tmp_path: Path, free_body: Callable[..., str]) -> None:
+    """Samples are read off the steps, never steered by: a coarser or longer grid gives the same values."""
+    fine = run(free_body("end = 64\nevery = 0.125"), tmp_path / "fine")
+    coarse = run(free_body("end = 128\nevery = 16"), tmp_path / "coarse")
+    assert coarse.sizes["time"] == 9
+    for name in ("time", "angular_velocity", "quaternion", "energy", "angular_momentum_drift"):
+        np.testing.assert_array_equal(fine[name].values[::128], coarse[name].values[:5])
+
+
+def test_a_row_does_not_depend_on_its_block() -> None:
+    """The padding in ``evaluate_rows`` is what makes it so: heyoka's rest of a batch has other bits."""
+    x, y = hy.make_vars("x", "y")
+    function = hy.cfunc([hy.sqrt(x * x + y * y) / (1.0 + x * y), hy.sin(x) * hy.cos(y)], [x, y])
+    states = np.random.default_rng(1).uniform(-1, 1, (301, 2))
+    whole = evaluate_rows(function, states)
+    assert whole.shape == (2, 301)
+    for first, last in ((0, 1), (1, 64), (64, 301), (300, 301), (100, 165)):
+        piece = evaluate_rows(function, states[first:last])
+        np.testing.assert_array_equal(piece, whole[:, first:last])
+
+
+@pytest.mark.parametrize(
+    ("precision", "formulation", "grid"),
+    [
+        ('"single"', "quaternion", "dense"),
+        ('"double"', "rates", "dense"),
+        ('"double"', "quaternion", "dense"),
+        ('"double"', "quaternion", "sparse"),
+        ('"double"', "quaternion", "uneven"),
+        ('"double"', "rotation_matrix", "a sample per step"),
+        ('"extended"', "quaternion", "uneven"),
+        ('"quadruple"', "quaternion", "sparse"),
+        ("30", "rotation_matrix", "a sample per step"),
+    ],
+)
+def test_it_is_one_bare_propagation(
+    precision: str, formulation: str, grid: str, tmp_path: Path, free_body: Callable[..., str]
+) -> None:
+    """The same equations handed to heyoka's own ``propagate_grid``; Euler angles, which are kept small on the
+    way, have no such counterpart.
+    """
+    output = 'record = ["angular_velocity"]' if formulation == "rates" else ""
+    if formulation == "rotation_matrix":
+        output = 'record = ["angular_velocity", "rotation_matrix"]'
+    text = free_body(GRIDS[grid], precision=precision, formulation=formulation, output=output)
+    prepared = prepare(rigidsim.parse(text))
+    system, chosen = prepared.system, prepared.precision
+    bare = hy.taylor_adaptive(
+        system.equations,
+        chosen.array(system.initial),
+        time=prepared.clock.at(0),
+        compact_mode=chosen.compact,
+        **chosen.options,
+        **({} if prepared.tolerance is None else {"tol": prepared.tolerance}),
+    )
+    states = bare.propagate_grid(prepared.clock.internal(0, prepared.clock.count))[-1]
+    lead = np.array(states).astype(np.float64)
+    recorded = {"quaternion": "quaternion", "rotation_matrix": "rotation_matrix"}.get(formulation)
+    dataset = run(text, tmp_path)
+    rates = np.ldexp(lead[:, :3], system.state_exponents[:3])
+    pairs = [(dataset.angular_velocity.values, rates)]
+    if recorded:
+        pairs.append((dataset[recorded].values.reshape(len(lead), -1), lead[:, 3:]))
+    # the last step of propagate_grid is clamped, so only its end is another (equally good) result: rounding
+    # of one step, some operations on components of order 1
+    few = 16 * 2.0 ** (1 - min(chosen.bits, 53))
+    for ours, theirs in pairs:
+        assert ours.shape == theirs.shape
+        np.testing.assert_array_equal(ours[:-1], theirs[:-1])
+        np.testing.assert_allclose(ours[-1], theirs[-1], rtol=0, atol=few)

@@ -1,0 +1,356 @@
+"""Euler angles through their singularity: another chart carries the run, and what is recorded stays what was
+asked for, continuous and as accurate as a quaternion's.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from hypothesis import given
+from hypothesis import strategies as st
+from support import EPSILON, angle_between, law, run_text, same_bits, wide
+
+import rigidsim
+from rigidsim.model.euler_charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
+from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.attitude import AXES, quaternion_from_euler, rotation_matrix
+from rigidsim.scene.schema import EULER_SEQUENCES
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.charts import NEAR
+from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.precision import precision_of
+from rigidsim.workflows.plan import plan
+from rigidsim.workflows.resume import resume
+
+pytestmark = pytest.mark.compact
+
+RECORD = 'output.record=["angular_velocity", "quaternion", "euler_angles"]'
+EULER = 'integrator.formulation="euler_angles"'
+HALF_TURN = "3.14159265358979323846264338327950288419716939937510582"
+RIGHT_ANGLE = "1.57079632679489661923132169163975144209858469968755291"
+angle = st.floats(-3.0, 3.0)
+
+
+def tumbling(sequence: str, start: str = "quaternion = [0.7, 0.4, 0.5, 0.3]", time: str = "") -> str:
+    """A body that turns over about its middle axis, through all attitudes."""
+    return f"""
+name = "free"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.3, 1.0, 0.5]
+{start}
+[time]
+{time or "end = 100" + chr(10) + "samples = 1001"}
+[integrator]
+euler_sequence = "{sequence}"
+"""
+
+
+def pole(sequence: str) -> str:
+    """A middle angle in the singularity."""
+    return HALF_TURN if is_proper(sequence) else RIGHT_ANGLE
+
+
+def attitude_from(sequence: str, angles: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) of Euler angles (n, 3) by products of three turns: numpy alone."""
+    result = np.tile([1.0, 0, 0, 0], (len(angles), 1))
+    for axis, turn in zip(sequence, angles.T, strict=True):
+        w, v = result[:, 0], result[:, 1:]
+        c, s = np.cos(turn / 2), np.sin(turn / 2)
+        e = np.eye(3)[AXES.index(axis)]
+        vector = w[:, None] * s[:, None] * e + c[:, None] * v + s[:, None] * np.cross(v, e)
+        result = np.column_stack([w * c - s * (v @ e), vector])
+    return result
+
+
+# --- the two charts ---------------------------------------------------------------------------------------
+
+
+@given(st.sampled_from(EULER_SEQUENCES), st.tuples(angle, angle, angle), st.sampled_from([1.0, -1.0]))
+def test_the_way_across_keeps_the_attitude(
+    sequence: str, angles: tuple[float, float, float], branch: float
+) -> None:
+    partner = partner_sequence(sequence)
+    assert partner_sequence(partner) == sequence
+    other = across(sequence, list(angles), math, branch)
+    context = context_for("quadruple")
+    here, there = (
+        rotation_matrix(quaternion_from_euler(context, [context.mpf(x) for x in a], s))
+        for a, s in ((angles, sequence), (other, partner))
+    )
+    # a dozen roundings of numbers up to 2 pi
+    assert max(abs(here[i][j] - there[i][j]) for i in range(3) for j in range(3)) < 32 * 2.0**-52
+    assert singular_factor(partner, other[1], math) * branch >= -1e-300
+    direction = here[AXES.index(partner[0])][AXES.index(partner[2])]
+    assert abs(direction - pole_of_partner(sequence, list(angles), math)) < 8 * 2.0**-52
+
+
+@given(st.sampled_from(EULER_SEQUENCES), st.tuples(angle, angle, angle))
+def test_one_of_two_charts_is_always_regular(sequence: str, angles: tuple[float, float, float]) -> None:
+    """f^2 + f'^2 >= 1, since the rows of a rotation matrix are unit vectors."""
+    other = across(sequence, list(angles), math)
+    factor = singular_factor(sequence, angles[1], math)
+    others = singular_factor(partner_sequence(sequence), other[1], math)
+    assert factor**2 + others**2 >= 1 - 8 * 2.0**-52
+    assert math.sqrt(1 - NEAR**2) > NEAR  # so that no change is followed by one back
+
+
+# --- runs -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str, runs: Path) -> None:
+    text = tumbling(sequence)
+    exact = run_text(text, runs, 'name="x"', RECORD, 'integrator.precision="extended"')
+    run = run_text(text, runs, 'name="e"', EULER, RECORD)
+    reference = wide(exact.dataset, "quaternion")
+    found = run.dataset["quaternion"].values
+    # twice the steps of a quaternion: three times the law at most, with the growth that this motion about
+    # its middle axis has (as the quaternion's bound would have it)
+    steps = run.summary["cost"]["steps"]
+    growth = max(1.0, run.summary["accuracy"]["amplification"])
+    assert angle_between(found, reference).max() <= 3 * law(2.0**-52, steps, 1.16, 100) * growth
+    # with its sign: never turned over
+    assert np.abs(found - reference).max() < 1e-6
+    changes = run.summary["chart_changes"]
+    assert changes["count"] > 0
+    assert changes["partner"] == partner_sequence(sequence)
+    assert run.summary["warnings"] == []
+    # the recorded angles are the same attitude, and the continuous ones
+    angles = run.dataset["euler_angles"].values
+    assert angle_between(attitude_from(sequence, angles), found).max() < 16 * 2.0**-52 * np.abs(angles).max()
+    limits = (0, math.pi) if is_proper(sequence) else (-math.pi / 2, math.pi / 2)
+    assert limits[0] <= angles[:, 1].min()
+    assert angles[:, 1].max() <= limits[1]
+    joined = exact.dataset["euler_angles"].values
+    turns = (angles - joined - (angles - joined)[0]) / (2 * math.pi)
+    # joined from quaternions at samples, a swing by more than half a turn between two is taken for less
+    lost = np.abs(np.diff(angles, axis=0)) > 3.0
+    assert (np.abs(np.diff(np.rint(turns), axis=0))[~lost] == 0).all()
+
+
+@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+def test_a_run_may_start_in_the_singularity(sequence: str, runs: Path) -> None:
+    start = f'euler_angles = [0.4, "{pole(sequence)}", 0.3]'
+    run = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), runs, EULER, RECORD)
+    assert run.status == "finished"
+    assert run.summary["warnings"] == []
+    exact = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), runs, 'name="q"', RECORD)
+    angles, found = run.dataset["euler_angles"].values, run.dataset["quaternion"].values
+    assert np.isfinite(angles).all()
+    given_angles = [0.4, float(pole(sequence)), 0.3]
+    np.testing.assert_allclose(angles[0], given_angles, rtol=0, atol=4 * 2.0**-52)  # the sum is the state's
+    steps = run.summary["cost"]["steps"]
+    growth = run.summary["accuracy"]["amplification"]
+    reference = exact.dataset["quaternion"].values
+    assert angle_between(found, reference).max() <= 6 * law(2.0**-52, steps, 1.16, 20) * growth
+    assert angle_between(attitude_from(sequence, angles), found).max() < 16 * 2.0**-52 * np.abs(angles).max()
+    assert (np.einsum("ij,ij->i", found[1:], found[:-1]) > 0.99).all()
+
+
+@pytest.mark.parametrize("offset", ["0", "1e-16", "1e-12", "1e-9"])
+@pytest.mark.parametrize("sequence", ["zxz", "zyx"])
+def test_a_pass_that_no_sampling_shows_goes_straight_through(sequence: str, offset: str, runs: Path) -> None:
+    """A body that spins about the line of nodes: the middle angle grows like t through 16 singularities."""
+    rates = [float(axis == sequence[1]) for axis in AXES]
+    text = f"""
+name = "straight"
+[body]
+principal_moments = [1, 1, 1]
+[initial]
+angular_velocity = {rates}
+euler_angles = [0.4, 0.75, "{offset}"]
+[time]
+end = 50
+samples = 5001
+[integrator]
+euler_sequence = "{sequence}"
+"""
+    run = run_text(text, runs, EULER, RECORD)
+    angles = run.dataset["euler_angles"].values
+    times = run.dataset["time"].values
+    # off the node line by the offset, and by rounding, which adds up as in any attitude, the outer angles
+    # move by that over the factor, whose smallest value at a sample is known beforehand
+    factor = np.abs(np.sin(0.75 + times) if is_proper(sequence) else np.cos(0.75 + times)).min()
+    rounding = 8 * 2.0**-52 * 50 * math.sqrt(run.summary["cost"]["steps"])
+    bound = (float(offset) + rounding) / factor
+    np.testing.assert_allclose(angles[:, 1], 0.75 + times, rtol=0, atol=bound)
+    assert np.abs(angles[:, 0] - 0.4).max() < bound
+    assert np.abs(angles[:, 2]).max() < bound
+    quaternion = run.dataset["quaternion"].values
+    assert np.abs(quaternion - attitude_from(sequence, angles)).max() < 1e-12  # in its sign, too
+
+
+def test_a_pass_at_a_distance_swings_the_outer_angles(runs: Path) -> None:
+    """1e-4 rad from the singularity they turn by half a turn within 1e-4 s: samples 1e-5 s apart show it."""
+    text = tumbling("zxz", 'euler_angles = [0.4, 0.05, "1e-4"]', "end = 0.1\nsamples = 10001")
+    text = text.replace("[0.3, 1.0, 0.5]", "[-1, 0, 0]").replace("[1, 2, 3]", "[1, 1, 1]")
+    angles = run_text(text, runs, EULER, RECORD).dataset["euler_angles"].values
+    # the node turns by at most 1e-5 s / (0.05 rad * 1e-4) = 2 rad from one sample to the next
+    assert np.abs(np.diff(angles[:, 0])).max() < 2.1
+    nearest = angles[:, 1].min()
+    assert 4.9e-6 < nearest < 1e-5  # 0.05 sin(1e-4)
+    assert angles[-1, 1] == pytest.approx(0.05, abs=1e-6)
+    assert abs(abs(angles[-1, 0] - angles[0, 0]) - math.pi) < 1e-3
+
+
+DRIVES = {
+    "one step at a time": Pacing(chunk_seconds=0.0, grid_rows=0, least_block_steps=10**9),
+    "grids of one step": Pacing(chunk_seconds=0.0),
+    "few rows": Pacing(rows_at_once=7, block_steps=13, least_block_steps=1, grid_rows=0),
+    "skips wherever it can": Pacing(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0),
+    "skips too far": Pacing(skip_from=2.0, skip_margin=1.7, grid_rows=0),
+}
+
+
+@pytest.mark.parametrize(
+    "time", ["end = 60\nsamples = 301", "end = 200\nsamples = 4"], ids=["dense", "sparse"]
+)
+@pytest.mark.parametrize("sequence", ["zxz"])
+def test_the_bits_do_not_depend_on_how_it_is_driven(sequence: str, time: str, runs: Path) -> None:
+    text = tumbling(sequence, time=time)
+    plain = run_text(text, runs, 'name="plain"', EULER)
+    assert plain.summary["chart_changes"]["count"] > 10
+    for pacing in DRIVES.values():
+        driven = run_text(text, runs, EULER, tuning=Tuning(pacing))
+        same_bits(plain, driven)
+        assert driven.summary["chart_changes"] == plain.summary["chart_changes"]
+
+
+@pytest.mark.parametrize("precision", ["double", "quadruple"])
+def test_a_resumed_run_has_the_same_bits(precision: str, runs: Path) -> None:
+    """Stopped after each few steps, in either chart."""
+    end = "end = 30\nsamples = 151" if precision == "double" else "end = 12\nsamples = 61"
+    steps = 13 if precision == "double" else 4
+    text = tumbling("zxz", time=end)
+    settings = [EULER, f'integrator.precision="{precision}"']
+    whole = run_text(text, runs, 'name="whole"', *settings)
+    every_step = Tuning(Pacing(chunk_seconds=0.0))  # a look at the guards after each
+    run = run_text(text, runs, 'name="parts"', *settings, "limits.max_steps=7", tuning=every_step)
+    sessions = 1
+    while run.status != "finished":
+        taken = run.summary["cost"]["steps"]
+        guard = f"limits.max_steps={5 + steps * (sessions % 5)}"
+        run = resume(run.folder.path, overrides=[guard], tuning=every_step)
+        assert run.summary["cost"]["steps"] > taken
+        sessions += 1
+    assert sessions > 3
+    same_bits(whole, run)
+    assert run.summary["chart_changes"] == whole.summary["chart_changes"]
+    assert whole.summary["chart_changes"]["count"] > 2
+
+
+SCENES = {
+    "free": ("principal_moments = [1, 2, 3]", "angular_velocity = [0.3, 1.0, 0.5]", ""),
+    "heavy top": (
+        "principal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 0.5]",
+        "angular_velocity = [0.9, 0.2, 1.1]",
+        '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1]',
+    ),
+    "gravity gradient": (
+        "principal_moments = [0.8, 0.9, 1]",
+        "angular_velocity = [0.05, 0.03, 1.02]",
+        '[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}',
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("scene", "sequence", "precision", "better", "end"),
+    [
+        ("free", "zxz", "double", "extended", 1000),
+        ("heavy top", "xyz", "double", "extended", 1000),
+        ("gravity gradient", "xyz", "double", "extended", 1000),
+        ("heavy top", "zxz", "extended", "quadruple", 100),
+        ("gravity gradient", "zxz", "extended", "quadruple", 100),
+        ("free", "xyz", "quadruple", "40", 20),
+    ],
+)
+def test_it_is_as_accurate_as_the_quaternion(
+    scene: str, sequence: str, precision: str, better: str, end: int, runs: Path
+) -> None:
+    body, initial, loads = SCENES[scene]
+    text = f"""
+name = "scene"
+[body]
+{body}
+[initial]
+{initial}
+quaternion = [0.7, 0.4, 0.5, 0.3]
+{loads}
+[time]
+end = {end}
+samples = 41
+[integrator]
+euler_sequence = "{sequence}"
+"""
+    better = better if better.isdigit() else f'"{better}"'
+    only = 'output.record=["quaternion"]'
+    reference = run_text(text, runs, 'name="x"', only, f"integrator.precision={better}").dataset
+    errors = {}
+    for formulation in ("quaternion", "euler_angles"):
+        settings = [only, f'integrator.formulation="{formulation}"', f'integrator.precision="{precision}"']
+        run = run_text(text, runs, *settings)
+        assert run.status == "finished"
+        if formulation == "euler_angles":
+            assert run.summary["chart_changes"]["count"] > 0
+        errors[formulation] = error(run.dataset, reference)
+        floor = 8 * float(precision_of(precision).epsilon)  # of what a quaternion's components can show
+    assert errors["euler_angles"] <= 10 * max(errors["quaternion"], floor)
+
+
+def error(dataset: xarray.Dataset, reference: xarray.Dataset) -> float:
+    """Largest angle between attitudes, by exact differences of all parts."""
+    names = ["quaternion", "quaternion_lo", "quaternion_lo2"]
+    parts = [[d[n].values for n in names if n in d] for d in (dataset, reference)]
+    difference = parts[0][0] - parts[1][0]
+    for low in range(1, 3):
+        for sign, found in zip((1, -1), parts, strict=True):
+            if low < len(found):
+                difference = difference + sign * found[low]
+    return float(2 * np.sqrt((difference**2).sum(axis=1)).max())
+
+
+@pytest.mark.parametrize("precision", ["single", "extended", "quadruple"])
+def test_other_precisions_pass_the_singularity(precision: str, runs: Path) -> None:
+    text = tumbling("zxz", time="end = 10\nsamples = 101")
+    run = run_text(text, runs, EULER, RECORD, f'integrator.precision="{precision}"')
+    assert run.summary["chart_changes"]["count"] > 0
+    angles, quaternion = wide(run.dataset, "euler_angles"), wide(run.dataset, "quaternion")
+    found = attitude_from("zxz", angles.astype(float))
+    limit = max(EPSILON[precision], 2.0**-52)
+    assert angle_between(found, quaternion.astype(float)).max() < 64 * limit
+
+
+def test_events_are_found_in_both_charts(runs: Path) -> None:
+    """An event on the asked sequence's own angle, and one that tells nothing of charts."""
+    text = tumbling("zxz", time="end = 100\nsamples = 11") + (
+        '[[events]]\nname = "flip"\nexpression = "wy"\n'
+        '[[events]]\nname = "level"\nexpression = "theta - 0.3"\n'
+    )
+    run = run_text(text, runs, EULER, RECORD)
+    plain = run_text(text, runs, 'name="q"', RECORD)
+    assert run.summary["events"] == plain.summary["events"]
+    assert run.summary["events"]["level"] > 3
+    # at rest neither; both within the drift of the attitude over the rate of crossing
+    for event in ("flip", "level"):
+        difference = run.dataset[f"{event}_time"].values - plain.dataset[f"{event}_time"].values
+        assert np.abs(difference).max() < 1e-10
+    np.testing.assert_allclose(run.dataset["level_euler_angles"].values[:, 1], 0.3, rtol=0, atol=1e-12)
+
+
+def test_plan_and_dataset_name_the_partner(runs: Path) -> None:
+    experiment = rigidsim.parse(tumbling("zxz"), overrides=[EULER])
+    planned = plan(experiment)
+    assert planned["euler_partner_sequence"] == "zxy"
+    assert any("zxy" in reason["why"] for reason in planned["reasons"])
+    run = run_text(tumbling("zxz"), runs, EULER)
+    assert run.dataset.attrs["euler_partner_sequence"] == "zxy"
+    plain = run_text(tumbling("zxz"), runs)
+    assert plain.dataset.attrs["euler_partner_sequence"] == ""
+    assert plain.summary["chart_changes"] is None

@@ -1,0 +1,89 @@
+"""Stable and unstable motions are told apart before a summary promises digits."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from support import run_text
+
+pytestmark = pytest.mark.compact
+
+SPIN = """
+name = "spin"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = {rates}
+[time]
+end = {end}
+samples = 101
+"""
+
+
+@pytest.mark.parametrize("rates", ["[1, 1e-3, 1e-3]", "[1e-3, 1e-3, 1]", "[0.5, 0.25, 1]"])
+def test_spin_about_an_outer_axis_is_stable(rates: str, runs: Path) -> None:
+    run = run_text(SPIN.format(rates=rates, end=500), runs)
+    assert run.summary["accuracy"]["amplification"] == 1
+
+
+@pytest.mark.parametrize("offset", ["1e-2", "1e-4", "1e-6"])
+def test_spin_about_the_middle_axis_amplifies_by_the_inverse_square_of_its_offset(
+    offset: str, runs: Path
+) -> None:
+    """A passage takes (2 / rate) log(1/offset), so errors grow by up to 1/offset^2 in it."""
+    run = run_text(SPIN.format(rates=f"[{offset}, 1, {offset}]", end=200), runs)
+    accuracy = run.summary["accuracy"]
+    largest = 1 / float(offset) ** 2
+    # an offset of 2^-30 saturates at O(1); a randomly chosen one has some part along the growing solution
+    assert 1e-4 * min(largest, 2**30) < accuracy["amplification"] < 10 * largest
+    assert 0 < accuracy["amplification_seconds"] <= 200
+
+
+def test_lost_digits_are_said(runs: Path) -> None:
+    lost = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), runs, 'integrator.precision="single"')
+    assert any("digits are gone" in warning for warning in lost.summary["warnings"])
+    kept = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), runs, 'integrator.precision="quadruple"')
+    assert not kept.summary["warnings"]
+
+
+SATELLITE = """
+name = "satellite"
+[body]
+principal_moments = [0.59555, 0.85945, 1]
+[initial]
+angular_velocity = {rates}
+euler_angles = [0, 0.3, 0]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 1
+orbit = {{semi_major_axis = 1, eccentricity = {eccentricity}}}
+[time]
+end = 600
+samples = 601
+"""
+
+
+def test_hyperion_tumbles_beyond_prediction(runs: Path) -> None:
+    """Wisdom, Peale & Mignard 1984: errors grow e-fold in about 8 / n; double has 15 digits to lose."""
+    chaotic = run_text(SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1), runs)
+    accuracy = chaotic.summary["accuracy"]
+    # the pilot sees some 40 orbits, over which the rate itself is uncertain by a factor of two
+    assert 0.06 < accuracy["error_growth_rate"] < 0.24
+    digits = 34.5  # natural logarithm of 1e15
+    assert digits / 0.24 / 2 < accuracy["predictable_seconds"] < digits / 0.06
+    assert any("digits are gone from about" in warning for warning in chaotic.summary["warnings"])
+    extended = run_text(
+        SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1), runs, 'integrator.precision="extended"'
+    )
+    longer = extended.summary["accuracy"]["predictable_seconds"] - accuracy["predictable_seconds"]
+    # eleven bits more are lost at the same rate, but for the law's t^1.5 and sqrt(steps)
+    assert longer == pytest.approx(math.log(2.0**11) / accuracy["error_growth_rate"], rel=0.3)
+
+
+def test_fast_spin_on_a_circular_orbit_is_predictable(runs: Path) -> None:
+    regular = run_text(SATELLITE.format(rates="[0, 0, 20]", eccentricity=0), runs)
+    assert regular.summary["accuracy"]["error_growth_rate"] == 0
+    assert regular.summary["accuracy"]["predictable_seconds"] is None
+    assert not regular.summary["warnings"]

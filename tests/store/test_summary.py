@@ -1,0 +1,120 @@
+"""``summary.json``: what is written is what is read; what isn't a summary is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+import rigidsim
+from rigidsim.errors import RunFolderError
+from rigidsim.store.attributes import Use, read_attributes
+from rigidsim.store.summary import Brief, Caution, Summary, WarningCode, read_summary
+
+# hundreds of turns between samples, of angles that a run in quaternions doesn't carry: a warning is certain
+BLURRED = (
+    "[body]\nprincipal_moments = [1, 2, 2.5]\n[initial]\nangular_velocity = [0.3, 1.0, 0.5]\n"
+    '[time]\nend = 3000\nsamples = 3\n[output]\ntimeline = false\nrecord = ["euler_angles"]\n'
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
+    text = 'name = "blurred"\n' + BLURRED
+    return rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("runs"))
+
+
+def test_what_a_run_returns_is_what_it_wrote(run: rigidsim.Run) -> None:
+    written = json.loads(run.folder.summary.read_text())
+    assert run.summary == written
+    assert list(run.summary) == list(written)
+    opened = rigidsim.open_run(run.folder.path)
+    assert opened.summary == written
+    assert opened.outcome == run.outcome
+
+
+def test_a_warning_has_a_code_beside_its_text(run: rigidsim.Run) -> None:
+    assert run.summary["warning_codes"] == ["not_joined"]
+    assert len(run.summary["warnings"]) == 1
+    assert "can't be joined with certainty" in run.summary["warnings"][0]
+    assert isinstance(run.outcome, Summary)
+    assert run.outcome.cautions == [Caution(WarningCode.NOT_JOINED, run.summary["warnings"][0])]
+
+
+def test_what_becomes_known_goes_into_a_copy(run: rigidsim.Run) -> None:
+    assert isinstance(run.outcome, Summary)
+    later = run.outcome.having(timeline_sha256="0" * 64)
+    assert later.as_dict() == {**run.summary, "timeline_sha256": "0" * 64}
+    assert "timeline_sha256" not in run.outcome.as_dict()
+    with pytest.raises(ValidationError, match="frozen"):
+        run.outcome.status = "finished"  # type: ignore[misc]
+    with pytest.raises(ValidationError, match="timeline_sha256"):
+        run.outcome.having(timeline_sha256="none")
+
+
+def test_an_older_summary_is_read_and_written_again_as_it_is(run: rigidsim.Run, tmp_path: Path) -> None:
+    older = {**run.summary, "of_another_version": [1, {"x": 2.5}]}
+    for key in ("warning_codes", "method", "hold_invariants", "lyapunov", "events", "chart_changes"):
+        older.pop(key)
+    path = tmp_path / "summary.json"
+    path.write_text(json.dumps(older))
+    assert read_summary(path).as_dict() == older
+
+
+DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "a text for a number": (lambda s: s["cost"].update(steps="7"), "'cost.steps': Input should be"),
+    "no number": (lambda s: s["invariants"]["energy"].update(scale=math.nan), "invariants.energy.scale"),
+    "nothing": (lambda s: s.pop("invariants"), "'invariants': Field required"),
+    "no seconds": (lambda s: s["cost"]["seconds"].pop("engine"), "'cost.seconds': "),
+    "a digest": (lambda s: s.update(dataset_sha256="x"), "'dataset_sha256': "),
+    "a status": (lambda s: s.update(status="\x1b[31m"), "'status': "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", DAMAGES)
+def test_a_damaged_one_is_refused_by_its_place(what: str, run: rigidsim.Run, tmp_path: Path) -> None:
+    content = json.loads(json.dumps(run.summary))
+    DAMAGES[what][0](content)
+    path = tmp_path / "summary.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(RunFolderError, match="is damaged or no summary of rigidsim") as refusal:
+        read_summary(path)
+    assert DAMAGES[what][1] in str(refusal.value)
+
+
+def test_a_run_under_way_says_no_more_than_that(tmp_path: Path) -> None:
+    path = tmp_path / "summary.json"
+    path.write_text('{"status": "running"}')
+    found = read_summary(path)
+    assert type(found) is Brief
+    assert found.dataset_digest is None
+    assert found.as_dict() == {"status": "running"}
+
+
+def test_the_summary_repeats_attributes_of_the_dataset(run: rigidsim.Run) -> None:
+    attributes = read_attributes(run.folder.dataset)
+    assert run.summary["provenance"] == attributes.of_use(Use.REPEATED)
+    assert attributes.warnings == "\n".join(run.summary["warnings"])
+    assert attributes.steps == run.summary["cost"]["steps"]
+    other = attributes.having(tolerance=1e-9, version_numpy="1.0", title="another", method=None)
+    system = [("tolerance", attributes.tolerance, 1e-9), ("method", "taylor", None)]
+    assert list(attributes.changed(Use.SYSTEM, other)) == system
+    assert list(other.changed(Use.SYSTEM, attributes)) == [("tolerance", 1e-9, attributes.tolerance)]
+    assert list(attributes.changed(Use.PLATFORM, other)) == [
+        ("version_numpy", attributes.version_numpy, "1.0")
+    ]
+
+
+def test_a_file_that_is_no_dataset_is_named(tmp_path: Path) -> None:
+    import h5py
+
+    path = tmp_path / "dataset.h5"
+    with h5py.File(path, "w") as file:
+        file["time"] = [0.0]
+    with pytest.raises(RunFolderError, match=r"no dataset of rigidsim \(attribute 'Conventions'"):
+        read_attributes(path)

@@ -1,0 +1,218 @@
+"""A load or an observable is one thing in one place: registered, it is there by its name everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+import mpmath
+import numpy as np
+import pytest
+from equations import CLOSE, derivative
+from support import config, run_text, tried, wide
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables import Observable, only_when_named
+from rigidsim.scene import registry
+from rigidsim.scene.fields import Moment, Rate
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load, register_observable
+from rigidsim.solve.problem import prepare
+
+
+@pytest.fixture(autouse=True)
+def registries() -> Iterator[None]:
+    """What a test registers is gone after it."""
+    loads, observables = dict(registry.LOAD_KINDS), dict(registry.OBSERVABLES)
+    yield
+    for known, before in ((registry.LOAD_KINDS, loads), (registry.OBSERVABLES, observables)):
+        known.clear()
+        known.update(before)
+
+
+# --- a load -------------------------------------------------------------------------------------------------
+
+
+class SpringFields(LoadFields):
+    """A torque that turns the body's z axis towards the space axis X: -stiffness times the cosine."""
+
+    kind: Literal["torsion_wire"]
+    inertia: Moment
+    frequency: Rate
+
+
+class TorsionWire(Load):
+    """Potential -k R_Xz with k = inertia frequency^2."""
+
+    Fields = SpringFields
+    title = "torsion_wire"
+    reads = frozenset({"attitude"})
+    conservative = True
+
+    def __init__(self, stiffness: Any) -> None:
+        self.stiffness = stiffness
+
+    @classmethod
+    def resolve(cls, fields: SpringFields, around: Surroundings) -> TorsionWire:
+        if fields.inertia.sign <= 0:
+            raise around.fault("inertia", f"given {float(fields.inertia):g}; a positive number is allowed")
+        return cls(fields.inertia.at(around.context) * fields.frequency.at(around.context) ** 2)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        k, zero = m.scene.context.ldexp(self.stiffness, -m.scaling.energy), m.scene.context.zero
+        return [([-k, zero, zero], m.matrix[0][1]), ([zero, k, zero], m.matrix[0][0])]
+
+    def potential(self, m: Kinematics) -> Any:
+        return -m.number(m.scene.context.ldexp(self.stiffness, -m.scaling.energy)) * m.matrix[0][2]
+
+    def amplitude(self, scene: Any) -> Any:
+        return 2 * self.stiffness
+
+
+WIRE = 'kind = "torsion_wire"\ninertia = "2 kg m^2"\nfrequency = "30 rpm"'
+STIFFNESS = 2 * np.pi**2
+
+
+def test_a_load_with_fields_is_usable_in_a_config(runs: Path) -> None:
+    with pytest.raises(ConfigError, match="torsion_wire"):
+        rigidsim.parse(config(loads=WIRE))
+    register_load(TorsionWire)
+    text = config(loads=WIRE, output='record = ["quaternion", "energy", "potential_energy"]')
+    system = prepare(rigidsim.parse(text)).system
+    w, q = np.array([0.3, 1.0, 0.5]), np.array([1.0, 0, 0, 0])
+    rates = derivative(system, np.concatenate([w, q]))[:3]
+    moments = np.array([1, 2, 2.5])
+    torque = np.array([0, STIFFNESS, 0])  # z x X = Y
+    expected = (np.cross(moments * w, w) + torque) / moments
+    np.testing.assert_allclose(rates, expected, rtol=0, atol=CLOSE * STIFFNESS)
+
+    run = run_text(text, runs)
+    row = run.summary["invariants"]["energy"]
+    assert 0 < row["largest_drift"] <= row["bound"]
+    assert "angular_momentum" not in run.summary["invariants"]
+    qw, qx, qy, qz = run.dataset["quaternion"].values.T
+    along = 2 * (qx * qz + qw * qy)
+    potential = run.dataset["potential_energy"].values
+    np.testing.assert_allclose(potential, -STIFFNESS * along, rtol=0, atol=CLOSE * STIFFNESS)
+    # unlike a load given at the call, it is in the config: the run can be reproduced from that alone
+    assert run.summary["bit_for_bit"]["claim"] is True
+    assert rigidsim.verify(run.folder.path).identical
+
+
+def test_its_keys_are_checked_like_any_others() -> None:
+    register_load(TorsionWire)
+    with pytest.raises(ConfigError, match=r"number 1 inertia.*given -1; a positive number is allowed"):
+        prepare(rigidsim.parse(config(loads=WIRE.replace('"2 kg m^2"', "-1"))))
+    with pytest.raises(ConfigError, match=r'frequncy.*"?frequency"?'):
+        rigidsim.parse(config(loads=WIRE.replace("frequency", "frequncy")))
+    with pytest.raises(ConfigError, match="torsion_wire"):  # the nearest of all kinds, this one among them
+        rigidsim.parse(config(loads=WIRE.replace("torsion_wire", "torsion_wires")))
+
+
+def test_a_name_is_given_once_and_a_config_needs_keys() -> None:
+    register_load(TorsionWire)
+
+    class Other(TorsionWire):
+        """Another class of the same kind."""
+
+    with pytest.raises(ValueError, match='a load of kind "torsion_wire" is registered already'):
+        register_load(Other)
+
+    class Bare(Load):
+        """Only for Python."""
+
+    with pytest.raises(ValueError, match="Bare has no Fields"):
+        register_load(Bare)
+
+
+# --- an observable ------------------------------------------------------------------------------------------
+
+
+def spin_parameter(m: Mechanics) -> list[Any]:
+    """w_x^2 + w_y^2 over the square of the unit of rates: a quantity that nobody else records."""
+    return [m.rates[0] ** 2.0 + m.rates[1] ** 2.0]
+
+
+TRANSVERSE = Observable(
+    "transverse_rate_squared", (), "rad2 s-2", "square of the rate across the body's z axis",
+    spin_parameter, lambda m: [-2 * m.scaling.time], "body axes", by_default=only_when_named,
+)  # fmt: skip
+
+
+def test_an_observable_is_recorded_by_its_name(runs: Path) -> None:
+    with pytest.raises(ConfigError, match="transverse_rate_squared"):
+        prepare(rigidsim.parse(config(output='record = ["transverse_rate_squared"]')))
+    register_observable(TRANSVERSE)
+    assert "transverse_rate_squared" not in run_text(config(), runs).dataset  # only where it is named
+    named = config(output='record = ["angular_velocity", "transverse_rate_squared"]')
+    dataset = run_text(named, runs).dataset
+    found = dataset["transverse_rate_squared"]
+    assert found.attrs["units"] == "rad2 s-2"
+    assert found.attrs["long_name"] == "square of the rate across the body's z axis"
+    assert found.dims == ("time",)
+    rates = dataset["angular_velocity"].values
+    # two products, a sum and the rounding of the recorded rates
+    np.testing.assert_allclose(found.values, rates[:, 0] ** 2 + rates[:, 1] ** 2, rtol=8 * 2.0**-53)
+
+
+def test_its_residuals_are_recorded_in_extended_precision(runs: Path) -> None:
+    register_observable(TRANSVERSE)
+    text = config(
+        integrator='precision = "extended"',
+        output='record = ["angular_velocity", "transverse_rate_squared"]',
+    )
+    dataset = run_text(text, runs).dataset
+    assert np.any(dataset["transverse_rate_squared_lo"].values != 0)
+    rates = wide(dataset, "angular_velocity")
+    exact = rates[:, 0] ** 2 + rates[:, 1] ** 2
+    error = np.abs(wide(dataset, "transverse_rate_squared") - exact)
+    assert (error <= 8 * 2.0**-64 * exact).all()
+    # the high part is the nearest double
+    assert (dataset["transverse_rate_squared"].values == exact.astype(float)).mean() > 0.99
+
+
+def test_unknown_names_still_name_the_nearest() -> None:
+    register_observable(TRANSVERSE)
+    for wrong, nearest in (
+        ("transverse_rate_square", "transverse_rate_squared"),
+        ("angular_velocty", "angular_velocity"),
+    ):
+        with pytest.raises(ConfigError, match=f'"{nearest}"'):
+            prepare(rigidsim.parse(config(output=f'record = ["{wrong}"]')))
+    with pytest.raises(ValueError, match='an observable named "energy" is registered already'):
+        register_observable(Observable("energy", (), "J", "mine", spin_parameter))
+
+
+# --- loads that share an orbit ------------------------------------------------------------------------------
+
+ORBIT = "orbit = {semi_major_axis = 1, eccentricity = 0.2, inclination = 0.3, period = 5}"
+
+
+def gradient(strength: str, orbit: str = ORBIT) -> str:
+    return f'kind = "gravity_gradient"\ngravitational_parameter = "{strength}"\n{orbit}'
+
+
+def test_two_loads_on_one_orbit_share_its_states() -> None:
+    """With the period given the orbit doesn't depend on the strength, and torques are linear in it."""
+    twice = config(loads=[gradient("3/4"), gradient("5/4")], time="end = 10\nsamples = 21")
+    once = config(loads=gradient("2"), time="end = 10\nsamples = 21")
+    states = prepare(rigidsim.parse(twice)).system.states
+    assert [name for name in states if "anomaly" in name] == ["cos_anomaly1", "sin_anomaly1"]
+    assert states == prepare(rigidsim.parse(once)).system.states
+    two, one = tried(twice), tried(once)
+    # the sum of two torques rounds once more than their joint coefficient does, at each of the steps; what is
+    # off by then turns the body by the time that is left
+    bound = 4 * 2.0**-52 * np.sqrt(one.steps) * 10 * float(mpmath.norm([0.3, 1.0, 0.5]))
+    chord = np.abs(two.attitudes[0] - one.attitudes[0]).max()
+    assert chord <= bound
+
+
+def test_loads_on_different_orbits_do_not() -> None:
+    other = ORBIT.replace("inclination = 0.3", "inclination = 0.4")
+    text = config(loads=[gradient("3/4"), gradient("5/4", other)])
+    states = prepare(rigidsim.parse(text)).system.states
+    assert [name for name in states if name.startswith("cos_anomaly")] == ["cos_anomaly1", "cos_anomaly2"]

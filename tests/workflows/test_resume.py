@@ -1,0 +1,452 @@
+"""A run that was cut, however often and by whatever, gives the bits of one in one go."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import EAGER, IMPATIENT, config, loaded, same_bits
+
+import rigidsim
+from rigidsim.errors import ConfigError, RunFolderError
+from rigidsim.solve import loop
+from rigidsim.store import atomic
+from rigidsim.store.segments import read_chain
+
+# arguments of ``config``, which by default is an asymmetric free body
+FREE: dict[str, str] = {}
+TOP = {
+    "body": 'principal_moments = [1, 1, "0.3 kg m^2"]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]',
+    "initial": "angular_velocity = [0.1, 0.2, 9]\neuler_angles = [0.2, 0.6, 0.7]",
+    "loads": 'kind = "uniform_gravity"',
+}
+DRIVEN = {"loads": 'kind = "torque"\ncomponents = ["0.1*sin(t)", "0", "0.05*wx"]'}
+LIBRATION = {
+    "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+    "orbit = {semi_major_axis = 2, eccentricity = 0.1, inclination = 0.3, period = 17}"
+}
+FLIGHT = {
+    "body": 'shape = "cuboid"\nsize = [1, 2, 3]\nmass = 2',
+    "initial": "angular_velocity = [0.3, 1.0, 0.5]\nposition = [4, 0, 1]\nvelocity = [0, 0.5, 0.1]",
+    "loads": 'kind = "central_gravity"\ngravitational_parameter = 1',
+}
+# no double residual holds their last bits
+TINY = {"initial": 'angular_velocity = ["1e-250", 1.0, "1e-290"]\neuler_angles = [0.2, 1.1, 0.7]'}
+EVENTS = '[[events]]\nname = "flip"\nexpression = "wz"\n'
+
+# tables, [integrator], [time], rest
+CASES = {
+    "single": (FREE, 'precision = "single"', "end = 60\nsamples = 121", ""),
+    "double, dense": (FREE, "", "end = 60\nsamples = 1201", ""),
+    "double, sparse": (FREE, "", "end = 2000\nsamples = 4", ""),
+    "double, rates": (FREE, 'formulation = "rates"', "end = 60\nsamples = 121",
+                      'record = ["angular_velocity"]\n'),
+    "double, quaternion and derived angles": (FREE, "", "end = 60\nsamples = 121",
+                      'record = ["quaternion", "euler_angles", "energy"]\n'),
+    "double, Euler angles": (FREE, 'formulation = "euler_angles"', "end = 60\nsamples = 121", ""),
+    "double, rotation matrix": (FREE, 'formulation = "rotation_matrix"', "end = 60\nsamples = 121", ""),
+    "double, canonical": (TOP, 'formulation = "canonical"', "end = 40\nsamples = 401", ""),
+    "double, uneven times": (FREE, "", "times = [0, 0.01, 7, 7.001, 90, 90.5, 200, 201]", ""),
+    "double, held invariants": (FREE, "hold_invariants = true", "end = 600\nsamples = 41", ""),
+    "double, held invariants, angles": (FREE, 'hold_invariants = true\nformulation = "euler_angles"',
+                                        "end = 300\nsamples = 601", ""),
+    "extended, held invariants, events": (FREE, 'hold_invariants = true\nprecision = "extended"',
+                                          "end = 600\nsamples = 601", EVENTS),
+    "double, driven": (DRIVEN, "", "end = 60\nsamples = 121", ""),
+    "double, gravity gradient": (LIBRATION, "", "end = 60\nsamples = 121", ""),
+    "double, six degrees of freedom": (FLIGHT, "", "end = 60\nsamples = 121", ""),
+    "double, events": (FREE, "", "end = 100\nsamples = 101", EVENTS),
+    "double, events, angles": (FREE, 'formulation = "euler_angles"', "end = 60\nsamples = 13", EVENTS),
+    "double, ended by an event": (DRIVEN, "", "end = 500\nsamples = 501",
+                                  '[[events]]\nname = "late"\nexpression = "t - 123.45"\naction = "stop"\n'),
+    "extended": (FREE, 'precision = "extended"', "end = 60\nsamples = 121", ""),
+    "extended, Euler angles, events": (FREE, 'precision = "extended"\nformulation = "euler_angles"',
+                                       "end = 60\nsamples = 61", EVENTS),
+    "quadruple": (FREE, 'precision = "quadruple"', "end = 20\nsamples = 81", ""),
+    "quadruple, tiny components": (TINY, 'precision = "quadruple"', "end = 10\nsamples = 21", ""),
+    "quadruple, driven, events": (DRIVEN, 'precision = "quadruple"', "end = 15\nsamples = 31", EVENTS),
+    "30 digits": (FREE, "precision = 30", "end = 10\nsamples = 41", ""),
+    "30 digits, tiny components": (TINY, "precision = 30", "end = 5\nsamples = 11", ""),
+    "50 digits, angles": (FREE, 'precision = 50\nformulation = "euler_angles"', "end = 4\nsamples = 9", ""),
+}  # fmt: skip
+
+
+def text_of(case: str, time: str = "", limits: str = "") -> str:
+    tables, integrator, usual, rest = CASES[case]
+    more = f"{rest}[limits]\n{limits}"
+    return config(**tables, time=time or usual, integrator=integrator, more=more, name="cut")
+
+
+def text_with(time: str, limits: str = "", **tables: str) -> str:
+    return config(**tables, time=time, more=f"[limits]\n{limits}", name="cut")
+
+
+def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> tuple[rigidsim.Run, int]:
+    """Resume until the run is over; also how often that took."""
+    for count in range(most):
+        if run.status.startswith("finished"):
+            return run, count
+        run = rigidsim.resume(run.folder.path, overrides=overrides, tuning=IMPATIENT)
+    raise AssertionError(f"not finished after {most} sessions")
+
+
+# the others in compact code: whether a run is cut or not, it is the same code
+UNROLLED = ("single", "double, dense", "double, sparse", "double, Euler angles", "quadruple")
+
+
+@pytest.mark.parametrize(
+    "case", [c if c in UNROLLED else pytest.param(c, marks=pytest.mark.compact) for c in CASES]
+)
+def test_a_run_cut_many_times_is_the_run_in_one_go(case: str, tmp_path: Path) -> None:
+    text = text_of(case)
+    whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole", tuning=IMPATIENT)
+    every = max(1, whole.summary["cost"]["steps"] // 4)
+    guard = f"limits.max_steps={every}"
+    experiment = rigidsim.parse(text + f"max_steps = {every}\n")
+    cut = rigidsim.run(experiment, out=tmp_path / "cut", tuning=IMPATIENT)
+    assert cut.status == "stopped: max_steps"
+    done, sessions = resumed_to_the_end(cut, guard)
+    assert sessions >= 1
+    assert done.status == whole.status
+    same_bits(whole, done)
+    for key in ("samples", "invariants", "events", "bit_for_bit", "states"):
+        assert done.summary[key] == whole.summary[key], key
+    assert done.summary["cost"]["steps"] == whole.summary["cost"]["steps"]
+    assert done.summary["cost"]["sessions"] == sessions + 1
+    assert not done.folder.segments.exists()
+
+
+def test_the_comparison_sees_one_bit(tmp_path: Path) -> None:
+    run = rigidsim.run(rigidsim.parse(text_with("end = 3\nsamples = 7")), out=tmp_path)
+    one, other = loaded(run), loaded(run).copy(deep=True)
+    other["energy"].values.view(np.int64)[3] ^= 1
+    with pytest.raises(AssertionError, match=r"energy\[3\]: .* the first of 1 differences"):
+        same_bits(one, other)
+
+
+# --- what can end a session -------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, rigidsim.Run]:
+    """A config, and its run in one go."""
+    text = text_with("end = 5\nsamples = 11")
+    return text, rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("whole"))
+
+
+class Cut(BaseException):
+    """As sudden as a kill: nothing is saved after it."""
+
+
+@pytest.mark.parametrize("moment", ["before the name", "after the name", "folder not synced"])
+@pytest.mark.parametrize(
+    "target", ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"]
+)
+def test_a_crash_at_any_file(
+    moment: str,
+    target: str,
+    short: tuple[str, rigidsim.Run],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The files of a run come into being one by one; between any two a process can die."""
+    text, whole = short
+    replace, sync = os.replace, atomic.sync_folder
+    named = []
+
+    def crashing(source: Any, to: Any) -> None:
+        if Path(to).name == target and moment == "before the name":
+            raise Cut
+        replace(source, to)
+        named.append(Path(to).name)
+        if Path(to).name == target and moment == "after the name":
+            raise Cut
+
+    def not_synced(folder: Path) -> None:
+        if moment == "folder not synced" and named and named[-1] == target:
+            raise Cut
+        sync(folder)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", crashing)
+        patch.setattr(atomic, "sync_folder", not_synced)
+        with pytest.raises(Cut):
+            rigidsim.run(rigidsim.parse(text), out=tmp_path / "cut", tuning=EAGER)
+    partial = rigidsim.open_run(tmp_path / "cut" / "cut")
+    if partial.saved:
+        first = loaded(partial)
+        same_bits(first, loaded(whole).isel(time=slice(first.sizes["time"])))
+    done = rigidsim.resume(partial.folder.path, tuning=EAGER)
+    assert done.status == "finished"
+    same_bits(whole, done)
+    assert sorted(p.name for p in done.folder.path.iterdir()) == sorted(
+        p.name for p in whole.folder.path.iterdir()
+    )
+
+
+def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5 would crash the process if it saw the error."""
+    from rigidsim.store.hdf5_sink import Sink
+
+    text = text_with("end = 300\nsamples = 20001")
+    whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole")
+    size = whole.folder.dataset.stat().st_size
+    write = Sink.write
+    for room in (0, 3000, size // 2, size - 3000):
+
+        class Full:
+            def __init__(self, file: Any) -> None:
+                self._file = file
+
+            def __getattr__(self, name: str) -> Any:
+                return getattr(self._file, name)
+
+            def write(self, content: Any) -> int:
+                if self._file.tell() + len(content) > room:  # noqa: B023
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                return self._file.write(content)
+
+        def small(self: Sink, content: Any) -> int:
+            if not isinstance(self._file, Full):
+                self._file = Full(self._file)  # type: ignore[assignment]
+            return write(self, content)
+
+        out = tmp_path / str(room)
+        with monkeypatch.context() as patch:
+            patch.setattr(Sink, "write", small)
+            with pytest.raises(RunFolderError, match=r"No space left on device.*rigidsim resume continues"):
+                rigidsim.run(rigidsim.parse(text), out=out)
+        assert not (out / "cut" / "dataset.h5").exists()
+        same_bits(whole, rigidsim.resume(out / "cut"))
+
+
+@pytest.mark.parametrize("limits", ["max_steps = 100", 'wall_time = "1 ms"', "max_drift = 1e-17"])
+def test_a_guard_can_be_moved_when_resuming(limits: str, tmp_path: Path) -> None:
+    text = text_with("end = 60\nsamples = 121")
+    whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole", tuning=IMPATIENT)
+    stopped = rigidsim.run(
+        rigidsim.parse(text.replace("[limits]\n", f"[limits]\n{limits}\n")), out=tmp_path, tuning=IMPATIENT
+    )
+    key = limits.split(" =")[0]
+    assert stopped.status == f"stopped: {key}"
+    assert stopped.summary["exit_code"] == 3
+    far = {"max_steps": "1000000", "wall_time": "1 h", "max_drift": "1"}[key]
+    done = rigidsim.resume(stopped.folder.path, overrides=[f"limits.{key}={far}"], tuning=IMPATIENT)
+    assert done.status == "finished"
+    same_bits(whole, done)
+    assert limits in done.folder.config.read_text()  # the config is the one that was given
+
+
+def test_only_guards_can_be_set(tmp_path: Path) -> None:
+    stopped = rigidsim.run(
+        rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 10")), out=tmp_path, tuning=IMPATIENT
+    )
+    with pytest.raises(RunFolderError, match=r"time\.end=7: would change the experiment; only limits\.KEY"):
+        rigidsim.resume(stopped.folder.path, overrides=["time.end=7"], tuning=IMPATIENT)
+
+
+# --- a later end ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("times", ["end = 60\nsamples = 121", "end = 60\nevery = 0.5"])
+@pytest.mark.parametrize("case", ["double, events", "double, Euler angles", "quadruple"])
+@pytest.mark.parametrize("begun", ["finished", "partial"])
+def test_a_later_end(case: str, times: str, begun: str, tmp_path: Path) -> None:
+    """A finished run goes on, and an unfinished one, with the bits of a run that was as long at once."""
+    scale = 10 if "quadruple" in case else 1
+    times = times.replace("60", str(60 // scale))
+    end = 90 // scale
+    later = times.replace(f"end = {60 // scale}", f"end = {end}")
+    later = later.replace("samples = 121", "samples = 181")
+    whole = rigidsim.run(rigidsim.parse(text_of(case, later)), out=tmp_path / "whole", tuning=IMPATIENT)
+    guard = "max_steps = 5" if begun == "partial" else ""
+    run = rigidsim.run(rigidsim.parse(text_of(case, times, guard)), out=tmp_path / "cut", tuning=IMPATIENT)
+    assert run.status == ("finished" if begun == "finished" else "stopped: max_steps")
+    done = rigidsim.resume(
+        run.folder.path, until=str(end), overrides=["limits.max_steps=1000000"], tuning=IMPATIENT
+    )
+    assert done.status == "finished"
+    same_bits(whole, done)
+    # and the run folder is one of a longer run: verified, and prolonged again
+    assert rigidsim.verify(done.folder.path).identical
+
+
+@pytest.mark.slow
+def test_a_prolonged_run_that_is_killed_is_resumed_to_its_later_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = rigidsim.run(
+        rigidsim.parse(text_with("end = 90\nsamples = 181")), out=tmp_path / "whole", tuning=EAGER
+    )
+    run = rigidsim.run(
+        rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path / "cut", tuning=EAGER
+    )
+    replace = os.replace
+
+    def crashing(source: Any, to: Any) -> None:
+        if Path(to).name == "00000002.h5":
+            raise Cut
+        replace(source, to)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", crashing)
+        with pytest.raises(Cut):
+            rigidsim.resume(run.folder.path, until="90", tuning=EAGER)
+    done = rigidsim.resume(run.folder.path, tuning=EAGER)
+    same_bits(whole, done)
+
+
+@pytest.mark.parametrize(
+    ("until", "says"),
+    [
+        ("50", "no later than the run's end"),
+        ("60", "no later than the run's end"),
+        ("60.3", "lies between two samples of the grid"),
+        ("-inf", "time"),
+        ("soon", "time"),
+    ],
+)
+def test_a_bad_later_end_leaves_a_finished_run_finished(until: str, says: str, tmp_path: Path) -> None:
+    run = rigidsim.run(rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path)
+    before = {p.name: p.read_bytes() for p in run.folder.path.iterdir()}
+    with pytest.raises((RunFolderError, ConfigError), match=says):
+        rigidsim.resume(run.folder.path, until=until)
+    assert {p.name: p.read_bytes() for p in run.folder.path.iterdir()} == before
+
+
+# --- what can't be resumed --------------------------------------------------------------------------
+
+
+def test_a_finished_run_has_nothing_left(tmp_path: Path) -> None:
+    run = rigidsim.run(rigidsim.parse(text_with("end = 3\nsamples = 7")), out=tmp_path)
+    with pytest.raises(
+        RunFolderError, match=r"nothing is left to do: the run reached its last sample; --until"
+    ):
+        rigidsim.resume(run.folder.path)
+
+
+def test_a_run_that_broke_down_has_nothing_left(tmp_path: Path) -> None:
+    text = text_with("end = 1e6\nsamples = 11", loads='kind = "torque"\ncomponents = ["wx*wx*wx", "0", "0"]')
+    run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
+    assert run.status in ("stopped: non-finite state", "stopped: step size collapsed")
+    with pytest.raises(RunFolderError, match="nothing is left to do: the st"):
+        rigidsim.resume(run.folder.path)
+    with pytest.raises(RunFolderError, match="cannot be prolonged: the st"):
+        rigidsim.resume(run.folder.path, until="2e6")
+
+
+def test_nothing_saved_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = text_with("end = 30\nsamples = 61")
+    whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole")
+    with monkeypatch.context() as patch:
+        patch.setattr(loop.IntegrationLoop, "run", lambda self: (_ for _ in ()).throw(Cut))
+        with pytest.raises(Cut):
+            rigidsim.run(rigidsim.parse(text), out=tmp_path / "cut")
+    done = rigidsim.resume(tmp_path / "cut" / "cut")
+    assert "nothing had been saved, so the run began anew" in done.summary["warnings"]
+    same_bits(whole, done)
+
+
+CHANGES = {
+    "a value": (lambda t: t.replace("0.3, 1.0", "0.3, 1.1"), r"line 5 is .*1\.1, 0\.5.*it was .*1\.0, 0\.5"),
+    "a comment": (lambda t: "# mine\n" + t, 'line 1 is "# mine"'),
+    "a table at the end": (lambda t: t + '[[events]]\nname = "e"\nexpression = "wz"\n', "lines"),
+    "a setting at the end": (lambda t: t + "#:set body.principal_moments=[1,2,2.6]\n", "lines"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_changed_config_is_refused(change: str, tmp_path: Path) -> None:
+    text = text_with("end = 60\nsamples = 121", "max_steps = 20")
+    run = rigidsim.run(rigidsim.parse(text), out=tmp_path, tuning=IMPATIENT)
+    edit, says = CHANGES[change]
+    run.folder.config.write_text(edit(text))
+    with pytest.raises(RunFolderError, match=rf"config\.toml: was changed since the run began \(.*{says}"):
+        rigidsim.resume(run.folder.path, tuning=IMPATIENT)
+    run.folder.config.write_text(text)
+    assert resumed_to_the_end(run)[0].status == "finished"
+
+
+def test_another_process_at_work_is_not_disturbed(tmp_path: Path) -> None:
+    run = rigidsim.run(
+        rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 20")), out=tmp_path, tuning=IMPATIENT
+    )
+    before = sorted((p.name, p.read_bytes()) for p in run.folder.segments.iterdir())
+    with run.folder.locked():
+        with pytest.raises(RunFolderError, match="another process is at work there"):
+            rigidsim.resume(run.folder.path, tuning=IMPATIENT)
+        with pytest.raises(RunFolderError, match="another process is at work there"):
+            rigidsim.run(run.folder.config, out=tmp_path, force=True, tuning=IMPATIENT)
+    assert sorted((p.name, p.read_bytes()) for p in run.folder.segments.iterdir()) == before
+    assert resumed_to_the_end(run)[0].status == "finished"
+
+
+@pytest.mark.parametrize("what", ["segments", "segments/00000000.h5", "config.toml", ".dataset.h5.partial"])
+def test_links_out_of_the_folder_are_refused(what: str, tmp_path: Path) -> None:
+    run = rigidsim.run(
+        rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 20")),
+        out=tmp_path / "r",
+        tuning=IMPATIENT,
+    )
+    place, elsewhere = run.folder.path / what, tmp_path / "elsewhere"
+    if place.exists():
+        place.rename(elsewhere)
+    else:
+        elsewhere.write_text("mine")
+    place.symlink_to(elsewhere)
+    with pytest.raises(RunFolderError, match=r"is a symbolic link, which no run writes"):
+        rigidsim.resume(run.folder.path, tuning=IMPATIENT)
+    assert elsewhere.exists()
+
+
+def test_other_versions_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bits are still those that both versions give, but nobody promises it."""
+    from rigidsim.store import provenance
+
+    run = rigidsim.run(
+        rigidsim.parse(text_with("end = 60\nsamples = 61", "max_steps = 20")), out=tmp_path, tuning=IMPATIENT
+    )
+    versions = provenance.versions()
+    monkeypatch.setattr(provenance, "versions", lambda: versions | {"heyoka": "99.0"})
+    done, _ = resumed_to_the_end(run)
+    claim = done.summary["bit_for_bit"]
+    assert claim["claim"] is False
+    assert f"version_heyoka {versions['heyoka']} -> 99.0" in claim["holds_for"]
+    assert "99.0" in loaded(done).attrs["mixed_provenance"]
+
+
+def test_what_is_read_of_a_partial_run_is_read_lazily(tmp_path: Path) -> None:
+    """Any selection across segments is that of the finished dataset."""
+    text = text_with("end = 60\nsamples = 121", "max_steps = 30")
+    whole = loaded(
+        rigidsim.run(
+            rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path / "whole", tuning=IMPATIENT
+        )
+    )
+    run = rigidsim.run(rigidsim.parse(text), out=tmp_path / "cut", tuning=IMPATIENT)
+    run = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=20"], tuning=IMPATIENT)
+    run = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=20"], tuning=IMPATIENT)
+    assert len(read_chain(run.folder.segments).paths) >= 3
+    with run.dataset as partial:
+        rows = partial.sizes["time"]
+        assert 10 < rows < 121
+        for rule in (
+            slice(None),
+            slice(3, rows, 7),
+            slice(rows, 3, -5),
+            slice(5, 5),
+            [0, rows - 1, 4],
+            7,
+            -1,
+        ):
+            expected = whole.isel(time=slice(rows)).isel(time=rule)
+            same_bits(partial.isel(time=rule).load(), expected)
+            assert not partial.energy.variable._in_memory
+        np.testing.assert_array_equal(
+            partial.quaternion.sel(time=7, quaternion_component="x"),
+            whole.quaternion.sel(time=7, quaternion_component="x"),
+        )
