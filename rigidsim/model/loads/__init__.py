@@ -8,6 +8,7 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new l
     applied,
     central_gravity,
     gravity_gradient,
+    magnetic_dipole,
     uniform_gravity,
     viscous_torque,
 )

@@ -1,0 +1,156 @@
+"""Magnetic dipole: a moment of the body, in a uniform field or in that of a centred dipole along an orbit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import heyoka as hy
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.two_part import as_factor
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, negligible, norm
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.fields import GravitationalParameter, Triple, quantity
+from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
+
+_FIELD_CONSTANT = "1e-7"
+"""mu_0 / 4 pi, T m/A: CODATA 2022 has 0.99999999987(16) times this, measured since the SI of 2019."""
+
+if TYPE_CHECKING:
+    MagneticMoment: TypeAlias = ExactNumber
+    FluxDensity: TypeAlias = ExactNumber
+else:
+    MagneticMoment = quantity("A m^2")
+    FluxDensity = quantity("T")
+
+
+class MagneticDipoleFields(LoadFields):
+    """Torque m x B on a dipole of the body, in a uniform ``field`` (space axes), or in the field of a centred
+    dipole ``source_moment`` (space axes) around which the body moves on ``orbit``.
+    """
+
+    kind: Literal["magnetic_dipole"]
+    moment: Triple[MagneticMoment]
+    field: Triple[FluxDensity] | None = None
+    orbit: Orbit | None = None
+    source_moment: Triple[MagneticMoment] | None = None
+    gravitational_parameter: GravitationalParameter | None = None
+
+
+@register_load
+@dataclass(frozen=True)
+class MagneticDipole(Load):
+    """Torque m x B, potential -m . B (Jackson, Classical Electrodynamics, sections 5.6 and 5.7).
+
+    The field of a centred dipole M is B = (mu_0 / 4 pi r^3) (3 (M . c) c - M) in direction c.
+
+    Attributes:
+        moment: m, body axes, A m^2 (mpf).
+        source: the field itself (T), or M (A m^2) where there is an orbit; space axes.
+        orbit: of the source as seen from the body, which only changes the sign of c; shared with other loads.
+    """
+
+    moment: Vector
+    source: Vector
+    orbit: KeplerOrbit | None = None
+    Fields = MagneticDipoleFields
+    title = "magnetic_dipole"
+    described = "a magnetic dipole"
+    reads = frozenset({"attitude"})
+
+    @classmethod
+    def resolve(cls, fields: MagneticDipoleFields, around: Surroundings) -> MagneticDipole:
+        """See ``SceneLoad``."""
+        if (fields.field is None) == (fields.orbit is None):
+            given = "neither field nor" if fields.field is None else "both field and"
+            raise around.fault("field", f"given {given} orbit; exactly one of them is needed")
+        if (fields.source_moment is None) != (fields.orbit is None):
+            what = "missing; it is needed with orbit" if fields.orbit else "given without orbit; remove it"
+            raise around.fault("source_moment", what)
+        strength = fields.gravitational_parameter
+        if strength is not None and (fields.orbit is None or strength.sign <= 0):
+            allowed = "with orbit only" if fields.orbit is None else "as a positive number only"
+            raise around.fault("gravitational_parameter", f"given {float(strength):g}; allowed {allowed}")
+        moment = _numbers(fields.moment, around)
+        if fields.orbit is None:
+            return cls(moment, _numbers(fields.field or [], around))
+        motion = None if strength is None else strength.at(around.context)
+        orbit = resolve_orbit(fields.orbit, motion, around)
+        return cls(moment, _numbers(fields.source_moment or [], around), orbit)
+
+    def acts(self) -> bool:
+        """Unless a moment or the field is zero."""
+        return any(x != 0 for x in self.moment) and any(x != 0 for x in self.source)
+
+    @property
+    def conservative(self) -> bool:  # type: ignore[override]
+        """In a uniform field."""
+        return self.orbit is None
+
+    def _size(self, scene: Scene) -> Any:
+        """Of the field, T: at the semi-major axis over the source's equator, where there is an orbit."""
+        size = norm(scene.context, self.source)
+        if self.orbit is None:
+            return size
+        return scene.context.mpf(_FIELD_CONSTANT) * size / self.orbit.semi_major_axis**3
+
+    def _field(self, m: Kinematics) -> list[Symbolic]:
+        """B over its size, body axes."""
+        length = norm(m.scene.context, self.source)
+        unit = [as_factor(m.number(x / length)) for x in self.source]
+        if self.orbit is None:
+            return apply(transpose(m.matrix), unit)
+        place = m.orbit(self.orbit)
+        c = place.direction
+        along = 3.0 * hy.sum([e * x for e, x in zip(unit, c, strict=True)])
+        falling = place.inverse_distance**3
+        space = [falling * (along * x - e) for e, x in zip(unit, c, strict=True)]
+        return apply(transpose(m.matrix), space)
+
+    def _moment(self, m: Kinematics) -> Vector:
+        """m times the field's size, internal units of energy."""
+        size = self._size(m.scene)
+        return [m.scene.context.ldexp(x * size, -m.scaling.energy) for x in self.moment]
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """m x B."""
+        moment = self._moment(m)
+        axes = diagonal([m.scene.context.one] * 3)
+        return [(cross(moment, axis), b) for axis, b in zip(axes, self._field(m), strict=True)]
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        """-m . B."""
+        pairs = zip(self._moment(m), self._field(m), strict=True)
+        return -hy.sum([m.number(x) * b for x, b in pairs if x != 0])
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """Where the moment lies along the axis."""
+        context = m.scene.context
+        across = norm(context, cross(self.moment, axis))
+        return bool(across <= norm(context, self.moment) * negligible(context))
+
+    def amplitude(self, scene: Scene) -> Any:
+        """2 m B at its largest: over the source's poles at pericentre, where there is an orbit."""
+        size = 2 * norm(scene.context, self.moment) * self._size(scene)
+        if self.orbit is None:
+            return size
+        return 2 * size * (self.orbit.semi_major_axis / self.orbit.pericentre) ** 3
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        """At pericentre."""
+        return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
+
+    @property
+    def effect(self) -> str:
+        """See ``Load``."""
+        where = "a uniform field" if self.orbit is None else "the field of a centred dipole along the orbit"
+        return f"magnetic_dipole: torque m x B in {where}"
+
+
+def _numbers(values: list[ExactNumber], around: Surroundings) -> Vector:
+    return [x.at(around.context) for x in values]

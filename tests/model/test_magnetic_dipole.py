@@ -1,0 +1,176 @@
+"""A magnetic dipole of the body: torque m x B in a uniform field, and in that of a dipole along an orbit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from equations import CLOSE, Random, array, derivative, general_body, matrix, observed, prepared
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from support import angle_between, config, law, run_text, tried
+
+import rigidsim
+from rigidsim.errors import ConfigError
+
+pytestmark = pytest.mark.compact
+
+BODY = "principal_moments = [1, 1.5, 2]"
+START = "angular_velocity = [0.4, -0.7, 0.9]\nquaternion = [0.3, -0.5, 0.2, 0.75]"
+ORBIT = (
+    "orbit = {semi_major_axis = 7e6, eccentricity = 0.2, inclination = 0.9, ascending_node = 0.3, "
+    "periapsis = 0.5, mean_anomaly = 0.7, node_rate = 0.01, period = 20}"
+)
+SOURCE = np.array([3e22, -2e22, 7e22])  # A m^2
+
+
+def text(load: str, end: float = 20.0, extra: str = "") -> str:
+    load = f'kind = "magnetic_dipole"\n{load}'
+    return config(BODY, START, load, f"end = {end}\nsamples = 201", more=extra, name="magnet")
+
+
+def dipole_field(r: np.ndarray, moment: np.ndarray = SOURCE) -> np.ndarray:
+    """B of a dipole (T) at r (m): Jackson, Classical Electrodynamics, eq. 5.56."""
+    distance = np.linalg.norm(r)
+    c = r / distance
+    return 1e-7 * (3 * c * (moment @ c) - moment) / distance**3
+
+
+def position(t: float) -> np.ndarray:
+    """On ``ORBIT``, by Kepler's equation and three rotations, m."""
+    e, a = 0.2, 7e6
+    mean = 0.7 + 2 * np.pi / 20 * t
+    anomaly = brentq(lambda x: x - e * np.sin(x) - mean, mean - 1, mean + 1, xtol=1e-15)
+    x, y = a * (np.cos(anomaly) - e), a * np.sqrt(1 - e * e) * np.sin(anomaly)
+    node = 0.3 + 0.01 * t
+
+    def turn(angle: float, i: int, j: int) -> np.ndarray:
+        m = np.eye(3)
+        m[i, i] = m[j, j] = np.cos(angle)
+        m[i, j], m[j, i] = -np.sin(angle), np.sin(angle)
+        return m
+
+    return turn(node, 0, 1) @ turn(0.9, 1, 2) @ turn(0.5, 0, 1) @ np.array([x, y, 0.0])
+
+
+def test_the_torque_is_the_moment_cross_the_field_in_any_body_axes() -> None:
+    random = Random(7)
+    for _ in range(5):
+        tensor, field, moment = random.tensor(), random.vector(3), random.vector(2)
+        q, w = random.quaternion(), random.vector()
+        system = prepared(
+            general_body(tensor),
+            f"angular_velocity = {array(w)}\nquaternion = {array(q)}",
+            f'kind = "magnetic_dipole"\nmoment = {array(moment)}\nfield = {array(field)}',
+        ).system
+        state = np.concatenate([w, q])
+        torque = np.cross(moment, matrix(q).T @ field)
+        expected = np.linalg.solve(tensor, np.cross(tensor @ w, w) + torque)
+        found = derivative(system, state)[:3]
+        assert np.abs(found - expected).max() <= CLOSE * np.linalg.cond(tensor) * (1 + np.abs(expected).max())
+        energy = w @ tensor @ w / 2 - moment @ (matrix(q).T @ field)
+        assert abs(observed(system, state)["energy"][0] - energy) <= CLOSE * (1 + abs(energy))
+
+
+def test_in_a_uniform_field_it_moves_like_the_heavy_top_with_the_same_torque(runs: Path) -> None:
+    """m x B is com x M g for m = M com and B = g: two loads, two codes, one motion."""
+    magnet = run_text(text("moment = [0.2, 0.1, 0.6]\nfield = [0, 0, -2]"), runs)
+    heavy = text("", extra="").replace("magnetic_dipole", "uniform_gravity").replace("magnet", "top")
+    heavy = heavy.replace("[initial]", "mass = 2\ncenter_of_mass = [0.1, 0.05, 0.3]\n[initial]")
+    heavy = heavy.replace('"uniform_gravity"', '"uniform_gravity"\nacceleration = [0, 0, -2]')
+    top = run_text(heavy, runs)
+    apart = angle_between(magnet.dataset["quaternion"].values, top.dataset["quaternion"].values).max()
+    # two runs that each keep the law of a good integration (Brouwer 1937), tripled as everywhere
+    steps = magnet.summary["cost"]["steps"]
+    assert apart <= 3 * law(2.0**-52, steps, 2.0, 20.0)
+    assert "energy" in magnet.summary["invariants"]
+    assert magnet.summary["warnings"] == []
+
+
+def test_a_symmetric_body_keeps_its_spin_where_the_moment_is_axial(runs: Path) -> None:
+    symmetric = text("moment = [0, 0, 1]\nfield = [1, 0, 2]").replace("[1, 1.5, 2]", "[1, 1, 2]")
+    assert "angular_momentum_axial" in run_text(symmetric, runs).summary["invariants"]
+    tilted = symmetric.replace("moment = [0, 0, 1]", "moment = [0.1, 0, 1]")
+    assert "angular_momentum_axial" not in run_text(tilted, runs).summary["invariants"]
+
+
+def test_along_an_orbit_it_agrees_with_another_integrator_of_the_plain_equations(runs: Path) -> None:
+    moment, inertia = np.array([2.0, -3.0, 5.0]) * 1e5, np.array([1, 1.5, 2])
+    load = f"moment = {array(moment)}\n{ORBIT}\nsource_moment = {array(SOURCE)}"
+    run = run_text(text(load), runs)
+    assert run.summary["warnings"] == []
+    assert list(run.summary["invariants"]) == ["energy_balance", "orbit_norm_1", "orbit_norm_2",
+                                               "quaternion_norm"]  # fmt: skip
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        w, q = y[:3], y[3:]
+        field = matrix(q / np.linalg.norm(q)).T @ dipole_field(position(t))
+        turn = np.array([[0, *-w], [w[0], 0, w[2], -w[1]], [w[1], -w[2], 0, w[0]], [w[2], w[1], -w[0], 0]])
+        return np.concatenate([(np.cross(inertia * w, w) + np.cross(moment, field)) / inertia, turn @ q / 2])
+
+    q = np.array([0.3, -0.5, 0.2, 0.75])
+    start = np.concatenate([[0.4, -0.7, 0.9], q / np.linalg.norm(q)])
+    times = run.dataset["time"].values
+    there = solve_ivp(rates, (0, 20), start, method="DOP853", t_eval=times, rtol=1e-11, atol=1e-12).y[3:].T
+    # the other integrator's tolerance, some hundred steps of it, and the growth of 20 s at 1 rad/s
+    assert angle_between(run.dataset["quaternion"].values, there).max() <= 1e-8
+
+
+def test_loads_of_one_orbit_share_its_states() -> None:
+    gradient = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1e20\n{ORBIT}\n'
+    load = f"moment = [1, 2, 3]\n{ORBIT}\nsource_moment = {array(SOURCE)}"
+    plan = rigidsim.plan(rigidsim.parse(text(load, extra=gradient)))
+    assert sorted(s for s in plan["states"] if "anomaly" in s) == ["cos_anomaly1", "sin_anomaly1"]
+    (shared,) = (r for r in plan["reasons"] if "anomaly" in r["states"])
+    assert shared["why"] == "magnetic_dipole, gravity_gradient: where its source is"
+    apart = gradient.replace("mean_anomaly = 0.7", "mean_anomaly = 0.8")
+    assert len(rigidsim.plan(rigidsim.parse(text(load, extra=apart)))["states"]) == plan["state_count"] + 4
+
+
+def test_every_formulation_gives_the_same_motion() -> None:
+    load = text(f"moment = [2e5, -3e5, 5e5]\n{ORBIT}\nsource_moment = {array(SOURCE)}")
+    exact = tried(load, "extended")
+    for formulation in ("quaternion", "euler_angles", "rotation_matrix", "canonical"):
+        quick = tried(load, "double", formulation)
+        apart = angle_between(quick.attitudes[0], exact.attitudes[0]).max()
+        # the law of a good integration (Brouwer 1937), tripled as everywhere
+        assert apart <= 3 * law(2.0**-52, quick.steps, 2.0, 20.0), formulation
+
+
+def test_teslas_and_ampere_square_metres_keep_their_digits() -> None:
+    given = text('moment = ["1 A m^2", "2e3 mA m^2", 3]\nfield = ["25 uT", "0.3 gauss", "-1e4 nT"]')
+    scene = rigidsim.workflows.read.parse(given)  # type: ignore[attr-defined]
+    table = scene.config.loads[0]
+    assert [str(x.rational) for x in table.moment] == ["1", "2", "3"]
+    assert [str(x.rational) for x in table.field] == ["1/40000", "3/100000", "-1/100000"]
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        ("moment = [1, 0, 0]", "[[loads]] number 1 field: given neither field nor orbit; exactly one"),
+        (f"moment = [1, 0, 0]\nfield = [1, 0, 0]\n{ORBIT}", "field: given both field and orbit; exactly one"),
+        (f"moment = [1, 0, 0]\n{ORBIT}", "source_moment: missing; it is needed with orbit"),
+        (
+            "moment = [1, 0, 0]\nfield = [1, 0, 0]\nsource_moment = [1, 0, 0]",
+            "given without orbit; remove it",
+        ),
+        ("moment = [1, 0, 0]\nfield = [1, 0, 0]\ngravitational_parameter = 1", "allowed with orbit only"),
+        (
+            "moment = [1, 0, 0]\norbit = {semi_major_axis = 1}\nsource_moment = [1, 0, 0]",
+            "orbit.period: missing; give it, or gravitational_parameter",
+        ),
+        (
+            'moment = ["1 T", 0, 0]\nfield = [1, 0, 0]',
+            '"T" is not a unit of the dimension asked for, which is A m^2',
+        ),
+        ("moment = [1, 0, 0]\nfield = [1, 0, 0]\nmoments = 3", 'unknown key; did you mean "moment"?'),
+    ],
+)
+def test_what_contradicts_itself_is_refused(load: str, message: str) -> None:
+    from rigidsim.scene.scene import build_scene
+
+    with pytest.raises(ConfigError) as caught:
+        build_scene(rigidsim.parse(text(load)))
+    assert message in str(caught.value)
