@@ -30,8 +30,8 @@ def kill_runs(tally: Tally, kills: int, draw: random.Random, folder: Path, deadl
         wanted = draw.randint(1, 6)
         before = done
         for _ in range(wanted):
-            # killed when all was done, before the process ended by itself, or out of time
-            if ended(run) or time.monotonic() > deadline:
+            # killed when all was done, before the process ended by itself; enough kills, or out of time
+            if ended(run) or done >= kills or time.monotonic() > deadline:
                 break
             killed = _kill_once(tally, draw, wholes, out, name, f"run {number} {name}, kill {done + 1}")
             if not killed:
