@@ -38,7 +38,7 @@ class RootAttributes(BaseModel):
         wall_seconds, cpu_seconds: of all sessions.
     """
 
-    model_config = ConfigDict(frozen=True, strict=True)
+    model_config = ConfigDict(frozen=True, strict=True, defer_build=True)
 
     Conventions: str
     title: str

@@ -81,7 +81,7 @@ Seconds = Annotated[dict[Text, FiniteNumber], AfterValidator(_with_engine)]
 class _Part(BaseModel):
     """Immutable; what a newer version wrote beside the fields is kept."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants")
+    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants", defer_build=True)
 
     def having(self, **known: Any) -> Self:
         """A copy with what has become known since, checked as on reading."""
