@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -115,6 +115,13 @@ def compact_code() -> Iterator[None]:
         for module in (problem, projection, error_law):
             patch.setattr(module, "precision_of", compactly)
         yield
+
+
+def cases(every: Iterable[Any], usual: Collection[Any]) -> list[Any]:
+    """Parameters of which only the usual ones are tried in each suite, the others among the long tests."""
+    every = list(every)
+    assert set(usual) <= set(every), "no such case"
+    return [case if case in usual else pytest.param(case, marks=pytest.mark.slow) for case in every]
 
 
 def config(

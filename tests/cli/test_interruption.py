@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
-from support import OFTEN, same_bits
+from support import OFTEN, cases, same_bits
 
 import rigidsim
 
@@ -50,7 +50,7 @@ def assert_first_samples(partial: xarray.Dataset, full: xarray.Dataset) -> int:
     return count
 
 
-@pytest.mark.parametrize("case", LONG)
+@pytest.mark.parametrize("case", cases(LONG, ("double, dense", "double, sparse", "quadruple, dense")))
 def test_an_interrupted_run_keeps_what_it_has(case: str, config: Config, start: Start) -> None:
     precision, spacing, number = LONG[case]
     name = config(time=f"end = {FOREVER}\nevery = {spacing}", integrator=f"precision = {precision}")

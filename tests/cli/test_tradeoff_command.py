@@ -7,9 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
 import xarray
 
 
+@pytest.mark.slow
 def test_table_dataset_and_figure(config: Callable[..., str], rigidsim_command: Callable[..., Any]) -> None:
     name = config(time="end = 20\nsamples = 5", rest='record = ["angular_velocity"]')
     told = rigidsim_command("tradeoff", name, "--budget", "10", "--repeats", "1", "--json")

@@ -36,6 +36,7 @@ def test_scenes_are_the_same_each_time_and_of_every_kind() -> None:
         rigidsim.parse(scene.text)
 
 
+@pytest.mark.slow
 def test_a_scene_that_keeps_its_word() -> None:
     outcome = examine(random_scene(3))
     assert 0 < outcome.true <= outcome.certified <= outcome.asked
@@ -71,6 +72,7 @@ def lying(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rigidsim.workflows.certify.certify", small)
 
 
+@pytest.mark.slow
 def test_a_certificate_that_lies_fails_the_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lying(monkeypatch)
     assert study.main(["--out", str(tmp_path), "--first", "7", "--count", "1"]) == 1

@@ -120,6 +120,7 @@ def test_mistyped_peers_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert "given reboun; known: heyoka" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_command_prints_ratios_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--short", "--scenes", "free_top", "--peers", "heyoka,scipy", "--repeats", "1"]
     assert study.main([*arguments, "--cap", "0.1", "--out", str(tmp_path)]) == 0

@@ -47,6 +47,7 @@ def chaotic(out: Path, unit: float = 1.0, end: float = 4000.0) -> rigidsim.Run:
     return run_text(text, out)
 
 
+@pytest.mark.slow
 def test_hyperion_is_chaotic_and_its_exponents_come_in_pairs(runs: Path) -> None:
     run = chaotic(runs)
     chaos = run.summary["lyapunov"]

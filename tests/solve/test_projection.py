@@ -227,6 +227,7 @@ def ended(parts: Scene, end: float, setting: Setting) -> Trial:
     return try_setting(rigidsim.parse(config(*parts, f"end = {end}\nsamples = 2")), setting, compact=True)
 
 
+@pytest.mark.slow
 def test_attitude_errors_no_longer_grow_faster_than_the_root_of_the_steps() -> None:
     """Against 80-bit runs, whose own error is 2000 times smaller than a plain double's. Between corrections
     the frequency is off by the wander of energy and momentum, some eps sqrt(k) after k steps, and its part

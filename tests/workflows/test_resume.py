@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import EAGER, IMPATIENT, config, loaded, same_bits
+from support import EAGER, IMPATIENT, cases, config, loaded, same_bits
 
 import rigidsim
 from rigidsim.errors import ConfigError, RunFolderError
@@ -96,10 +96,28 @@ def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> t
 
 # the others in compact code: whether a run is cut or not, it is the same code
 UNROLLED = ("single", "double, dense", "double, sparse", "double, Euler angles", "quadruple")
+USUAL = (
+    "double, dense",
+    "double, sparse",
+    "double, held invariants, angles",
+    "double, events, angles",
+    "double, ended by an event",
+    "extended, Euler angles, events",
+    "30 digits, tiny components",
+)
 
 
 @pytest.mark.parametrize(
-    "case", [c if c in UNROLLED else pytest.param(c, marks=pytest.mark.compact) for c in CASES]
+    "case",
+    [
+        pytest.param(
+            c,
+            marks=[
+                m for m, of in ((pytest.mark.compact, UNROLLED), (pytest.mark.slow, USUAL)) if c not in of
+            ],
+        )
+        for c in CASES
+    ],
 )
 def test_a_run_cut_many_times_is_the_run_in_one_go(case: str, tmp_path: Path) -> None:
     text = text_of(case)
@@ -138,11 +156,14 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, rigidsim.Run]:
     return text, rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("whole"))
 
 
+MOMENTS = ("before the name", "after the name", "folder not synced")
+
+
 class Cut(BaseException):
     """As sudden as a kill: nothing is saved after it."""
 
 
-@pytest.mark.parametrize("moment", ["before the name", "after the name", "folder not synced"])
+@pytest.mark.parametrize("moment", cases(MOMENTS, ("before the name", "folder not synced")))
 @pytest.mark.parametrize(
     "target", ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"]
 )
