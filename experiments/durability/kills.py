@@ -13,7 +13,6 @@ import rigidsim
 from experiments.durability.judging import Tally, check_after, check_complete, ended, names, saved_rows
 from experiments.durability.processes import await_moment, child, exit_code, work_on
 from experiments.durability.scenes import SCENES, Undisturbed, text_of
-from rigidsim.errors import RunFolderError
 
 
 def kill_runs(tally: Tally, kills: int, draw: random.Random, folder: Path, deadline: float) -> None:
@@ -70,10 +69,8 @@ def _finish(tally: Tally, wholes: Undisturbed, out: Path, name: str, where: str)
     """Let a run come to its end, and hold it against the undisturbed one."""
     run = out / name
     if ended(run):
-        try:
-            rigidsim.resume(run)  # cleans up
-        except RunFolderError as error:
-            tally.expect("nothing is left to do" in str(error), f"{where}: {error}")
+        again = rigidsim.resume(run)  # cleans up
+        tally.expect(again.status == "finished", f"{where}: {again.status} when nothing was left to do")
     else:
         code = exit_code(child(work_on(run, text_of(name)), out / "log"))
         if not tally.expect(code == 0, f"{where}: {(out / 'log').read_text()[-400:]}"):

@@ -23,6 +23,7 @@ from rigidsim.solve.sampler import Progress
 _LINE_EVERY = 5.0  # seconds between plain lines
 _TITLE = 24  # letters of a run's name beside the bar
 _WIDE = 100  # columns from which simulated time has room
+_NOTHING_LEFT = "nothing is left to do: {}; --until prolongs a finished run to a later end"
 _PHASES = {
     "lyapunov": "Lyapunov exponents",
     "dataset": "writing dataset.h5",
@@ -77,6 +78,10 @@ class TerminalObserver(Observer):
         """See ``Observer``."""
         if name in _PHASES:
             self._draw(_PHASES[name])
+
+    def nothing_left(self, why: str) -> None:
+        """See ``Observer``."""
+        self._bar.console.print(_NOTHING_LEFT.format(why), highlight=False, markup=False)
 
     def choosing(self, name: str) -> None:
         """See ``Observer``."""
@@ -139,6 +144,10 @@ class LineObserver(Observer):
         if name in _PHASES:
             self._say(_PHASES[name])
         self._tried, self._verb = "", "comparing with" if name == "certify" else "trying"
+
+    def nothing_left(self, why: str) -> None:
+        """See ``Observer``."""
+        print(_NOTHING_LEFT.format(why), file=sys.stderr, flush=True)
 
     def choosing(self, name: str) -> None:
         """See ``Observer``."""

@@ -120,7 +120,7 @@ def _print_ended(summary: Summary, out: Console) -> None:
         _line(out, "held", "put back: what the drift would have been; held drifts are no independent check")
     _print_accuracy(summary.accuracy, out)
     if summary.events:
-        _line(out, "events", ", ".join(f"{name} {count:,}" for name, count in summary.events.items()))
+        _line(out, "events", ", ".join(_event(summary, name) for name in summary.events))
     chaos = summary.lyapunov
     if chaos is not None:
         what = "chaotic" if chaos.chaotic else "regular"
@@ -128,6 +128,16 @@ def _print_ended(summary: Summary, out: Console) -> None:
         _line(out, "motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
     for warning in summary.warnings:
         _line(out, "warning", warning, "bold red")
+
+
+def _event(summary: Summary, name: str) -> str:
+    """How often, and when."""
+    text, times = f"{name} {summary.events[name]:,}", summary.event_times.get(name)
+    if times is None:
+        return text
+    if times.first == times.last:
+        return f"{text} at {times.first:.9g} s"
+    return f"{text} from {times.first:.9g} s to {times.last:.9g} s"
 
 
 def _invariants(summary: Summary) -> Table:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigidsim.errors import StoppedWritingError
+from rigidsim.scene.schema import Output
 from rigidsim.session.attributes import of_complete
 from rigidsim.session.guards import Observer
 from rigidsim.session.recorder import Recorder
@@ -87,20 +88,32 @@ class Completion:
         self.folder.write_summary(self.summary)
 
     def _draw_timeline(self) -> None:
-        output, path = self.prepared.scene.config.output, self.folder.timeline
-        if not output.timeline or not self.summary.samples:
-            return
-        from rigidsim.look.timeline import write_timeline
+        self.summary = with_timeline(
+            self.summary, self.folder, self.prepared.scene.config.output, self.observer
+        )
+        if self.summary.timeline_sha256 is not None:
+            self.phases.next("timeline")
 
-        self.observer.phase("timeline")
-        try:
-            with open_dataset(self.folder.dataset, indexed=False) as dataset:  # memory goes with the rows
-                write_timeline(dataset, path, rows=output.timeline_rows)
-        except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
-            why = error.strerror if isinstance(error, OSError) else None
-            raise StoppedWritingError(
-                f"{path}: can't be written: {why or error}; the dataset is complete, and rigidsim view draws "
-                "the timeline once that is possible"
-            ) from None
-        self.summary = self.summary.having(timeline_sha256=provenance.file_sha256(path))
-        self.phases.next("timeline")
+
+def with_timeline(summary: Summary, folder: RunFolder, output: Output, observer: Observer) -> Summary:
+    """Draw a complete dataset's timeline, where one is asked for; the summary with its digest.
+
+    Raises:
+        StoppedWritingError: it can't be written.
+    """
+    if not output.timeline or not summary.samples:
+        return summary
+    from rigidsim.look.timeline import write_timeline
+
+    path = folder.timeline
+    observer.phase("timeline")
+    try:
+        with open_dataset(folder.dataset, indexed=False) as dataset:  # memory goes with the rows
+            write_timeline(dataset, path, rows=output.timeline_rows)
+    except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
+        why = error.strerror if isinstance(error, OSError) else None
+        raise StoppedWritingError(
+            f"{path}: can't be written: {why or error}; the dataset is complete, and rigidsim view draws "
+            "the timeline once that is possible"
+        ) from None
+    return summary.having(timeline_sha256=provenance.file_sha256(path))

@@ -8,6 +8,7 @@ from rigidsim.session.variables import recorded_variables
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.store.summary import EventTimes
 from rigidsim.store.variables import Extra, Variable
 
 
@@ -48,6 +49,17 @@ def _extras(event: str, variable: Variable, parts: list[np.ndarray], count: int)
         )
         for part, (name, values) in enumerate(zip(variable.part_names(), parts, strict=True))
     ]
+
+
+def event_times(prepared: InitialValueProblem, log: EventLog, last: float) -> dict[str, EventTimes]:
+    """When each event that was found happened first and last."""
+    clock, times = prepared.clock, {}
+    for index, crossing in enumerate(prepared.system.crossings):
+        found = log.occurrences(index, last)
+        if found:
+            first, latest = (clock.seconds(f.time) for f in (found[0], found[-1]))
+            times[crossing.name] = EventTimes(first=first, last=latest)
+    return times
 
 
 def event_counts(prepared: InitialValueProblem, log: EventLog, last: float) -> dict[str, int]:

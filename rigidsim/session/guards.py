@@ -27,6 +27,9 @@ class Observer:
     def phase(self, name: str) -> None:
         """A new phase begins: "integrate", "lyapunov", "dataset", "timeline", "certify"."""
 
+    def nothing_left(self, why: str) -> None:
+        """The run to be resumed had ended for good before, with these words; nothing was done."""
+
     def choosing(self, name: str) -> None:
         """Settings for the run of this name are about to be chosen, by trials; its integration follows."""
 

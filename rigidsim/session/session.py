@@ -9,12 +9,12 @@ from rigidsim.accuracy.error_law import motion_growth
 from rigidsim.session.attributes import root_attributes
 from rigidsim.session.completion import Completion
 from rigidsim.session.diagnostics import Diagnostics, growth_by_spectrum
-from rigidsim.session.event_variables import event_counts, event_variables
+from rigidsim.session.event_variables import event_counts, event_times, event_variables
 from rigidsim.session.guards import Guards, Interruption, Observer
 from rigidsim.session.lyapunov import lyapunov_variables, spectrum_of
 from rigidsim.session.recorder import Recorder
 from rigidsim.session.restore import restore
-from rigidsim.session.summary import chart_changes, closing_words, cost_so_far, summarise
+from rigidsim.session.summary import chart_changes, closing_words, cost_so_far, summarise, time_reached
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.tuning import Tuning
 from rigidsim.session.variables import dataset_variables
@@ -102,12 +102,14 @@ class Session:
         summary = summarise(
             Diagnostics(prepared, progress, recorder.statistics, growth),
             spectrum,
-            message=closing_words(prepared, progress, evaluator),
+            message=closing_words(prepared, progress, evaluator, log),
             remarks=self.remarks,
             initial=evaluator.initial_invariants(),
             cost=cost_so_far(prepared, progress, clock, self.effort),
             attributes=attributes,
+            time_reached=time_reached(prepared, progress, log),
             events=event_counts(prepared, log, last),
+            event_times=event_times(prepared, log, last),
             chart_changes=chart_changes(prepared, corrected),
         )
         if progress.status.final:

@@ -11,6 +11,7 @@ from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem
@@ -23,6 +24,7 @@ from rigidsim.store.summary import (
     Caution,
     ChartChanges,
     Cost,
+    EventTimes,
     Invariant,
     Lyapunov,
     Summary,
@@ -39,7 +41,9 @@ def summarise(
     initial: Mapping[str, list[float]],
     cost: Cost,
     attributes: RootAttributes,
+    time_reached: float,
     events: dict[str, int],
+    event_times: dict[str, EventTimes],
     chart_changes: ChartChanges | None,
 ) -> Summary:
     """All but the digests of files that are still to be written.
@@ -50,7 +54,8 @@ def summarise(
         remarks: on how the session began; they stand before the warnings.
         initial: values of the invariants, SI.
         attributes: of the dataset.
-        events: how often each was found.
+        time_reached: seconds.
+        events, event_times: how often each was found, and when.
     """
     prepared, progress = found.prepared, found.progress
     scene, system = prepared.scene, prepared.system
@@ -63,7 +68,8 @@ def summarise(
         **as_fields([*remarks, *found.cautions()]),
         samples=progress.next_sample,
         samples_planned=progress.samples,
-        time_reached=progress.time,
+        time_reached=time_reached,
+        engine_time=progress.time,
         formulation=system.requirements.formulation,
         states=tuple(system.states),
         precision=prepared.precision.name,
@@ -83,6 +89,7 @@ def summarise(
         bit_for_bit=_bit_for_bit(prepared, progress, attributes.mixed_provenance),
         provenance=attributes.of_use(Use.REPEATED),
         events=events,
+        event_times=event_times,
         chart_changes=chart_changes,
     )
 
@@ -108,9 +115,23 @@ def _seconds(step: float, exponent: int) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def closing_words(prepared: InitialValueProblem, progress: Progress, evaluator: Evaluator) -> str:
-    """The status in words, with where and why for a run that broke down."""
+def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLog) -> float:
+    """Of the last sample, or of the event that ended the run, seconds; the start before the first sample."""
+    clock = prepared.clock
+    if progress.status is Status.EVENT and log.stop is not None:
+        return clock.seconds(log.stop)
+    return clock.label(progress.next_sample - 1) if progress.next_sample else clock.seconds(clock.start)
+
+
+def closing_words(
+    prepared: InitialValueProblem, progress: Progress, evaluator: Evaluator, log: EventLog
+) -> str:
+    """The status in words: with which event and when, or where and why for a run that broke down."""
     text = progress.status.message
+    if progress.status is Status.EVENT:
+        ending = next(f for f in log.found if log.stops[f.index])
+        name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
+        return f"{text}: {name} at {when:.9g} s"
     if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
         return text
     text += f"; last good state at {progress.time:.9g} s after {progress.steps} steps"

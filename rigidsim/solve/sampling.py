@@ -58,6 +58,15 @@ class SampleClock:
         """One sample's time in internal units, a scalar of the precision."""
         return self.internal(index, index + 1)[0]
 
+    def label(self, index: int) -> float:
+        """One sample's time in seconds, as the dataset's coordinate has it."""
+        return self.seconds(self.at(index))
+
+    def seconds(self, time: Scalar) -> float:
+        """A time in internal units as the nearest double, seconds."""
+        alone = np.array([time], dtype=self._precision.scalar)
+        return float(np.ldexp(self._precision.parts(alone)[0][0], self.exponent))
+
     def _refuse_coinciding(self, samples: SampleTimes) -> None:
         """The spacing is resolved worst at the time of largest size."""
         candidates = {0, max(0, self.count - 2)}

@@ -38,10 +38,12 @@ class Claim:
     Attributes:
         since: schema version of the dataset from which the field means what it means now.
         of_end: whether it says how the run ended, which an interruption changes.
+        beside: a field without which, in older summaries, this one means something else; empty for none.
     """
 
     since: int = 1
     of_end: bool = False
+    beside: str = ""
 
 
 class WarningCode(Enum):
@@ -189,6 +191,13 @@ class Body(_Part):
     mass: FiniteNumber | None
 
 
+class EventTimes(_Part):
+    """When an event happened, s."""
+
+    first: Annotated[FiniteNumber, Claim()]
+    last: Annotated[FiniteNumber, Claim()]
+
+
 class ChartChanges(_Part):
     """How often a run in Euler angles went from its sequence to the partner or back."""
 
@@ -224,7 +233,9 @@ class Summary(Brief):
 
     Attributes:
         warnings, warning_codes: texts, and a ``WarningCode`` for each; older summaries have the texts alone.
-        time_reached: seconds.
+        time_reached: seconds: of the last sample, or of the event that ended the run.
+        engine_time: seconds: where the integration stood, which goes past samples in steps of its own.
+        events, event_times: how often each happened, and when those that did.
         provenance: attributes of the dataset that are repeated here.
         dataset_sha256, timeline_sha256: of the files, once there are any.
     """
@@ -233,7 +244,8 @@ class Summary(Brief):
     warning_codes: tuple[Text, ...] = ()
     samples: Annotated[StrictInt, Claim()]
     samples_planned: Annotated[StrictInt, Claim()]
-    time_reached: Annotated[FiniteNumber, Claim()]
+    time_reached: Annotated[FiniteNumber, Claim(beside="engine_time")]
+    engine_time: Annotated[FiniteNumber | None, Claim()] = None
     formulation: Annotated[Text, Claim()]
     states: Annotated[tuple[Text, ...], Claim()]
     precision: Annotated[Text, Claim()]
@@ -248,6 +260,7 @@ class Summary(Brief):
     bit_for_bit: BitForBit
     provenance: dict[Text, StrictStr | StrictInt]
     events: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
+    event_times: dict[Text, EventTimes] = Field(default_factory=dict)
     chart_changes: Annotated[ChartChanges | None, Claim()] = None
     dataset_sha256: Digest | None = None
     timeline_sha256: Digest | None = None

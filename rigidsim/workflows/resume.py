@@ -12,6 +12,7 @@ import numpy as np
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment, parse_saved
 from rigidsim.session.attributes import root_attributes as attributes_now
+from rigidsim.session.completion import with_timeline
 from rigidsim.session.guards import Observer
 from rigidsim.session.session import Session
 from rigidsim.session.tuning import Tuning
@@ -24,7 +25,7 @@ from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain, root_attributes
-from rigidsim.store.summary import Caution, WarningCode
+from rigidsim.store.summary import Caution, Summary, WarningCode
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.certify import certified
 from rigidsim.workflows.verify import text_difference
@@ -56,11 +57,11 @@ def resume(
 
     Returns:
         The run. Its dataset is bit for bit that of a run in one go, on the same versions and CPU features;
-        on others the summary says so.
+        on others the summary says so. One that is complete is returned as it is, and the observer told.
 
     Raises:
-        RunFolderError: no run, a finished one, one in use, one that can't be written, or one whose config or
-            segments were changed.
+        RunFolderError: no run, one in use, one that can't be written, or one whose config or segments were
+            changed.
         ConfigError: a bad ``until`` or override.
     """
     folder = find_run(path)
@@ -76,11 +77,7 @@ def resume(
         # a run that was killed while its dataset was completed has both, and is completed again
         finished = folder.dataset.exists() and not folder.segments.exists()
         if finished and until is None:
-            done = open_run(folder.path)
-            raise RunFolderError(
-                f"{folder.path}: nothing is left to do: {done.outcome.message or done.status}; "
-                "--until prolongs it to a later end"
-            )
+            return _as_it_is(folder, experiment, session, loads)
         folder.refuse_read_only()
         lost = not folder.dataset.exists() and not folder.segments.exists()
         if lost and folder.read_summary().dataset_digest is not None:
@@ -101,6 +98,29 @@ def resume(
             session.remarks.append(Caution(WarningCode.BEGUN_ANEW, text))
         run = session.execute(prepared, folder, chain if chain.paths else None)
         return certified(run, prepared.experiment, None, session, loads)[0]
+
+
+def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads: Sequence[Load]) -> Run:
+    """A run whose dataset is complete; what a Ctrl-C left out after that is made up for.
+
+    Raises:
+        RunFolderError: that can't be written.
+    """
+    done = open_run(folder.path)
+    summary = done.outcome
+    if isinstance(summary, Summary) and summary.status == Status.INTERRUPTED.value:
+        folder.refuse_read_only()
+        found = read_attributes(folder.dataset)
+        summary = with_timeline(summary, folder, experiment.config.output, session.observer)
+        summary = summary.having(
+            status=found.status,
+            message=found.status_message or "",
+            exit_code=Status(found.status).exit_code,
+        )
+        folder.write_summary(summary)
+        return certified(Run(folder, summary), experiment, None, session, loads)[0]
+    session.observer.nothing_left(done.outcome.message or done.status)
+    return done
 
 
 def _refuse_links(folder: RunFolder) -> None:

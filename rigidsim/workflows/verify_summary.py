@@ -46,7 +46,8 @@ def _claims(part: BaseModel, version: int, *, ended: bool) -> dict[str, Any]:
         if name not in given:
             continue  # an older summary's
         if claim is not None:
-            if version >= claim.since and (ended or not claim.of_end):
+            known = not claim.beside or claim.beside in given
+            if known and version >= claim.since and (ended or not claim.of_end):
                 found[name] = given[name]
         elif isinstance(value, BaseModel):
             found[name] = _claims(value, version, ended=ended)

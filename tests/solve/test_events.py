@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from io import StringIO
 from itertools import pairwise
 from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-from support import run_text
+from rich.console import Console
+from support import config, run_text
 
+from rigidsim.cli.tables import print_summary
 from rigidsim.errors import ConfigError
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.pacing import Pacing
@@ -109,6 +113,44 @@ def test_a_run_can_end_at_an_event(runs: Path) -> None:
     times = run.dataset["time"].values
     assert times[-1] <= first < times[-1] + 0.1
     assert np.array_equal(run.dataset["quaternion"], whole["quaternion"][: len(times)])
+
+
+def test_a_coin_stops_when_it_lands(runs: Path) -> None:
+    """Thrown up with 4 m/s from 0.2 m it lands at the root of its parabola; the time reached
+    is that of the event, to its last digit, wherever the engine's step ended, and people are told of it.
+    """
+    gravity, up, height = 10.0, 4.0, 0.2
+    coin = config(
+        body='shape = "disk"\nradius = 0.012\nmass = 0.0075',
+        initial=f"angular_velocity = [240, 3, 1]\nposition = [0, 0, {height}]\nvelocity = [0.1, 0, {up}]",
+        loads=f'kind = "uniform_gravity"\nacceleration = [0, 0, {-gravity}]',
+        time="end = 10\nevery = 0.01",
+        more='[[events]]\nname = "landed"\nexpression = "z"\naction = "stop"\n'
+        '[[events]]\nname = "summit"\nexpression = "vz"\n[[events]]\nname = "never"\nexpression = "z - 5"',
+    )
+    run = run_text(coin, runs)
+    landing = (up + math.sqrt(up**2 + 2 * gravity * height)) / gravity
+    found, last = run.summary["time_reached"], run.dataset.time.values[-1]
+    assert found == pytest.approx(landing, abs=4 * 2.0**-52)  # seconds, of some roundings of order 1
+    assert last == 0.84 < found < run.summary["engine_time"]
+    landed, summit = run.dataset["landed_time"].values, run.dataset["summit_time"].values
+    assert run.summary["event_times"] == {
+        "landed": {"first": landed[0], "last": found},
+        "summit": {"first": summit[0], "last": summit[0]},
+    }
+    assert run.summary["message"] == f"the run ended at an event, as asked: landed at {found:.9g} s"
+    printed = Console(width=200, record=True, file=StringIO())
+    print_summary(run.outcome, "here", printed)
+    said = f"landed 1 at {found:.9g} s, summit 1 at {summit[0]:.9g} s, never 0"
+    assert said in printed.export_text()
+
+
+def test_the_time_reached_is_that_of_the_last_sample(runs: Path) -> None:
+    run = run_text(FLIPS.format(samples=11) + FLIP, runs, "time.end=10")
+    assert run.summary["time_reached"] == 10 < run.summary["engine_time"]
+    assert run.summary["event_times"]["flip"]["last"] <= 10
+    stopped = run_text(FLIPS.format(samples=2001) + "[limits]\nmax_steps = 20", runs)
+    assert stopped.summary["time_reached"] == stopped.dataset.time.values[-1]
 
 
 def test_events_read_attitude_position_and_time(runs: Path) -> None:

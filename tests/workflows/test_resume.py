@@ -13,8 +13,9 @@ from support import EAGER, IMPATIENT, cases, config, loaded, same_bits
 
 import rigidsim
 from rigidsim.errors import ConfigError, RunFolderError
+from rigidsim.session.guards import Observer
 from rigidsim.solve import loop
-from rigidsim.store import atomic
+from rigidsim.store import atomic, provenance
 from rigidsim.store.segments import read_chain
 
 # arguments of ``config``, which by default is an asymmetric free body
@@ -339,23 +340,65 @@ def test_a_bad_later_end_leaves_a_finished_run_finished(until: str, says: str, t
     assert {p.name: p.read_bytes() for p in run.folder.path.iterdir()} == before
 
 
+class Told(Observer):
+    """Keeps what it is told of runs in which nothing was left to do."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def nothing_left(self, why: str) -> None:
+        self.said.append(why)
+
+
 # --- what can't be resumed --------------------------------------------------------------------------
 
 
 def test_a_finished_run_has_nothing_left(tmp_path: Path) -> None:
     run = rigidsim.run(rigidsim.parse(text_with("end = 3\nsamples = 7")), out=tmp_path)
-    with pytest.raises(
-        RunFolderError, match=r"nothing is left to do: the run reached its last sample; --until"
-    ):
-        rigidsim.resume(run.folder.path)
+    leftover = run.folder.path / ".dataset.h5.1.partial"
+    leftover.write_text("of a killed process")
+    before = {p.name: p.read_bytes() for p in run.folder.path.iterdir() if p != leftover}
+    told = Told()
+    again = rigidsim.resume(run.folder.path, observer=told)
+    assert again.status == "finished"
+    assert again.summary == run.summary
+    assert told.said == ["the run reached its last sample"]
+    assert {p.name: p.read_bytes() for p in run.folder.path.iterdir()} == before
+
+
+def test_what_a_ctrl_c_left_out_after_the_dataset_is_made_up_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The run is finished then, and a script that resumes until the exit code is 0 comes to an end."""
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    experiment = rigidsim.parse(text_with("end = 3\nsamples = 7"), overrides=["output.timeline=true"])
+    with monkeypatch.context() as patch:
+        patch.setattr("rigidsim.look.timeline.write_timeline", interrupted)
+        run = rigidsim.run(experiment, out=tmp_path)
+    assert run.status == "interrupted"
+    assert run.folder.dataset.exists()
+    content = run.folder.dataset.read_bytes()
+    for _ in range(2):
+        again = rigidsim.resume(run.folder.path)
+        assert (again.status, again.summary["exit_code"]) == ("finished", 0)
+        assert again.summary["message"] == "the run reached its last sample"
+        assert again.summary["timeline_sha256"] == provenance.file_sha256(run.folder.timeline)
+        assert run.folder.dataset.read_bytes() == content
 
 
 def test_a_run_that_broke_down_has_nothing_left(tmp_path: Path) -> None:
     text = text_with("end = 1e6\nsamples = 11", loads='kind = "torque"\ncomponents = ["wx*wx*wx", "0", "0"]')
     run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
     assert run.status in ("stopped: non-finite state", "stopped: step size collapsed")
-    with pytest.raises(RunFolderError, match="nothing is left to do: the st"):
-        rigidsim.resume(run.folder.path)
+    told = Told()
+    again = rigidsim.resume(run.folder.path, observer=told)
+    assert again.summary == run.summary
+    assert again.summary["exit_code"] == 3
+    assert len(told.said) == 1
+    assert told.said[0].startswith("the st")
     with pytest.raises(RunFolderError, match="cannot be prolonged: the st"):
         rigidsim.resume(run.folder.path, until="2e6")
 

@@ -186,6 +186,7 @@ EDITS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "precision": (lambda s: s.update(precision="quadruple"), "precision is 'quadruple', 'double'"),
     "not held": (lambda s: s.update(hold_invariants=False), "hold_invariants is False, True"),
     "events": (lambda s: s["events"].update(flip=3), "events.flip is 3, 0 when run again"),
+    "time reached": (lambda s: s.update(time_reached=7.0), "time_reached is 7.0, 2000.0 when run again"),
     "dataset": (lambda s: s.update(dataset_sha256="0" * 64), "was written for another dataset"),
     "timeline": (lambda s: s.update(timeline_sha256="0" * 64), "timeline.rrd: was damaged or changed"),
 }  # fmt: skip
@@ -221,7 +222,8 @@ def test_an_older_summary_claims_less(complete: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(complete, tmp_path / "run")
 
     def older(summary: dict[str, Any]) -> None:
-        for key in ("timeline_sha256", "hold_invariants", "method", "chart_changes"):
+        summary["time_reached"] = summary.pop("engine_time")  # which is what it meant
+        for key in ("event_times", "timeline_sha256", "hold_invariants", "method", "chart_changes"):
             summary.pop(key)
         for row in summary["invariants"].values():
             row.pop("put_back")

@@ -24,6 +24,8 @@ def resume(
 ) -> None:
     """Go on with an interrupted, killed or guarded run; the result is bit for bit the uninterrupted one.
 
+    On a run that is complete it says so and does nothing: a script can call it until the exit code is 0.
+
     Example: rigidsim resume runs/intermediate_axis
     """
     from rigidsim.cli import progress
