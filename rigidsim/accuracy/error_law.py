@@ -73,7 +73,7 @@ def _beyond_measure(prepared: InitialValueProblem, growth: Growth) -> Growth:
     form, _ = closed_form_if_any(scene, driven=bool(prepared.python_loads))
     if form is None:
         return growth
-    seconds = float(scene.samples.last - scene.samples.start)
+    seconds = float(scene.samples.last - scene.start)
     argument = getattr(form.motion, "argument", None)
     if argument is None:
         return replace(growth, rate=max(growth.rate, growth.passing_rate), window=0.0)

@@ -13,6 +13,7 @@ from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.scene import SampleTimes, Scene, build_scene
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.evaluate import Evaluator
@@ -98,9 +99,8 @@ def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath
     scene = build_scene(replace(experiment, config=changed))
     if times is None:
         return scene
-    exact = [scene.context.mpf(t) for t in times]
-    start = scene.samples.start
-    return replace(scene, samples=SampleTimes(start, exact[-1] - start, 0, exact, len(exact)))
+    exact = [fraction_of(t) for t in times]
+    return replace(scene, samples=SampleTimes.listed(scene.samples.begin, exact, scene.context))
 
 
 def try_setting(
@@ -130,10 +130,10 @@ def try_setting(
     started = time.process_time()
     scene = trial_scene(experiment, setting, times)
     samples, early = scene.samples, 0
-    if samples.times is not None and samples.times[0] > samples.start:
+    if samples.times is not None and samples.times[0] > samples.begin:
         # a motion begins at its first sample, which must be its start
-        early, whole = 1, [samples.start, *samples.times]
-        scene = replace(scene, samples=replace(samples, times=whole, count=len(whole)))
+        early, whole = 1, [samples.begin, *samples.times]
+        scene = replace(scene, samples=SampleTimes.listed(samples.begin, whole, scene.context))
     prepared = prepare_scene(experiment, scene, loads=loads, tolerance=setting.tolerance)
     if compact:
         prepared = compactly(prepared)

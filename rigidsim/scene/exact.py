@@ -37,8 +37,12 @@ class ExactNumber:
 
     def at(self, context: Any) -> Any:
         """The value as an ``mpf`` of the given mpmath context, correct to its precision."""
-        value = context.mpf(self.rational.numerator) / context.mpf(self.rational.denominator)
+        value = rounded(self.rational, context)
         return value * context.pi**self.pi_power if self.pi_power else value
+
+    def fraction(self, context: Any) -> Fraction:
+        """The value itself; of a multiple of pi the nearest number of the context."""
+        return self.rational if self.pi_power == 0 else fraction_of(self.at(context))
 
     def __float__(self) -> float:
         import mpmath
@@ -54,6 +58,18 @@ class ExactNumber:
 
 
 ZERO = ExactNumber(Fraction(0))
+
+
+def rounded(value: Fraction, context: Any) -> Any:
+    """The nearest mpf of an mpmath context."""
+    return context.mpf(value.numerator) / context.mpf(value.denominator)
+
+
+def fraction_of(value: Any) -> Fraction:
+    """A finite mpf of any context, exactly."""
+    sign, mantissa, exponent, _ = value._mpf_
+    whole = -int(mantissa) if sign else int(mantissa)
+    return Fraction(whole << exponent) if exponent >= 0 else Fraction(whole, 1 << -exponent)
 
 
 def _rational(text: str | Decimal) -> Fraction:

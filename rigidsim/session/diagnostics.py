@@ -205,4 +205,4 @@ def largest_spacing(prepared: InitialValueProblem) -> float:
     if samples.times is not None:
         pairs = pairwise(samples.times)
         return max((float(b - a) for a, b in pairs), default=0.0)
-    return float(samples.span / samples.intervals)
+    return float(samples.step)

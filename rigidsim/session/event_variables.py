@@ -32,6 +32,8 @@ def event_variables(
             values, times = evaluator.evaluate_apart(block), block.times
         exponent = prepared.clock.exponent
         values["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]
+        while len(values["time"]) < prepared.clock.part_count:  # found by the engine: no label to be off
+            values["time"].append(np.zeros(len(times)))
         for variable in variables:
             empty = [np.zeros((0, int(np.prod(variable.shape))))] * variable.parts
             extras += _extras(crossing.name, variable, values.get(variable.name, empty), count)

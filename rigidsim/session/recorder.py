@@ -49,8 +49,7 @@ class Recorder(SampleReceiver):
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples."""
         recorded = self._evaluator.evaluate(block)
-        exponent = self._prepared.clock.exponent
-        recorded["time"] = [np.ldexp(part, exponent) for part in self._prepared.precision.parts(block.times)]
+        recorded["time"] = self._prepared.clock.parts(block.first, block.times)
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[drift_name(invariant.name)][0][:, 0])
         for name, values in put_back_by_invariant(self._prepared.projected_scalars, block.put_back).items():

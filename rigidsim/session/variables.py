@@ -33,9 +33,12 @@ def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
 
 
 def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
-    """Time, and what is recorded; each with residuals beyond double precision."""
+    """Time, and what is recorded; each with residuals beyond double precision.
+
+    In single precision time has one too, since its labels are exact to a double.
+    """
     parts = prepared.precision.part_count
-    result = [time_variable(parts)]
+    result = [time_variable(prepared.clock.part_count)]
     for recorded in prepared.system.recorded:
         attributes: dict[str, Any] = {"units": recorded.units, "long_name": recorded.long_name}
         if recorded.frame:

@@ -114,20 +114,23 @@ class Precision:
         """How many float64 numbers hold one of this precision exactly."""
         return max(1, -(-self.bits // 53))
 
-    def parts(self, values: np.ndarray) -> list[np.ndarray]:
+    def parts(self, values: np.ndarray, lead: np.ndarray | None = None) -> list[np.ndarray]:
         """float64 arrays whose sum, smallest first, is exactly ``values``; the first is the nearest double.
 
         Zeros keep their sign (a residual of zero has the sign of its leading part), infinities and nan
         stand in the first part alone.
+
+        Args:
+            lead: the first part, where values halfway between two doubles are known to lie nearer to one.
         """
         if self.bits <= 53:
-            return [values.astype(np.float64)]
+            return [values.astype(np.float64) if lead is None else lead]
         parts: list[np.ndarray] = []
         rest = values
         for n in range(self.part_count):
             # infinities and nan have no residual; numpy would warn of what is set right below
             with np.errstate(invalid="ignore", over="ignore"):
-                part = rest.astype(np.float64)
+                part = rest.astype(np.float64) if n or lead is None else lead
                 parts.append(part)
                 if n + 1 < self.part_count:
                     rest = rest - part.astype(self.scalar)

@@ -1,14 +1,29 @@
-"""Sample times in the run's own precision: ``start + i * span / intervals``, never by adding up."""
+"""Sample times: each the number that the config means, rounded once, never by adding up.
+
+Sample i of a grid lies at the rational number (a + i b) / d, with whole a, b and d. Where these fit the
+significand, one division of two exact numbers is the nearest number to it, and a block of samples costs three
+operations of arrays. Elsewhere a block is summed in numbers of twice the length, and what lies too near the
+middle between two numbers to be told from it (one sample in 2^30) is a division of long integers, as all are
+beyond 80 bits.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
 
+import mpmath
 import numpy as np
+from mpmath.libmp import from_rational, round_nearest
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.exact import fraction_of, rounded
 from rigidsim.scene.scene import SampleTimes
-from rigidsim.solve.precision import Mpf, Precision, Scalar, precision_of
+from rigidsim.solve.precision import Precision, Scalar, precision_of
+
+_BLOCK = 1 << 16
 
 
 class SampleClock:
@@ -16,9 +31,10 @@ class SampleClock:
 
     Attributes:
         start: of the motion, a scalar of the precision: a list of times may begin later.
+        part_count: how many float64 numbers hold a label with what it is off the time of the integration.
 
     Args:
-        samples: where they lie (mpf, seconds).
+        samples: where they lie.
         precision: of the run.
         exponent: binary exponent of the internal unit of time.
 
@@ -29,30 +45,22 @@ class SampleClock:
     def __init__(self, samples: SampleTimes, precision: Precision, exponent: int) -> None:
         self.count = samples.count
         self.exponent = exponent
+        self.part_count = precision.part_count if precision.bits == 53 else max(2, precision.part_count)
         self._precision = precision
-        unit = samples.start.context.mpf(2) ** exponent
-        if samples.times is not None:
-            self._list: np.ndarray | None = precision.array([t / unit for t in samples.times])
-        else:
-            self._list = None
-            wide = _double_or(precision)
-            self._start = wide(samples.start / unit)
-            self._span = wide(samples.span / unit)
-            self._intervals = wide(samples.start.context.mpf(samples.intervals))
-            self._end = wide((samples.start + samples.span) / unit)
-            self._last_index = samples.intervals
-        self.start = precision.number(samples.start / unit) if self._list is not None else self.at(0)
+        self._double = precision_of("double")
+        self._samples = samples
+        self._divisor = math.lcm(samples.begin.denominator, samples.step.denominator)
+        self._first = int(samples.begin * self._divisor)
+        self._step = int(samples.step * self._divisor)
+        self._whole = {kind.bits: self._exact_numbers(kind) for kind in (precision, self._double)}
+        unit = samples.context.mpf(2) ** exponent
+        self._per_second = precision.number(1 / unit)
+        self.start = precision.number(rounded(samples.begin, samples.context) / unit)
         self._refuse_coinciding(samples)
 
     def internal(self, first: int, stop: int) -> np.ndarray:
-        """Times of samples first ... stop-1 in internal units, shape (stop - first,)."""
-        if self._list is not None:
-            return self._list[first:stop]
-        numbers = self._precision.indices(first, stop)
-        times = self._start + (numbers * self._span) / self._intervals
-        if first <= self._last_index < stop:
-            times[self._last_index - first] = self._end
-        return times.astype(self._precision.scalar) if self._precision.narrow else times
+        """Times of samples first ... stop-1 in internal units, shape (stop - first,), in the precision."""
+        return self._seconds(first, stop, self._precision) * self._per_second
 
     def at(self, index: int) -> Scalar:
         """One sample's time in internal units, a scalar of the precision."""
@@ -60,17 +68,94 @@ class SampleClock:
 
     def label(self, index: int) -> float:
         """One sample's time in seconds, as the dataset's coordinate has it."""
-        return self.seconds(self.at(index))
+        return float(self.labels(index, index + 1)[0])
 
     def seconds(self, time: Scalar) -> float:
         """A time in internal units as the nearest double, seconds."""
         alone = np.array([time], dtype=self._precision.scalar)
         return float(np.ldexp(self._precision.parts(alone)[0][0], self.exponent))
 
+    def labels(self, first: int, stop: int) -> np.ndarray:
+        """The double nearest to the time of each sample first ... stop-1, s."""
+        return self._seconds(first, stop, self._double)
+
+    def parts(self, first: int, times: np.ndarray) -> list[np.ndarray]:
+        """Labels of samples from ``first`` on, s, and their residuals: the sum, smallest first, is exactly
+        the time of the integration.
+
+        Args:
+            times: of these samples, as of ``internal``.
+        """
+        exact = times / self._per_second
+        if self._precision.bits == 53:
+            return [exact]
+        parts = self._precision.parts(exact, self.labels(first, first + len(times)))
+        if self._precision.bits < 53:
+            parts.append(exact.astype(np.float64) - parts[0])
+        return parts
+
+    def _seconds(self, first: int, stop: int, precision: Precision) -> np.ndarray:
+        """The number of a precision that is nearest to each time, s."""
+        if precision.bits < 53:
+            return self._narrowed(self._seconds(first, stop, self._double), first, precision)
+        if self._samples.times is None:
+            whole, farthest = self._whole[precision.bits], max(stop - 1, 0)
+            largest = max(self._step * farthest, abs(self._numerator(farthest)))
+            if whole is not None and largest <= 2**precision.bits:
+                return (whole[0] + precision.indices(first, stop) * whole[1]) / whole[2]
+            if precision.cheap and stop - first > 1:
+                blocks = range(first, stop, _BLOCK)
+                return np.concatenate([self._summed(i, min(i + _BLOCK, stop), precision) for i in blocks])
+        return np.array(
+            [_nearest(n, d, precision) for n, d in self._rationals(first, stop)], dtype=precision.scalar
+        )
+
+    def _exact_numbers(self, precision: Precision) -> tuple[Scalar, Scalar, Scalar] | None:
+        """a, b and d; None where one of them doesn't fit the significand."""
+        a, b, d = self._first, self._step, self._divisor
+        if max(abs(a), b, d) > 2**precision.bits:
+            return None
+        return _nearest(a, 1, precision), _nearest(b, 1, precision), _nearest(d, 1, precision)
+
+    def _summed(self, first: int, stop: int, precision: Precision) -> np.ndarray:
+        """As ``_seconds``, of at most ``_BLOCK`` samples of a grid: the first, and multiples of the step."""
+        spare = _BLOCK.bit_length()  # bits of a number that its products with an index take
+        base, base_rest = _in_two(Fraction(self._numerator(first), self._divisor), precision)
+        step, step_rest = _in_two(Fraction(self._step, self._divisor), precision, spare)
+        index = precision.indices(0, stop - first)
+        total, low = _with_error(base, index * step)
+        times, rest = _with_error(total, low + (base_rest + index * step_rest))
+        # left out: the third parts of both numbers, and the roundings of the sum of second parts
+        left_out = 2.0 ** (3 + spare - 2 * precision.bits) * (abs(base) + index[-1] * step)
+        half = np.spacing(np.nextafter(np.abs(times), 0)) / 2
+        for i in np.flatnonzero(~(np.abs(rest) + left_out < half)):
+            times[i] = _nearest(self._numerator(first + int(i)), self._divisor, precision)
+        return times
+
+    def _narrowed(self, doubles: np.ndarray, first: int, precision: Precision) -> np.ndarray:
+        """From doubles that are nearest to numbers to the narrower ones that are."""
+        times = doubles.astype(precision.scalar)
+        # rounded twice is rounded once but where the first ends halfway between two narrow numbers
+        halfway = np.uint64(1) << np.uint64(52 - precision.bits)
+        beyond = doubles.view(np.uint64) & (2 * halfway - np.uint64(1))
+        for i in np.flatnonzero(beyond == halfway):
+            [(n, d)] = self._rationals(first + int(i), first + int(i) + 1)
+            times[i] = _nearest(n, d, precision)
+        return times
+
+    def _numerator(self, index: int) -> int:
+        return self._first + index * self._step
+
+    def _rationals(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
+        if self._samples.times is not None:
+            yield from (time.as_integer_ratio() for time in self._samples.times[first:stop])
+        else:
+            yield from ((self._numerator(i), self._divisor) for i in range(first, stop))
+
     def _refuse_coinciding(self, samples: SampleTimes) -> None:
         """The spacing is resolved worst at the time of largest size."""
         candidates = {0, max(0, self.count - 2)}
-        if self._list is not None:
+        if samples.times is not None:
             candidates = set(range(self.count - 1))
         for i in candidates:
             if i + 1 < self.count:
@@ -87,9 +172,26 @@ class SampleClock:
                     )
 
 
-def _double_or(precision: Precision) -> Callable[[Mpf], Scalar]:
-    """Conversion for grids: single precision computes them in double, since i alone may not fit 24 bits."""
-    if not precision.narrow:
-        return precision.number
+def _in_two(value: Fraction, precision: Precision, spare: int = 0) -> tuple[Scalar, Scalar]:
+    """Two numbers, the first with ``spare`` bits less than the precision, whose sum is close to a value."""
+    parts = []
+    for bits in (precision.bits - spare, precision.bits):
+        part = from_rational(*value.as_integer_ratio(), bits, round_nearest)
+        parts.append(precision.number(mpmath.mp.make_mpf(part)))
+        value -= fraction_of(mpmath.mp.make_mpf(part))
+    return parts[0], parts[1]
 
-    return lambda value: np.float64(precision_of("double").number(value))
+
+def _with_error(a: Any, b: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Sum as rounded, and what rounding took off it (Knuth 1969, section 4.2.2, theorem B)."""
+    total = a + b
+    of_b = total - a
+    return total, (a - (total - of_b)) + (b - of_b)
+
+
+def _nearest(numerator: int, denominator: int, precision: Precision) -> Scalar:
+    """The number of a precision nearest to a quotient, ties to even."""
+    if precision.bits == 53:
+        return numerator / denominator  # as Python divides whole numbers
+    value = from_rational(numerator, denominator, precision.bits, round_nearest)
+    return precision.number(mpmath.mp.make_mpf(value))

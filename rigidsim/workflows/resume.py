@@ -164,15 +164,13 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
     text = experiment.text
     later = parse_saved(text, source=experiment.source, overrides=[f"time.end={until}"])
     if later.config.time.every is None:
-        end = build_scene(later).samples.last
-        ratio = (end - before.start) * before.intervals / before.span
-        count = int(ratio + 0.5)
-        if abs(ratio - count) > ratio * 2.0**-100:
+        intervals = (build_scene(later).samples.exact_last - before.begin) / before.step
+        if intervals.denominator != 1:
             raise RunFolderError(
                 f"--until {until}: lies between two samples of the grid; give a whole number of intervals "
                 "of (end - start) / (samples - 1)"
             )
-        overrides = [f"time.end={until}", f"time.samples={count + 1}"]
+        overrides = [f"time.end={until}", f"time.samples={intervals.numerator + 1}"]
         later = parse_saved(text, source=experiment.source, overrides=overrides)
     after = build_scene(later).samples
     if after.count <= before.count:
@@ -272,8 +270,7 @@ def _same_times(prepared: InitialValueProblem, chain: Chain) -> None:
             saved = file["time"]
             for start in range(0, saved.shape[0], _ROWS_AT_ONCE):
                 times = np.asarray(saved[start : start + _ROWS_AT_ONCE])
-                grid = prepared.precision.parts(prepared.clock.internal(first, first + len(times)))[0]
-                if not np.array_equal(np.ldexp(grid, prepared.clock.exponent), times):
+                if not np.array_equal(prepared.clock.labels(first, first + len(times)), times):
                     raise RunFolderError(
                         "--until: the longer grid's first sample times differ from those saved by a "
                         "rounding; choose an end that is a multiple of the old one, or [time] every"
