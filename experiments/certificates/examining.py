@@ -20,7 +20,7 @@ from rigidsim.accuracy.reference import references
 from rigidsim.accuracy.setting import Setting, setting_of
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.errors import ConfigError
-from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.scene.config import Experiment, parse
 from rigidsim.scene.scene import build_scene
 
 _MOST_ROWS = 400
@@ -118,7 +118,7 @@ def _judged(scene: RandomScene, experiment: Experiment, run: rigidsim.Run, outco
     accuracy, spent = summary["accuracy"], summary["cost"]
     with run.dataset as dataset:
         samples = dataset.sizes["time"]
-        setting = setting_of(parse_saved(dataset.attrs["config"], source=outcome.kind))
+        setting = setting_of(parse(dataset.attrs["config"], source=outcome.kind))
         kinds = {r.how: r.kind for r in references(setting, motion_of(experiment), scene.accuracy)}
         reference = truth_setting(experiment, setting, scene, kinds.get(accuracy["how"]))
         most = _WIDE_ROWS if reference.method == "closed_form" else _MOST_ROWS

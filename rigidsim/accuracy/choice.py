@@ -21,7 +21,7 @@ from rigidsim.accuracy.setting import Setting, epsilon, setting_of
 from rigidsim.accuracy.trial import Told
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
-from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.scene.config import Experiment
 from rigidsim.scene.schema import LARGEST_DIGITS
 
 _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
@@ -87,8 +87,8 @@ def chosen(
     """The experiment with the settings that its ``accuracy`` asks for written into it.
 
     Keys that the config gives stay as they are; where it gives precision, tolerance and method, nothing is
-    chosen and the run is only certified. The text says what was chosen in ``#:set`` lines, so that it
-    means the same run again.
+    chosen and the run is only certified. The text has what was chosen in its keys, so that it means the
+    same run again.
 
     Args:
         loads: given from Python.
@@ -107,7 +107,7 @@ def chosen(
     except ConfigError as error:
         raise error.at(experiment.source) from None
     keys = choice.setting.overrides(without=integrator.model_fields_set)
-    return parse_saved(experiment.text, source=experiment.source, overrides=keys), choice
+    return experiment.having(keys), choice
 
 
 def choose(

@@ -42,6 +42,8 @@ def root_attributes(
         status=Status.RUNNING.value,
         config=prepared.experiment.text,
         config_sha256=prepared.experiment.sha256,
+        config_given=prepared.experiment.given,
+        config_set="\n".join(prepared.experiment.settings),
         formulation=system.requirements.formulation,
         euler_sequence=system.sequence,
         euler_partner_sequence="" if system.partner is None else system.partner.sequence,

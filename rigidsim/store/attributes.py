@@ -26,6 +26,10 @@ class RootAttributes(BaseModel):
     """Root attributes; those that are None, as some of older versions and of segments are, don't stand there.
 
     Attributes:
+        config: the TOML text of what was run, one visible value per key; its digest is config_sha256.
+        config_given: the text as it was given, before settings replaced values in it; older files have none,
+            and keep settings in ``#:set`` comments at the end of config.
+        config_set: the settings (KEY=VALUE), one a line.
         run_id: tells this run from all others.
         states: names, in order.
         tolerance: effective.
@@ -49,6 +53,8 @@ class RootAttributes(BaseModel):
     status: Annotated[str, Use.SETTING]
     config: str
     config_sha256: Annotated[str, Use.REPEATED]
+    config_given: str | None = None
+    config_set: str | None = None
     formulation: Annotated[str, Use.SYSTEM, Use.SETTING]
     euler_sequence: Annotated[str, Use.SYSTEM]
     euler_partner_sequence: str | None = None

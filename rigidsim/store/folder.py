@@ -27,7 +27,7 @@ class RunFolder:
 
     @property
     def config(self) -> Path:
-        """The config as given."""
+        """What is run, in one visible value per key."""
         return self.path / "config.toml"
 
     @property

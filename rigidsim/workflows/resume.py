@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.errors import RunFolderError
-from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.scene.config import Experiment, has_earlier_settings, parse, parse_earlier
+from rigidsim.scene.overrides import assignments
 from rigidsim.session.attributes import root_attributes as attributes_now
 from rigidsim.session.completion import with_timeline
 from rigidsim.session.guards import Observer
@@ -28,7 +29,7 @@ from rigidsim.store.segments import Chain, read_chain, root_attributes
 from rigidsim.store.summary import Caution, Summary, WarningCode
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.certify import certified
-from rigidsim.workflows.verify import text_difference
+from rigidsim.workflows.verify import embedded, text_difference
 
 if TYPE_CHECKING:
     from rigidsim.model.load import Load
@@ -83,6 +84,8 @@ def resume(
         if lost and folder.read_summary().dataset_digest is not None:
             raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with --force")
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
+        if chain.paths:
+            experiment = _continued(experiment, chain.paths[-1])
         prepared = prepare(experiment, loads=loads)
         if chain.paths:
             session.mixed = _compared(prepared, chain)
@@ -91,7 +94,7 @@ def resume(
             chain = read_chain(folder.segments)
         if chain.damage is not None:
             session.remarks.append(_set_aside(chain, folder))
-        if until is not None:
+        if folder.config.read_text(encoding="utf-8") != experiment.text:
             atomic.write_bytes(folder.config, experiment.text.encode())
         if not chain.paths:
             text = "nothing had been saved, so the run began anew"
@@ -142,15 +145,26 @@ def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
         text = folder.config.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RunFolderError(f"{folder.config}: can't be read ({error})") from None
-    return parse_saved(text, source=str(folder.config))
+    finished = folder.dataset.exists() and not folder.segments.exists()
+    first = folder.dataset if finished else min(folder.segments.glob("*.h5"), default=None)
+    try:
+        earlier = first is not None and "config_given" not in root_attributes(first)
+    except RunFolderError:
+        first, earlier = None, False
+    if first is None and has_earlier_settings(text):
+        raise RunFolderError(
+            f"{folder.config}: ends with #:set comments, in which an earlier version kept what --set had "
+            "replaced, and nothing was saved that says so; write the values into their tables, remove the "
+            "comments, and run it again with --force"
+        )
+    return (parse_earlier if earlier else parse)(text, source=str(folder.config))
 
 
 def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
     """The same experiment, and text, under other guards."""
     if not overrides:
         return experiment
-    guarded = parse_saved(experiment.text, source=experiment.source, overrides=overrides)
-    limits = guarded.config.limits
+    limits = experiment.having(overrides).config.limits
     return replace(experiment, config=experiment.config.model_copy(update={"limits": limits}))
 
 
@@ -161,8 +175,7 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
     before = build_scene(experiment).samples
     if before.times is not None:
         raise RunFolderError("--until: this run has a list of sample times, which no later end prolongs")
-    text = experiment.text
-    later = parse_saved(text, source=experiment.source, overrides=[f"time.end={until}"])
+    later = experiment.having([f"time.end={until}"])
     if later.config.time.every is None:
         intervals = (build_scene(later).samples.exact_last - before.begin) / before.step
         if intervals.denominator != 1:
@@ -170,8 +183,7 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
                 f"--until {until}: lies between two samples of the grid; give a whole number of intervals "
                 "of (end - start) / (samples - 1)"
             )
-        overrides = [f"time.end={until}", f"time.samples={intervals.numerator + 1}"]
-        later = parse_saved(text, source=experiment.source, overrides=overrides)
+        later = experiment.having([f"time.end={until}", f"time.samples={intervals.numerator + 1}"])
     after = build_scene(later).samples
     if after.count <= before.count:
         raise RunFolderError(f"--until {until}: no later than the run's end, or before its next sample")
@@ -215,6 +227,34 @@ def _set_aside(chain: Chain, folder: RunFolder) -> Caution:
     )
 
 
+def _continued(experiment: Experiment, last: Path) -> Experiment:
+    """The experiment with what was given when the run began, and the later end that it has since.
+
+    Raises:
+        RunFolderError: it is another experiment than the last saved file's.
+    """
+    begun = embedded(last)
+    ends: list[str] = []
+    if experiment.text != begun.text:
+        ends = assignments(experiment.text, ["time.end", "time.samples"])
+        if not ends or not _prolongs(experiment, begun, ends):
+            raise RunFolderError(
+                f"{experiment.source}: was changed since the run began "
+                f"({text_difference(experiment.text, begun.text)}); "
+                "put it back (the segments hold it as their attribute config), or begin a new run"
+            )
+    return replace(experiment, given=begun.given, settings=(*begun.settings, *ends))
+
+
+def _prolongs(experiment: Experiment, begun: Experiment, ends: Sequence[str]) -> bool:
+    """Whether it is the experiment that was begun, but for a later end."""
+    from rigidsim.scene.scene import build_scene
+
+    if begun.having(ends).text != experiment.text:
+        return False
+    return build_scene(experiment).samples.count > build_scene(begun).samples.count
+
+
 def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
     """What differs from the run's beginning in versions or machine; empty where nothing does.
 
@@ -223,13 +263,6 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
     """
     last = chain.paths[-1]
     saved = read_attributes(last)
-    begun, text = saved.config, prepared.experiment.text
-    if not _prolongs(text, begun):
-        raise RunFolderError(
-            f"{prepared.experiment.source}: was changed since the run began "
-            f"({text_difference(text, begun)}); "
-            "put it back (the segments hold it as their attribute config), or begin a new run"
-        )
     version, oldest = saved.schema_version, 3 if prepared.holds_invariants else 2
     if not oldest <= version <= SCHEMA_VERSION:
         raise RunFolderError(
@@ -248,18 +281,6 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
     _same_times(prepared, chain)
     differing = [f"{name} {then} -> {value}" for name, then, value in saved.changed(Use.PLATFORM, now)]
     return "; ".join([x for x in [saved.mixed_provenance, *differing] if x])
-
-
-_PROLONGING = ("#:set time.end=", "#:set time.samples=")
-
-
-def _prolongs(text: str, begun: str) -> bool:
-    """Whether a config is the one that a run was begun with, up to a later end."""
-    begun = begun.rstrip("\n")
-    added = text[len(begun) :]
-    if not text.startswith(begun) or (added and not added.startswith("\n")):
-        return False
-    return all(line.startswith(_PROLONGING) for line in added.splitlines() if line)
 
 
 def _same_times(prepared: InitialValueProblem, chain: Chain) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RunFolderError
-from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.scene.config import Experiment, parse, parse_earlier
 from rigidsim.session.guards import Observer
 from rigidsim.store import netcdf, provenance
 from rigidsim.store.attributes import Use, read_attributes
@@ -111,7 +111,7 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         plain = experiment.config.integrator.model_copy(update={"accuracy": None})
         replaced = {"output": quiet, "limits": unguarded, "integrator": plain}
         config = experiment.config.model_copy(update=replaced)
-        again = run(Experiment(experiment.text, config, experiment.source), out=scratch, observer=observer)
+        again = run(replace(experiment, config=config), out=scratch, observer=observer)
         if not again.folder.dataset.exists():
             raise RunFolderError(f"{dataset}: the second run {again.outcome.message}; nothing was compared")
         differing, first, samples = _compare(dataset, again.folder.dataset, saved.schema_version)
@@ -148,10 +148,15 @@ def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
         RunFolderError: it is no dataset of rigidsim.
         ConfigError: the config in it isn't one.
     """
-    text = root_attributes(dataset).get("config")
+    found = root_attributes(dataset)
+    text, given, settings = (found.get(name) for name in ("config", "config_given", "config_set"))
     if not isinstance(text, str):
         raise RunFolderError(f"{dataset}: embeds no config; it is no dataset of rigidsim")
-    return parse_saved(text, source=f"{dataset} (embedded config)", overrides=overrides)
+    source = f"{dataset} (embedded config)"
+    if not isinstance(given, str) or not isinstance(settings, str):
+        return parse_earlier(text, source=source, overrides=overrides)
+    experiment = parse(text, source=source, overrides=overrides)
+    return replace(experiment, given=given, settings=(*settings.splitlines(), *experiment.settings))
 
 
 def _dataset(path: Path) -> tuple[Path, RunFolder | None]:

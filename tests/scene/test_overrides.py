@@ -1,13 +1,16 @@
-"""``--set KEY=VALUE``: the same config as if it had been written so, and one that a file carries along."""
+"""``--set KEY=VALUE``: the same config as if it had been written so, and a text that says so."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rigidsim.errors import ConfigError
-from rigidsim.scene.config import load, parse
+from rigidsim.scene.config import load, parse, parse_earlier
+from rigidsim.scene.overrides import apply_overrides, written
+from rigidsim.scene.toml_text import parse_toml
 
 BASE = """\
 name = "base"
@@ -54,6 +57,88 @@ def test_an_override_is_the_edit(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", EDITS)
+def test_what_is_run_stands_in_its_text(case: str) -> None:
+    """One value per key, where the key stands; the text and the settings as given are known beside it."""
+    override = EDITS[case][0]
+    experiment = parse(BASE, overrides=[override])
+    assert parse(experiment.text).config == experiment.config
+    assert experiment.given == BASE
+    assert experiment.settings == (override.strip(),)
+    changed = [line for line in BASE.splitlines() if line not in experiment.text.splitlines()]
+    assert len(changed) <= 1
+
+
+def test_comments_and_order_stay() -> None:
+    text = BASE.replace("end = 10", "end  =  10   # as long as it takes\n# and no longer")
+    text = text.replace("[1, 2, 2.5]", "[1, # small\n  2, # middle\n  2.5, # large\n]")
+    experiment = parse(text, overrides=["time.end=7 h", "body.principal_moments[1]=2.25"])
+    expected = text.replace("end  =  10 ", 'end  =  "7 h" ').replace("  2, # middle", "  2.25, # middle")
+    assert experiment.text == expected
+
+
+TABLES = {
+    "out of order": BASE + "[body.more]\n",
+    "inline": BASE.replace("[time]\nend = 10", "time = {end = 10, samples = 5}").replace("[body]", "[[x]]"),
+    "dotted": 'time.end = 10\nname = "a"\n[body]\nmass = 1\n',
+    "empty": "",
+    "no line end": "[time]\nend = 10",
+    "array of tables": '[[loads]]\nkind = "a"\n\n# two\n[[loads]]\nkind = "b"\n[time]\nend = 1\n',
+}
+SETTINGS = [
+    "time.end=20",
+    "time.start=-0.10",
+    "limits.max_steps=1_000",
+    "body.mass=1e-3",
+    "name=b c",
+    'x={a="b"}',
+    "time.end = 3 # s",
+]
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.parametrize("case", TABLES)
+def test_a_value_is_written_into_any_layout(case: str, setting: str) -> None:
+    table = parse_toml(TABLES[case], "")
+    apply_overrides(table, [setting])
+    assert parse_toml(written(TABLES[case], [setting], table, ""), "") == table
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        BASE + "#:set time.end=20\n",
+        "#:set time.end=20\n" + BASE,
+        BASE.replace('"base"', '"base"\ndescription = """\n#:set time.end=20\n"""'),
+    ],
+)
+def test_no_comment_is_executed(text: str, tmp_path: Path) -> None:
+    """Nor a line of a string that looks like one which an earlier version wrote."""
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    for experiment in (parse(text), load(path), load(path, overrides=["time.start=1"])):
+        assert experiment.config.time.end is not None
+        assert experiment.config.time.end.rational == 10
+        assert "#:set time.end=20" in experiment.text
+
+
+def test_an_edited_copy_runs_what_it_says(tmp_path: Path) -> None:
+    path = tmp_path / "config.toml"
+    path.write_text(parse(BASE, overrides=["time.end=30 yr"]).text, encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace("30 yr", "1 yr"), encoding="utf-8")
+    assert load(path).config.time.end.rational == 31557600
+
+
+@pytest.mark.parametrize("case", EDITS)
+def test_what_earlier_versions_wrote_keeps_its_meaning(case: str) -> None:
+    override, _ = EDITS[case]
+    earlier = f"{BASE}#:set description=x\n#:set {override.strip()}\n"
+    expected = parse(BASE, overrides=["description=x", override])
+    assert parse_earlier(earlier, source="") == replace(expected, source="")
+    inside = BASE.replace('"base"', '"base"\ndescription = """\n#:set time.end=20\n"""')
+    assert parse_earlier(inside, source="").config.time.end.rational == 10
+
+
+@pytest.mark.parametrize("case", EDITS)
 def test_a_written_config_means_the_same_again(tmp_path: Path, case: str) -> None:
     first = parse(BASE, overrides=[EDITS[case][0]])
     path = tmp_path / "config.toml"
@@ -83,7 +168,9 @@ def test_without_overrides_the_text_is_as_given(tmp_path: Path) -> None:
 
 def test_digits_survive_an_override() -> None:
     digits = "1.234567890123456789012345678901234567891"
-    assert parse(BASE, overrides=[f"time.end={digits}"]).config == parse(BASE.replace("10", digits)).config
+    experiment = parse(BASE, overrides=[f"time.end={digits}"])
+    assert experiment.config == parse(BASE.replace("10", digits)).config
+    assert f"end = {digits}\n" in experiment.text
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ import numpy as np
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import trial_scene, try_setting
 from rigidsim.errors import ConfigError, RigidsimError
-from rigidsim.scene.config import Experiment, parse_saved
+from rigidsim.scene.config import Experiment, parse
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import prepare_scene
@@ -157,7 +157,7 @@ def _per_unit(one_pass: Callable[[int], bool], count: int, most: int, patience: 
 def work(stdin: TextIO, stdout: TextIO) -> None:
     """Do the tasks given on stdin, answering on stdout."""
     given = json.load(stdin)
-    experiment = parse_saved(given["text"], source=given["source"])
+    experiment = parse(given["text"], source=given["source"])
     for index, table in enumerate(given["tasks"]):
         task = task_of(table)
         answer: dict[str, Any] = {"index": index}

@@ -1,0 +1,121 @@
+"""``--set KEY=VALUE``: values replaced in a config's tables, and where they stand in its text."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.toml_text import DEEP_KEY, DEEPEST_KEY, decimal, parse_toml
+
+_MOST_OVERRIDES = 1000
+
+
+def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> None:
+    """Replace values of a config's tables, in order.
+
+    Args:
+        overrides: each a dotted key with optional [index], an equals sign and a TOML value (what is none,
+            such as a bare word or a number with its unit, is a string).
+
+    Raises:
+        ConfigError: one can't be applied.
+    """
+    if len(overrides) > _MOST_OVERRIDES:
+        what = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
+        raise ConfigError(Problem("--set", what))
+    for assignment in overrides:
+        key, value_text = _parts(assignment)
+        try:
+            value = tomllib.loads(f"value = {value_text}", parse_float=decimal)["value"]
+        except (ValueError, RecursionError):
+            value = value_text
+        _assign(table, key, value, assignment)
+
+
+def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str) -> str:
+    """A config's text with values replaced where they stand, in the digits given; comments and order stay.
+
+    Args:
+        meant: the tables that the result must have.
+
+    Raises:
+        ConfigError: it can't be written so.
+    """
+    import tomlkit  # 25 ms that only configs with something to replace pay for
+    from tomlkit.exceptions import TOMLKitError
+
+    try:
+        document = tomlkit.parse(text)
+        for assignment in overrides:
+            key, value_text = _parts(assignment)
+            try:
+                value: Any = tomlkit.parse(f"value = {value_text}\n").item("value")
+            except (ValueError, RecursionError):
+                value = tomlkit.string(value_text)
+            _assign(document, key, value, assignment)
+        result = document.as_string()
+        if parse_toml(result, source) == meant:
+            return result
+    except (TOMLKitError, ConfigError, ValueError, TypeError, RecursionError):
+        pass  # a text that the other reader takes and this one doesn't: none is known
+    what = "can't be written into this text; edit the file instead"
+    raise ConfigError(Problem(f"--set {overrides[-1][:60]}", what), source)
+
+
+def assignments(text: str, keys: Sequence[str]) -> list[str]:
+    """``KEY=VALUE`` texts of those of some keys (``table.key``) that a config has, in its own digits."""
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    found = []
+    for key in keys:
+        table, _, name = key.partition(".")
+        if name in document.get(table, {}):
+            found.append(f"{key}={document[table][name].as_string()}")
+    return found
+
+
+def _parts(assignment: str) -> tuple[str, str]:
+    key, equals, value_text = assignment.partition("=")
+    where = f"--set {assignment[:60]}"
+    if not equals or not key.strip() or "\n" in assignment:
+        raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
+    if DEEP_KEY.search(assignment):
+        raise ConfigError(Problem(where, f"a key of more than {DEEPEST_KEY} parts"))
+    return key.strip(), value_text.strip()
+
+
+def _assign(table: dict[str, Any], key: str, value: Any, assignment: str) -> None:
+    where = f"--set {assignment[:60]}"
+    steps: list[str | int] = []
+    for part in key.split("."):
+        match = re.fullmatch(r"([^\[\]]+)((?:\[\d{1,9}\])*)", part.strip())
+        if match is None:
+            raise ConfigError(
+                Problem(
+                    where, f'"{part}" is not a key, or a key with an index counted from 0, such as times[0]'
+                )
+            )
+        steps.append(match[1])
+        steps.extend(int(index) for index in re.findall(r"\d+", match[2]))
+    target: Any = table
+    for step, following in pairwise(steps):
+        if isinstance(target, dict) and isinstance(step, str):
+            if step not in target:
+                target[step] = [] if isinstance(following, int) else {}
+            target = target[step]
+        elif isinstance(target, list) and isinstance(step, int) and 0 <= step < len(target):
+            target = target[step]
+        else:
+            raise ConfigError(Problem(where, f'there is nothing at "{step}" to set'))
+    last = steps[-1]
+    try:
+        if isinstance(target, list) == isinstance(last, str):
+            raise TypeError
+        target[last] = value
+    except (TypeError, IndexError):
+        raise ConfigError(Problem(where, f'there is nothing at "{last}" to set')) from None

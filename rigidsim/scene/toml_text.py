@@ -1,0 +1,71 @@
+"""Reading TOML with every digit as it was written, and within bounds of time and memory."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene import validation_messages as messages
+
+# The TOML reader's time and memory grow with the square of a dotted key's length. (Runs of keys, quoted or
+# bare, joined by points; the look-behind lets the search pass over each run once.)
+DEEPEST_KEY = 100
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+DEEP_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST_KEY}}}")
+
+
+def decimal(text: str) -> Decimal:
+    """A number of a TOML text.
+
+    Raises:
+        ValueError: out of range.
+    """
+    try:
+        return Decimal(text.replace("_", ""))
+    except InvalidOperation:  # an exponent past what Decimal itself holds
+        raise ValueError(f"the number {text[:40]} is out of range") from None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The tables of a TOML text, decimals kept as written.
+
+    Raises:
+        ConfigError: not TOML; the message has the line and column.
+    """
+    deep = DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start()) + 1
+        what = f"can't be read: a key of more than {DEEPEST_KEY} parts (at line {line})"
+        raise ConfigError(Problem("TOML", what), source)
+    try:
+        return tomllib.loads(text, parse_float=decimal)
+    except RecursionError:
+        raise ConfigError(Problem("TOML", "can't be read: nested too deeply"), source) from None
+    except ValueError as error:
+        text = re.sub(r"\(('[^()]*'),?\)", _dotted, str(error))
+        raise ConfigError(Problem("TOML", f"can't be read: {text}"), source) from None
+
+
+def long_integers(table: dict[str, Any]) -> list[Problem]:
+    """Whole numbers too long to be shown; TOML has no limit for hexadecimal ones."""
+    problems = []
+    waiting: list[tuple[tuple[str | int, ...], Any]] = [((), table)]
+    while waiting:
+        path, node = waiting.pop()
+        if isinstance(node, dict):
+            waiting += [((*path, key), child) for key, child in node.items()]
+        elif isinstance(node, list):
+            waiting += [((*path, index), child) for index, child in enumerate(node)]
+        elif isinstance(node, int) and node.bit_length() > messages.LONGEST_INTEGER:
+            most = messages.LONGEST_INTEGER
+            what = f"given {messages.shown(node)}; whole numbers of at most {most} bits are allowed"
+            problems.append(Problem(messages.key_path(path), what))
+    return problems
+
+
+def _dotted(key: re.Match[str]) -> str:
+    """tomllib shows a key as a Python tuple; the user wrote a dotted key."""
+    return '"' + key[1].strip("'").replace("', '", ".") + '"'
