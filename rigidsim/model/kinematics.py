@@ -88,20 +88,25 @@ class Kinematics:
         """w . I w / 2."""
         return 0.5 * hy.sum([w * m for w, m in zip(self.rates, self.momentum_body, strict=True)])
 
+    @property
+    def marked(self) -> Vector | None:
+        """A vector in body axes that a uniform field pulls at (mpf); None without one."""
+        return self.numbers.arm
+
     @cached_property
     def symmetry_direction(self) -> Vector | None:
         """Unit axis about which the tensor is symmetric, body axes (mpf).
 
-        None for an asymmetric body, and for a sphere without a weight to mark an axis.
+        None for an asymmetric body, and for a sphere on which nothing marks an axis.
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
         tiny = max(moments) * negligible(context)
-        if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere: gravity marks its axis
-            if self.numbers.arm is None:
+        if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere
+            if self.marked is None:
                 return None
-            length = context.sqrt(dot(self.numbers.arm, self.numbers.arm))
-            return [a / length for a in self.numbers.arm]
+            length = context.sqrt(dot(self.marked, self.marked))
+            return [a / length for a in self.marked]
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             if abs(moments[j] - moments[k]) <= tiny:

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import heyoka as hy
+
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
@@ -67,7 +69,32 @@ class Load(SceneLoad):
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
         """Whether it has no torque about a symmetry axis of the body (mpf, body axes)."""
-        return False
+        context = m.scene.context
+        tiny = negligible(context)
+        return all(
+            abs(dot(vector, axis)) <= tiny * norm(context, vector)
+            for vector, expression in self.torque(m)
+            if expression != hy.expression(0.0)
+        )
+
+    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether it may have a torque about a unit axis in space (mpf). Not asked where ``linear_potential``
+        or ``fixed_source`` say more.
+        """
+        up = m.numbers.up
+        return self.about_vertical or up is None or norm(m.scene.context, cross(up, axis)) != 0
+
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        """Vectors a in body and f in space axes (mpf, SI) of a torque a x R^T f, potential -a . R^T f."""
+        return None
+
+    def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
+        """3 G M / R^3 (mpf, 1/s^2) and unit vector (space axes) of a source that rests in space."""
+        return None
+
+    def damping(self) -> Vector | None:
+        """Coefficients c_i (mpf, kg m^2/s) of a torque -c_i w_i about the body axes, where it is one."""
+        return None
 
     def narrow(self, m: Kinematics) -> list[Symbolic]:
         """Dimensionless expressions of ``seconds(m)`` and the states around whose zeros the load changes all

@@ -10,7 +10,7 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.two_part import as_factor
+from rigidsim.scene.arithmetic import Vector
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,18 @@ class Mechanics(Kinematics):
     loads: list[Load] = field(default_factory=list)
 
     @cached_property
+    def _torques(self) -> list[list[Term]]:
+        return [load.torque(self) for load in self.loads]
+
+    @cached_property
     def torque(self) -> list[Term]:
         """Of all loads, body axes, internal units of energy."""
-        return [term for load in self.loads for term in load.torque(self)]
+        return [term for terms in self._torques for term in terms]
+
+    @cached_property
+    def turning(self) -> list[Load]:
+        """The loads that have a torque."""
+        return [load for load, terms in zip(self.loads, self._torques, strict=True) if terms]
 
     @cached_property
     def force(self) -> list[Term]:
@@ -74,35 +83,15 @@ class Mechanics(Kinematics):
         return hy.sum(terms)
 
     @property
+    def marked(self) -> Vector | None:
+        """See ``Kinematics``: towards the centre of mass of a heavy body, or a dipole of another."""
+        pulled = [load.linear_potential(self.scene) for load in self.loads]
+        return self.numbers.arm or next((found[0] for found in pulled if found is not None), None)
+
+    @property
     def keeps_axial(self) -> bool:
         """Whether the angular momentum along the symmetry axis is conserved."""
         axis = self.symmetry_direction
         if axis is None:
             return False
-        return all(load.keeps_axial(self, axis) or not load.torque(self) for load in self.loads)
-
-    @cached_property
-    def jacobi(self) -> Symbolic | None:
-        """Jacobi's constant H = w . I w / 2 - n o . I w + U of the only load, whose potential U rests in a
-        frame that turns with a circular orbit in a fixed plane (o its normal, n the mean motion).
-        """
-        orbit = self.loads[0].corotating_orbit if len(self.loads) == 1 else None
-        if orbit is None:
-            return None
-        load = self.loads[0]
-        context = self.scene.context
-        motion = context.ldexp(orbit.mean_motion, self.scaling.time)
-        if self.attitude is not None and self.attitude.orbital is not None:
-            factor = as_factor(self.number(motion))
-            normal_body = self.attitude.orbital.normal
-            carried = [factor * (o * x) for o, x in zip(normal_body, self.momentum_body, strict=True)]
-        else:
-            sin_i, cos_i = context.sin(orbit.inclination), context.cos(orbit.inclination)
-            normal = [
-                sin_i * context.sin(orbit.ascending_node),
-                -sin_i * context.cos(orbit.ascending_node),
-                cos_i,
-            ]
-            pairs = zip(normal, self.momentum_space, strict=True)
-            carried = [self.number(motion * o) * x for o, x in pairs if o != 0]
-        return self.rotational_energy - hy.sum(carried) + load.potential(self)
+        return all(load.keeps_axial(self, axis) for load in self.turning)

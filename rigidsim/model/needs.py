@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from rigidsim.model import central_forces, fixed_axes
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotating_frame import rotating_orbit
+from rigidsim.scene.arithmetic import negligible
 from rigidsim.scene.scene import Scene
 
 
@@ -40,9 +43,9 @@ class Need:
 
 def work_is_needed(m: Mechanics) -> bool:
     """Whether the energy balance is checked by integrating power: where energy isn't conserved and Jacobi's
-    constant doesn't stand in for it.
+    constant of a single load doesn't stand in for it.
     """
-    has_jacobi = m.attitude is not None and m.jacobi is not None
+    has_jacobi = m.attitude is not None and len(m.loads) == 1 and m.loads[0].corotating_orbit is not None
     return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
 
 
@@ -74,6 +77,24 @@ def _no_vertical(scene: Scene, formulation: str) -> str | None:
     return "the scene has no load that marks a vertical; record angular_momentum instead"
 
 
+def _free_axis(which: int) -> Need:
+    return Need(lambda m: m.attitude is not None and fixed_axes.free_axis(m, which) is not None)
+
+
+def _isotropic_damping(m: Mechanics) -> bool:
+    """Whether each load with a torque damps, all together in proportion to the inertia tensor, and the body
+    turns.
+    """
+    found = [load.damping() for load in m.turning]
+    if not found or any(c is None for c in found) or all(w == 0 for w in m.scene.angular_velocity):
+        return False
+    total = [sum((c[i] for c in found if c is not None), m.scene.context.zero) for i in range(3)]
+    inertia, k = m.scene.body.inertia, max(range(3), key=lambda i: m.scene.body.inertia[i][i])
+    wanted = [[total[k] / inertia[k][k] * x for x in row] for row in inertia]
+    differences = [(total[i] if i == j else 0) - wanted[i][j] for i in range(3) for j in range(3)]
+    return all(abs(d) <= total[k] * negligible(m.scene.context) for d in differences)
+
+
 NEEDS: dict[str, Need] = {
     "attitude": Need(lambda m: m.attitude is not None, lambda _: "attitude", _no_attitude),
     "flight": Need(lambda m: m.velocity is not None, lambda _: "flight", _no_position),
@@ -82,9 +103,19 @@ NEEDS: dict[str, Need] = {
     "energy": Need(_has_energy, _flight_of_a_free_body),
     "symmetry": Need(lambda m: m.symmetry_direction is not None),
     "work": Need(work_is_needed),
-    "jacobi": Need(lambda m: m.attitude is not None and m.jacobi is not None),
+    "jacobi": Need(lambda m: m.attitude is not None and rotating_orbit(m) is not None),
     "kovalevskaya": Need(lambda m: kovalevskaya_top(m) is not None),
     "goryachev_chaplygin": Need(lambda m: goryachev_chaplygin_top(m) is not None),
+    "source_axis": Need(lambda m: m.attitude is not None and fixed_axes.kept_source_axis(m) is not None),
+    "field_axis": Need(lambda m: m.attitude is not None and fixed_axes.kept_field_axis(m) is not None),
+    **{f"free_axis_{name}": _free_axis(i) for i, name in enumerate("xyz")},
+    "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
+    "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
+    "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),
+    "attracting_line": Need(
+        lambda m: m.velocity is not None and m.attitude is not None and central_forces.line(m) is not None
+    ),
+    "free_fall": Need(lambda m: m.velocity is not None and central_forces.falls_freely(m)),
     "attractor": Need(
         lambda m: m.velocity is not None and any(x.attracting_point is not None for x in m.loads)
     ),

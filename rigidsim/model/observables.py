@@ -12,7 +12,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model import first_integrals, rotations
+from rigidsim.model import central_forces, first_integrals, fixed_axes, rotations
 from rigidsim.model.drift_scales import (
     attracting_point,
     energy_scale,
@@ -23,6 +23,7 @@ from rigidsim.model.drift_scales import (
 )
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import NEEDS
+from rigidsim.model.rotating_frame import jacobi_constant
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.registry import register_observable
 
@@ -104,16 +105,25 @@ def _conservative(m: Mechanics) -> str | None:
 
 
 def _vertical_only(m: Mechanics) -> str | None:
-    others = [load for load in m.loads if load.about_vertical and load.torque(m)]
-    return None if others else "gravity has no torque about the vertical"
+    if not fixed_axes.keeps(m, m.carried(m.numbers.up)):
+        return None
+    alone = len(m.turning) == 1
+    return f"{'gravity has' if alone else 'the loads have'} no torque about the vertical"
+
+
+def _rests_in_orbit(m: Mechanics) -> str:
+    if len(m.turning) == 1:
+        return "the only load is a gravity gradient on a circular orbit"
+    return "all potentials rest in the frame that turns with a circular orbit"
 
 
 def _central(m: Mechanics) -> str | None:
-    alone = len(m.loads) == 1 and m.loads[0].attracting_point is not None
-    return "the only load is a central force" if alone else None
+    if not central_forces.one_point(m):
+        return None
+    return "the only load is a central force" if len(m.loads) == 1 else "all loads are forces to one point"
 
 
-def _total_momentum(m: Mechanics) -> list[Symbolic]:
+def total_momentum(m: Mechanics) -> list[Symbolic]:
     """M r x v + R I w about the (first) attracting point."""
     context, scaling = m.scene.context, m.scaling
     offset = []
@@ -163,24 +173,27 @@ def _euler(m: Mechanics) -> list[Symbolic]:
     return rotations.euler_from_matrix(sequence, m.matrix)
 
 
-def _linear_momentum(m: Mechanics) -> list[Symbolic]:
+def linear_momentum(m: Mechanics) -> list[Symbolic]:
+    """M v, in units of speed times 2^``mass_exponent``."""
     assert m.velocity is not None
     context = m.scene.context
-    mass = context.ldexp(m.scene.body.mass, -_mass_exponent(m))
+    mass = context.ldexp(m.scene.body.mass, -mass_exponent(m))
     return [m.number(mass) * v for v in m.velocity]
 
 
-def _mass_exponent(m: Mechanics) -> int:
+def mass_exponent(m: Mechanics) -> int:
+    """Of the mass, binary."""
     return int(m.scene.context.frexp(m.scene.body.mass)[1])
 
 
-def _same(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mechanics], list[int]]:
+def same_unit(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mechanics], list[int]]:
+    """``Observable.exponents`` of components that have one unit."""
     return lambda m: [exponent(m)] * count
 
 
-_MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
+MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
 _ENERGY = lambda m: m.scaling.energy  # noqa: E731
-_NONE = lambda m: 0  # noqa: E731
+NO_UNIT = lambda m: 0  # noqa: E731
 
 
 def _carried_as(kind: str) -> Callable[[Mechanics], bool]:
@@ -194,57 +207,57 @@ _BUILT_IN: tuple[Observable, ...] = (
     ),
     Observable(
         "quaternion", ("quaternion_component",), "1", "attitude quaternion, body to space",
-        lambda m: m.carried(m.attitude).quaternion, _same(_NONE, 4), "body to space", ("attitude",),
+        lambda m: m.carried(m.attitude).quaternion, same_unit(NO_UNIT, 4), "body to space", ("attitude",),
         continuity=lambda m: {"state": "", "wrapping": "parity", "nearest": "nearest"}[
             m.carried(m.attitude).quaternion_sign
         ],
     ),
     Observable(
         "euler_angles", ("euler_angle",), "rad", "intrinsic Euler angles, body to space",
-        _euler, _same(_NONE, 3), "body to space", ("attitude",), by_default=_carried_as("euler_angles"),
+        _euler, same_unit(NO_UNIT, 3), "body to space", ("attitude",), by_default=_carried_as("euler_angles"),
         continuity=lambda m: "wrapped" if _carried_as("euler_angles")(m) else "unwrap",
     ),
     Observable(
         "rotation_matrix", ("space_axis", "body_axis"), "1", "rotation matrix, body to space",
-        lambda m: [x for row in m.matrix for x in row], _same(_NONE, 9), "body to space", ("attitude",),
+        lambda m: [x for row in m.matrix for x in row], same_unit(NO_UNIT, 9), "body to space", ("attitude",),
         by_default=_carried_as("rotation_matrix"),
     ),
     Observable(
         "angular_momentum", SPACE, "kg m2 s-1", "angular momentum",
-        lambda m: m.momentum_space, _same(_MOMENTUM, 3), "space axes", ("attitude",),
+        lambda m: m.momentum_space, same_unit(MOMENTUM, 3), "space axes", ("attitude",),
         _torque_free, momentum_scale,
     ),
     Observable(
         "angular_momentum_norm", (), "kg m2 s-1", "norm of the angular momentum",
-        lambda m: [hy.sqrt(hy.sum([x * x for x in m.momentum_body]))], _same(_MOMENTUM, 1), "", (),
+        lambda m: [hy.sqrt(hy.sum([x * x for x in m.momentum_body]))], same_unit(MOMENTUM, 1), "", (),
         _torque_free, momentum_scale,
     ),
     Observable(
         "angular_momentum_vertical", (), "kg m2 s-1", "angular momentum along the vertical",
-        _along_vertical, _same(_MOMENTUM, 1), "space axes", ("vertical",),
+        _along_vertical, same_unit(MOMENTUM, 1), "space axes", ("vertical",),
         _vertical_only, momentum_scale,
     ),
     Observable(
         "angular_momentum_axial", (), "kg m2 s-1", "angular momentum along the symmetry axis",
-        _along_symmetry_axis, _same(_MOMENTUM, 1), "body axes", ("symmetry",), _axial, momentum_scale,
+        _along_symmetry_axis, same_unit(MOMENTUM, 1), "body axes", ("symmetry",), _axial, momentum_scale,
     ),
     Observable(
-        "energy", (), "J", "total energy", lambda m: [m.energy], _same(_ENERGY, 1), "", ("energy",),
+        "energy", (), "J", "total energy", lambda m: [m.energy], same_unit(_ENERGY, 1), "", ("energy",),
         _conservative, energy_scale,
     ),
     Observable(
         "total_angular_momentum", SPACE, "kg m2 s-1",
         "angular momentum about the attracting point, orbital plus spin",
-        _total_momentum, _same(_MOMENTUM, 3), "space axes", ("attractor",), _central, total_momentum_scale,
+        total_momentum, same_unit(MOMENTUM, 3), "space axes", ("attractor",), _central, total_momentum_scale,
     ),
     Observable(
-        "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [m.carried(m.jacobi)],
-        _same(_ENERGY, 1), "", ("jacobi",),
-        lambda m: "the only load is a gravity gradient on a circular orbit", energy_scale,
+        "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [jacobi_constant(m)],
+        same_unit(_ENERGY, 1), "", ("jacobi",),
+        _rests_in_orbit, energy_scale,
     ),
     Observable(
         "kovalevskaya_constant", (), "rad4 s-4", "Kovalevskaya's constant",
-        lambda m: [first_integrals.kovalevskaya_constant(m)], _same(lambda m: -4 * m.scaling.time, 1), "",
+        lambda m: [first_integrals.kovalevskaya_constant(m)], same_unit(lambda m: -4 * m.scaling.time, 1), "",
         ("kovalevskaya",),
         lambda m: "A = B = 2 C, and the centre of mass lies in the equatorial plane (Kovalevskaya)",
         first_integrals.kovalevskaya_scale,
@@ -252,7 +265,7 @@ _BUILT_IN: tuple[Observable, ...] = (
     Observable(
         "goryachev_chaplygin_constant", (), "rad3 s-3", "Goryachev's and Chaplygin's constant",
         lambda m: [first_integrals.goryachev_chaplygin_constant(m)],
-        _same(lambda m: -3 * m.scaling.time, 1), "",
+        same_unit(lambda m: -3 * m.scaling.time, 1), "",
         ("goryachev_chaplygin",),
         lambda m: "A = B = 4 C, the centre of mass lies in the equatorial plane, and L_z = 0 (Goryachev, "
         "Chaplygin)",
@@ -260,33 +273,34 @@ _BUILT_IN: tuple[Observable, ...] = (
     ),
     Observable(
         "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],
-        _same(_ENERGY, 1), "", ("work",),
+        same_unit(_ENERGY, 1), "", ("work",),
     ),
     Observable(
         "energy_balance", (), "J", "energy less the work done", lambda m: [m.energy - hy.make_vars(WORK)],
-        _same(_ENERGY, 1), "", ("work",), lambda m: "energy changes by the work of the loads", energy_scale,
+        same_unit(_ENERGY, 1), "", ("work",), lambda m: "energy changes by the work of the loads",
+        energy_scale,
     ),
     Observable(
         "rotational_energy", (), "J", "kinetic energy of rotation",
-        lambda m: [m.rotational_energy], _same(_ENERGY, 1), "", (),
+        lambda m: [m.rotational_energy], same_unit(_ENERGY, 1), "", (),
         lambda m: _torque_free(m) if m.scene.free_flight else None, rotational_scale,
         by_default=lambda m: m.scene.free_flight,
     ),
     Observable(
         "potential_energy", (), "J", "potential energy",
-        lambda m: [m.potential_energy], _same(_ENERGY, 1), "", ("potential",),
+        lambda m: [m.potential_energy], same_unit(_ENERGY, 1), "", ("potential",),
     ),
     Observable(
         "position", SPACE, "m", "position of the centre of mass", lambda m: m.carried(m.position),
-        _same(lambda m: m.scaling.length, 3), "space axes", ("flight",),
+        same_unit(lambda m: m.scaling.length, 3), "space axes", ("flight",),
     ),
     Observable(
         "velocity", SPACE, "m s-1", "velocity of the centre of mass", lambda m: m.carried(m.velocity),
-        _same(lambda m: m.scaling.speed, 3), "space axes", ("flight",),
+        same_unit(lambda m: m.scaling.speed, 3), "space axes", ("flight",),
     ),
     Observable(
-        "linear_momentum", SPACE, "kg m s-1", "linear momentum", _linear_momentum,
-        _same(lambda m: m.scaling.speed + _mass_exponent(m), 3), "space axes", ("flight",),
+        "linear_momentum", SPACE, "kg m s-1", "linear momentum", linear_momentum,
+        same_unit(lambda m: m.scaling.speed + mass_exponent(m), 3), "space axes", ("flight",),
         _linear, linear_momentum_scale,
     ),
 )  # fmt: skip

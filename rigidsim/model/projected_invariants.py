@@ -39,7 +39,25 @@ _FOLLOWS = {
     "angular_momentum_norm": ("angular_momentum", "its three components are projected"),
     "energy": ("rotational_energy", "its rotational part is projected; nothing turns the flight's velocity"),
 }
-_NEVER = {"energy_balance": "it checks a work that is integrated beside the motion and doesn't act on it"}
+_WATCHED = "it is watched alone: what is projected is a set that keeps the numbers of earlier runs"
+_NEVER = {
+    "energy_balance": "it checks a work that is integrated beside the motion and doesn't act on it",
+    **dict.fromkeys(
+        (
+            "angular_momentum_source",
+            "angular_momentum_field",
+            "angular_momentum_x",
+            "angular_momentum_y",
+            "angular_momentum_z",
+            "angular_momentum_direction",
+            "brun_constant",
+            "bogoyavlensky_constant",
+            "total_angular_momentum_axial",
+            "linear_momentum_horizontal",
+        ),
+        _WATCHED,
+    ),
+}
 
 
 def _squared_rows(m: Mechanics) -> list[Symbolic]:

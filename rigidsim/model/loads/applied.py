@@ -27,6 +27,7 @@ from rigidsim.scene.expressions import (
 )
 from rigidsim.scene.fields import Metre, Triple, refuse
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts
 from rigidsim.scene.validation_messages import shown
 
@@ -98,7 +99,7 @@ class Applied(Load):
 
     def acts(self) -> bool:
         """Unless all components are zero."""
-        return not all(isinstance(c.root, Constant) and c.root.value.sign == 0 for c in self.components)
+        return not all(_vanishes(component) for component in self.components)
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
         """See ``SceneLoad``."""
@@ -139,11 +140,35 @@ class Applied(Load):
         found = self._components(m)
         return apply(transpose(m.matrix), found) if self.frame == "space" else found
 
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        """The arm and the force, where that is constant in space."""
+        roots = [component.root for component in self.components]
+        if self.title != "force" or self.frame != "space":
+            return None
+        if not all(isinstance(root, Constant) for root in roots):
+            return None
+        return self.arm, [root.value.at(scene.context) for root in roots]  # type: ignore[union-attr]
+
+    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
+        """Unless the components in space axes say that it doesn't: a torque has none along the axis, a force
+        has no other.
+        """
+        if self.frame != "space":
+            return True
+        acting = [not _vanishes(component) for component in self.components]
+        if self.title == "torque":
+            return any(a and n != 0 for a, n in zip(acting, axis, strict=True))
+        return any(a and abs(n) != 1 for a, n in zip(acting, axis, strict=True))
+
     def narrow(self, m: Kinematics) -> list[Symbolic]:
         """Arguments of pulses and switches in the components."""
         variables = state_names(m, self.names)
         parts = {part.root: part for c in self.components for part in narrow_parts(c)}
         return [to_heyoka(part, variables, m.number, m.scene.context) for part in parts.values()]
+
+
+def _vanishes(component: Expression) -> bool:
+    return isinstance(component.root, Constant) and component.root.value.sign == 0
 
 
 @register_load

@@ -129,6 +129,13 @@ class GravityGradient(Load):
         """c x (I c) has no part along an axis of symmetry."""
         return True
 
+    def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
+        """Where the source rests."""
+        if self.position is None:
+            return None
+        distance = norm(scene.context, self.position)
+        return 3 * self.gravitational_parameter / distance**3, [x / distance for x in self.position]
+
     def amplitude(self, scene: Scene) -> Any:
         """As of ``tidal_range`` at the least distance."""
         context = scene.context

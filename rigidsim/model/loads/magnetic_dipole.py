@@ -11,7 +11,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, diagonal, negligible, norm
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Triple, quantity
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
@@ -128,11 +128,9 @@ class MagneticDipole(Load):
         pairs = zip(self._moment(m), self._field(m), strict=True)
         return -hy.sum([m.number(x) * b for x, b in pairs if x != 0])
 
-    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
-        """Where the moment lies along the axis."""
-        context = m.scene.context
-        across = norm(context, cross(self.moment, axis))
-        return bool(across <= norm(context, self.moment) * negligible(context))
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        """m and B, in a uniform field."""
+        return (self.moment, self.source) if self.orbit is None else None
 
     def amplitude(self, scene: Scene) -> Any:
         """2 m B at its largest: over the source's poles at pericentre, where there is an orbit."""

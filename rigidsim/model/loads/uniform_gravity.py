@@ -12,7 +12,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
+from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
@@ -101,13 +101,9 @@ class UniformGravity(Load):
         terms = [m.number(k) * x for k, x in zip(weights, m.position, strict=True) if k]
         return hy.sum(terms) if terms else None
 
-    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
-        """Where the centre of mass lies on the axis."""
-        arm = m.numbers.arm
-        if arm is None:
-            return True
-        context = m.scene.context
-        return bool(norm(context, cross(arm, axis)) <= norm(context, arm) * negligible(context))
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        """M com and g, about a fixed point."""
+        return None if scene.torque_arm is None else (scene.torque_arm, self.acceleration)
 
     @property
     def effect(self) -> str:

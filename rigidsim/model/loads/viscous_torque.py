@@ -43,6 +43,10 @@ class ViscousTorque(Load):
         """Where any coefficient isn't zero."""
         return any(c != 0 for c in self.coefficients)
 
+    def damping(self) -> Vector | None:
+        """See ``Load``."""
+        return self.coefficients
+
     def amplitude(self, scene: Scene) -> Any:
         """It only takes."""
         return scene.context.zero

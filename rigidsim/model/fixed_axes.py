@@ -1,0 +1,243 @@
+"""Axes fixed in space about which no torque acts, and the integrals of gravity gradients of fixed sources.
+
+Two kinds of potential are looked at together, since the torques of several loads may add up to what none has
+by itself. With R from body to space axes, loads of a linear one,
+
+    U = - sum a_k . R^T f_k     (a weight, a dipole in a uniform field, a constant force),
+
+turn the body about an axis n unless sum a_k (f_k x n)^T = 0; loads of a quadratic one,
+
+    U = (1/2) sum s_k c_k . I c_k,  c_k = R^T d_k,  s_k = 3 G M_k / R_k^3     (fixed sources, MacCullagh),
+
+unless n x S is antisymmetric, S = sum s_k d_k d_k^T. The latter alone have two integrals beside the energy,
+for any sources (Bogoyavlensky, Commun. Math. Phys. 94, 1984, 255), which follow from the Lax pair
+L(h) = h^2 J^2 + h M + V with J = (tr I) / 2 - I and V = R^T S R (Manakov's for S = 0):
+
+    B = |L|^2 - tr(adj(I) V),     adj(I) = det(I) I^-1
+    K = L . S L - tr(S) |L|^2 + tr(adj(I) V^2).
+
+For a single source B is Brun's, |L|^2 - 3 (G M / R^3) det(I) (c . I^-1 c) (Brun, Ofvers. Kongl. Svenska
+Vet.-Akad. Forh. 7, 1893, 455), and K follows from it and L . d.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.load import Load
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.two_part import as_factor
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, eigen, negligible, norm
+
+
+def _outer(a: Vector, b: Vector) -> Matrix:
+    return [[x * y for y in b] for x in a]
+
+
+def _added(matrices: list[Matrix]) -> Matrix:
+    return reduce(
+        lambda a, b: [[x + y for x, y in zip(r, s, strict=True)] for r, s in zip(a, b, strict=True)], matrices
+    )
+
+
+def _size(matrix: Matrix) -> Any:
+    return max(abs(x) for row in matrix for x in row)
+
+
+def _linear(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Vector, Vector]]:
+    found = [load.linear_potential(m.scene) for load in loads]
+    return [pair for pair in found if pair is not None]
+
+
+def _sources(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Any, Vector]]:
+    found = [load.fixed_source(m.scene) for load in loads]
+    return [pair for pair in found if pair is not None]
+
+
+def _source_matrix(sources: list[tuple[Any, Vector]]) -> Matrix:
+    """S, 1/s^2, of at least one source."""
+    return _added([_outer([s * x for x in d], d) for s, d in sources])
+
+
+def parallel(context: Any, a: Vector, b: Vector) -> bool:
+    """Whether two vectors lie on one line, up to rounding."""
+    return bool(norm(context, cross(a, b)) <= norm(context, a) * norm(context, b) * negligible(context))
+
+
+def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bool:
+    """Whether no torque acts about a unit axis in space, whatever the motion.
+
+    Args:
+        loads: that are looked at; all of them by default.
+    """
+    tiny = negligible(m.scene.context)
+    turning = [load for load in m.turning if loads is None or load in loads]
+    linear, sources = _linear(m, turning), _sources(m, turning)
+    if linear:
+        along = _added([_outer(a, cross(f, axis)) for a, f in linear])
+        if _size(along) > tiny * sum(_size(_outer(a, f)) for a, f in linear):
+            return False
+    if sources:
+        s = _source_matrix(sources)
+        turned = transpose([cross(axis, column) for column in transpose(s)])  # n x S
+        if max(abs(turned[i][j] + turned[j][i]) for i in range(3) for j in range(i + 1)) > tiny * _size(s):
+            return False
+    return not any(
+        load.turns_about(m, axis)
+        for load in turning
+        if load.linear_potential(m.scene) is None and load.fixed_source(m.scene) is None
+    )
+
+
+def field_axis(m: Mechanics) -> Vector | None:
+    """Unit vector along the field that linear potentials add up to; None where they don't add up to one."""
+    linear = _linear(m, m.turning)
+    if not linear:
+        return None
+    context = m.scene.context
+    total = _added([_outer(a, f) for a, f in linear])
+    tiny = negligible(context) * sum(_size(_outer(a, f)) for a, f in linear)
+    row = max(total, key=lambda row: norm(context, row))
+    size = norm(context, row)
+    if size <= tiny:
+        return None
+    axis = [x / size for x in row]
+    return axis if all(norm(context, cross(other, axis)) <= tiny for other in total) else None
+
+
+def source_axis(m: Mechanics) -> Vector | None:
+    """Unit vector towards the fixed sources, where they lie on one line, or else their axis of symmetry."""
+    sources = _sources(m, m.turning)
+    if not sources:
+        return None
+    s = _source_matrix(sources)
+    values, axes = eigen(m.scene.context, s)
+    tiny = negligible(m.scene.context) * _size(s)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        if abs(values[j] - values[k]) <= tiny < abs(values[i] - values[j]):
+            towards = sources[0][1]
+            return axes[i] if dot(axes[i], towards) >= 0 else [-x for x in axes[i]]
+    return None
+
+
+def weight_axis(m: Mechanics) -> Vector | None:
+    """Unit vector against gravity, where it turns the body."""
+    return m.numbers.up if m.numbers.arm is not None else None
+
+
+def free_axis(m: Mechanics, which: int) -> Vector | None:
+    """A space axis without a torque about it, where some torque acts and the axis has no better name."""
+    context = m.scene.context
+    axis = [context.one if i == which else context.zero for i in range(3)]
+    named = [a for a in (weight_axis(m), source_axis(m), field_axis(m)) if a is not None]
+    if not m.torque or any(parallel(context, axis, a) for a in named):
+        return None
+    return axis if keeps(m, axis) else None
+
+
+def kept_source_axis(m: Mechanics) -> Vector | None:
+    """``source_axis`` where the momentum along it is conserved, and it isn't the vertical."""
+    axis, weight = source_axis(m), weight_axis(m)
+    if axis is None or (weight is not None and parallel(m.scene.context, axis, weight)):
+        return None
+    return axis if keeps(m, axis) else None
+
+
+def kept_field_axis(m: Mechanics) -> Vector | None:
+    """``field_axis``, likewise, where it is no source's axis either."""
+    axis = field_axis(m)
+    others = [a for a in (weight_axis(m), source_axis(m)) if a is not None]
+    if axis is None or any(parallel(m.scene.context, axis, other) for other in others):
+        return None
+    return axis if keeps(m, axis) else None
+
+
+def along(m: Mechanics, axis: Vector) -> Symbolic:
+    """Angular momentum along an axis in space, internal units."""
+    return hy.sum([m.number(n) * x for n, x in zip(axis, m.momentum_space, strict=True) if n != 0])
+
+
+# --- sources alone ----------------------------------------------------------------------------------------
+
+
+def sources_alone(m: Mechanics) -> bool:
+    """Whether fixed sources have all the torque there is."""
+    turning = m.turning
+    return bool(turning) and all(load.fixed_source(m.scene) is not None for load in turning)
+
+
+def several_directions(m: Mechanics) -> bool:
+    """Whether fixed sources that have all the torque lie in more than one direction."""
+    if not sources_alone(m):
+        return False
+    first, *others = (d for _, d in _sources(m, m.loads))
+    return not all(parallel(m.scene.context, first, other) for other in others)
+
+
+def adjugate(matrix: Matrix) -> Matrix:
+    """det(A) A^-1 of a symmetric 3x3 matrix, also of a singular one."""
+    a, b, c = matrix
+    return [cross(b, c), cross(c, a), cross(a, b)]
+
+
+def _squares(m: Mechanics) -> tuple[list[tuple[Any, Vector, Symbolic]], Symbolic]:
+    """For each direction d of the principal axes of S (internal units): its value s, d, and adj(I) seen along
+    it; and |L|^2.
+    """
+    context = m.scene.context
+    values, axes = eigen(context, _source_matrix(_sources(m, m.loads)))
+    inertia = adjugate(m.numbers.inertia)
+    rows = []
+    for value, axis in zip(values, axes, strict=True):
+        s = context.ldexp(value, 2 * m.scaling.time)
+        if abs(s) <= context.ldexp(max(values), 2 * m.scaling.time) * negligible(context):
+            continue
+        d = apply(transpose(m.matrix), [as_factor(m.number(x)) for x in axis])
+        terms = [
+            m.number(inertia[i][j]) * (d[i] * d[j]) for i in range(3) for j in range(3) if inertia[i][j] != 0
+        ]
+        rows.append((s, axis, hy.sum(terms)))
+    return rows, hy.sum([x * x for x in m.momentum_body])
+
+
+def brun_constant(m: Mechanics) -> Symbolic:
+    """B, internal units of momentum squared."""
+    rows, squared = _squares(m)
+    return squared - hy.sum([m.number(s) * seen for s, _, seen in rows])
+
+
+def bogoyavlensky_constant(m: Mechanics) -> Symbolic:
+    """K, internal units of (momentum / time) squared."""
+    rows, squared = _squares(m)
+    trace = sum((s for s, _, _ in rows), m.scene.context.zero)
+    terms = [m.number(-trace) * squared]
+    for s, axis, seen in rows:
+        momentum = along(m, axis)
+        terms += [m.number(s) * (momentum * momentum), m.number(s * s) * seen]
+    return hy.sum(terms)
+
+
+def largest_brun(m: Mechanics, momentum: Any) -> Any:
+    """|L|^2 + tr(S) times the largest product of two moments, SI.
+
+    Args:
+        momentum: size of the angular momentum.
+    """
+    moments = sorted(m.scene.body.principal_moments)
+    return momentum**2 + _trace(m) * moments[1] * moments[2]
+
+
+def largest_bogoyavlensky(m: Mechanics, momentum: Any) -> Any:
+    """tr(S) times ``largest_brun``, SI."""
+    return _trace(m) * largest_brun(m, momentum)
+
+
+def _trace(m: Mechanics) -> Any:
+    s = _source_matrix(_sources(m, m.loads))
+    return sum(s[i][i] for i in range(3))

@@ -1,0 +1,116 @@
+"""Invariants of scenes whose loads spare an axis or a direction, recorded where they hold and only there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model import central_forces, fixed_axes
+from rigidsim.model.drift_scales import linear_momentum_scale, momentum_scale, total_momentum_scale
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables import (
+    MOMENTUM,
+    NO_UNIT,
+    SPACE,
+    Observable,
+    linear_momentum,
+    mass_exponent,
+    same_unit,
+    total_momentum,
+)
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.registry import register_observable
+
+
+def _total_momentum_along(m: Mechanics) -> list[Symbolic]:
+    pairs = zip(m.carried(central_forces.line(m)), total_momentum(m), strict=True)
+    return [hy.sum([m.number(n) * x for n, x in pairs if n != 0])]
+
+
+def _along(axis: Callable[[Mechanics], Vector | None]) -> Callable[[Mechanics], list[Symbolic]]:
+    return lambda m: [fixed_axes.along(m, m.carried(axis(m)))]
+
+
+def _free_axis(which: int) -> Callable[[Mechanics], Vector | None]:
+    return lambda m: fixed_axes.free_axis(m, which)
+
+
+def _direction(m: Mechanics) -> list[Symbolic]:
+    inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in m.momentum_body]))
+    return [x * inverse for x in m.momentum_space]
+
+
+def _across_gravity(m: Mechanics) -> list[Symbolic]:
+    momentum, up = linear_momentum(m), [m.number(x) for x in m.carried(m.numbers.up)]
+    along = hy.sum([u * p for u, p in zip(up, momentum, strict=True)])
+    return [p - u * along for u, p in zip(up, momentum, strict=True)]
+
+
+def _brun_scale(m: Mechanics) -> tuple[Any, str]:
+    value = fixed_axes.largest_brun(m, momentum_scale(m)[0])
+    return value, "squared angular momentum plus 3 G M / R^3 times the largest product of two moments"
+
+
+def _bogoyavlensky_scale(m: Mechanics) -> tuple[Any, str]:
+    value = fixed_axes.largest_bogoyavlensky(m, momentum_scale(m)[0])
+    return value, "sum of 3 G M / R^3 times the scale of Brun's constant"
+
+
+def _unit_scale(m: Mechanics) -> tuple[Any, str]:
+    return m.scene.context.one, "1"
+
+
+_BUILT_IN: tuple[Observable, ...] = (
+    Observable(
+        "angular_momentum_source", (), "kg m2 s-1", "angular momentum along the axis of the fixed sources",
+        _along(fixed_axes.kept_source_axis), same_unit(MOMENTUM, 1), "space axes", ("source_axis",),
+        lambda m: "no load has a torque about the direction of a fixed source", momentum_scale,
+    ),
+    Observable(
+        "angular_momentum_field", (), "kg m2 s-1", "angular momentum along the uniform field",
+        _along(fixed_axes.kept_field_axis), same_unit(MOMENTUM, 1), "space axes", ("field_axis",),
+        lambda m: "no load has a torque about the direction of the field", momentum_scale,
+    ),
+    *(
+        Observable(
+            f"angular_momentum_{'xyz'[i]}", (), "kg m2 s-1",
+            f"angular momentum along the space axis {'XYZ'[i]}",
+            _along(_free_axis(i)), same_unit(MOMENTUM, 1), "space axes", (f"free_axis_{'xyz'[i]}",),
+            lambda m: "no load has a torque about this axis", momentum_scale,
+        )
+        for i in range(3)
+    ),
+    Observable(
+        "angular_momentum_direction", SPACE, "1", "direction of the angular momentum",
+        _direction, same_unit(NO_UNIT, 3), "space axes", ("isotropic_damping",),
+        lambda m: "the damping is in proportion to the inertia tensor", _unit_scale,
+    ),
+    Observable(
+        "brun_constant", (), "kg2 m4 s-2", "Brun's constant",
+        lambda m: [fixed_axes.brun_constant(m)], same_unit(lambda m: 2 * m.scaling.momentum, 1), "",
+        ("sources",), lambda m: "all torques are gravity gradients of fixed sources (Brun)", _brun_scale,
+    ),
+    Observable(
+        "bogoyavlensky_constant", (), "kg2 m4 s-4", "Bogoyavlensky's constant",
+        lambda m: [fixed_axes.bogoyavlensky_constant(m)],
+        same_unit(lambda m: 2 * (m.scaling.momentum - m.scaling.time), 1), "", ("several_sources",),
+        lambda m: "all torques are gravity gradients of fixed sources (Bogoyavlensky)", _bogoyavlensky_scale,
+    ),
+    Observable(
+        "total_angular_momentum_axial", (), "kg m2 s-1",
+        "angular momentum along the line of the attracting points, orbital plus spin",
+        _total_momentum_along, same_unit(MOMENTUM, 1), "space axes", ("attracting_line",),
+        lambda m: "no load turns the motion about the line of the attracting points", total_momentum_scale,
+    ),
+    Observable(
+        "linear_momentum_horizontal", SPACE, "kg m s-1", "linear momentum across gravity", _across_gravity,
+        same_unit(lambda m: m.scaling.speed + mass_exponent(m), 3), "space axes", ("free_fall",),
+        lambda m: "the only force is uniform gravity", linear_momentum_scale,
+    ),
+)  # fmt: skip
+
+for _observable in _BUILT_IN:
+    register_observable(_observable)

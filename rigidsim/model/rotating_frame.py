@@ -1,0 +1,60 @@
+"""Jacobi's constant: all torques come from potentials that rest in a frame that turns with a circular orbit.
+
+H = w . I w / 2 - n o . I w + U is conserved, o the orbit's normal and n its mean motion (Hughes 1986, ch. 9).
+U may be that of any number of sources on circles of one plane and one period, and beside them of what the
+turning of the frame doesn't change, such as a uniform field along o.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import add
+
+import heyoka as hy
+
+from rigidsim.model.fixed_axes import keeps, parallel
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.two_part import as_factor
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.orbits import KeplerOrbit
+
+
+def _normal(m: Mechanics, orbit: KeplerOrbit) -> Vector:
+    context = m.scene.context
+    sin_i, cos_i = context.sin(orbit.inclination), context.cos(orbit.inclination)
+    return [
+        sin_i * context.sin(orbit.ascending_node),
+        -sin_i * context.cos(orbit.ascending_node),
+        cos_i,
+    ]
+
+
+def _same_frame(m: Mechanics, a: KeplerOrbit, b: KeplerOrbit) -> bool:
+    return bool(a.mean_motion == b.mean_motion) and parallel(m.scene.context, _normal(m, a), _normal(m, b))
+
+
+def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
+    """An orbit with whose frame all potentials turn; None where there isn't one."""
+    orbits = [load.corotating_orbit for load in m.turning if load.corotating_orbit is not None]
+    if not orbits or not all(_same_frame(m, orbits[0], orbit) for orbit in orbits[1:]):
+        return None
+    others = [load for load in m.turning if load.corotating_orbit is None]
+    if not all(load.conservative for load in others) or not keeps(m, _normal(m, orbits[0]), others):
+        return None
+    return orbits[0]
+
+
+def jacobi_constant(m: Mechanics) -> Symbolic:
+    """H, internal units of energy."""
+    orbit, context = m.carried(rotating_orbit(m)), m.scene.context
+    motion = context.ldexp(orbit.mean_motion, m.scaling.time)
+    if m.attitude is not None and m.attitude.orbital is not None:
+        factor = as_factor(m.number(motion))
+        normal_body = m.attitude.orbital.normal
+        carried = [factor * (o * x) for o, x in zip(normal_body, m.momentum_body, strict=True)]
+    else:
+        pairs = zip(_normal(m, orbit), m.momentum_space, strict=True)
+        carried = [m.number(motion * o) * x for o, x in pairs if o != 0]
+    potentials = [m.carried(load.potential(m)) for load in m.turning]
+    return m.rotational_energy - hy.sum(carried) + reduce(add, potentials)
