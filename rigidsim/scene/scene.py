@@ -14,6 +14,7 @@ from rigidsim.scene import attitude, schema
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, context_for, dot, transpose
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
 from rigidsim.scene.exact import rounded
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
@@ -75,6 +76,7 @@ class Scene:
         loads: the others, without those that are zero whatever happens.
         events: crossings that are recorded, or end the run.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
+        axes, epoch: what the space axes and time 0 are, where the config says it or a load implies it.
     """
 
     name: str
@@ -93,6 +95,8 @@ class Scene:
     start: Any
     end: Any
     samples: SampleTimes
+    axes: str | None
+    epoch: Epoch | None
     config: schema.Config
 
     @property
@@ -163,6 +167,8 @@ def build_scene(experiment: Experiment) -> Scene:
             start=start,
             end=end,
             samples=samples,
+            axes=config.frame.axes or next((load.axes for load in resolved if load.axes), None),
+            epoch=config.time.epoch or next((load.epoch for load in resolved if load.epoch), None),
             config=config,
         )
     except ConfigError as error:
@@ -238,7 +244,8 @@ def _resolve_loads(
 ) -> list[SceneLoad]:
     found = []
     for number, fields in enumerate(config.loads):
-        around = Surroundings(number, context, config.parameters, body.center_of_mass, free_flight)
+        fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
+        around = Surroundings(number, context, *fixed)
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
         found.append(kind.resolve(fields, around))
     return found
