@@ -14,7 +14,8 @@ from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import fraction_of
-from rigidsim.scene.scene import SampleTimes, Scene, build_scene
+from rigidsim.scene.sample_times import SampleTimes
+from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene

@@ -8,9 +8,11 @@ its body coordinates to its space coordinates; only the scalar goes last: Q1 Q2 
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 
 from rigidsim.formats import ccsds
+from rigidsim.formats.naming import labels
 from rigidsim.formats.registry import Format, Source
 from rigidsim.formats.tables import Table
 
@@ -21,43 +23,25 @@ def write_aem(table: Table, path: Path, source: Source) -> None:
     Args:
         table: along time.
         path: the file; replaced.
-        source: the run; its naming says epoch, object and frame.
+        source: the run; its attributes or its naming say epoch and axes.
 
     Raises:
-        RigidsimError: no quaternion was recorded, or something that the standard can't express.
+        RigidsimError: no quaternion was recorded, epoch or axes are unknown, or something that the standard
+            can't express.
     """
-    quaternion = ccsds.columns_of(table, "quaternion", "xyzw", "AEM")
-    naming = source.naming
-    tags = ccsds.Tags(naming.epoch)
-    start, stop = ccsds.span(table, tags, source.bits)
-    lines = [
-        "CCSDS_AEM_VERS = 2.0",
-        *ccsds.comments(
-            [
-                f"rigidsim run {source.title}, numbers rounded to the 16 digits that the standard allows",
-                f"{naming.epoch} {ccsds.TIME_SYSTEM} is time zero of the scene",
-                f"{naming.frame} stands for the space axes X Y Z of the scene, SC_BODY_1 for its body axes",
-            ]
-        ),
-        f"CREATION_DATE = {ccsds.created()}",
-        "ORIGINATOR = RIGIDSIM",
-        "",
-        "META_START",
-        ccsds.keyword("OBJECT_NAME", naming.object_name or source.title),
-        ccsds.keyword("OBJECT_ID", naming.object_id),
-        ccsds.keyword("REF_FRAME_A", naming.frame),
-        "REF_FRAME_B = SC_BODY_1",
-        f"TIME_SYSTEM = {ccsds.TIME_SYSTEM}",
-        f"START_TIME = {start}",
-        f"STOP_TIME = {stop}",
-        "ATTITUDE_TYPE = QUATERNION",
-        "META_STOP",
-        "",
-        "DATA_START",
-    ]
+    quaternion = ccsds.columns_of(table, "quaternion", "wxyz", "AEM")
+    named = labels(source.naming, source.attributes)
+    frames = [("REF_FRAME_A", named.frame), ("REF_FRAME_B", "SC_BODY_1")]
+    lines = ccsds.opening("AEM", table, source, named, frames, "ATTITUDE_TYPE = QUATERNION")
+
+    def scalar_last(state: list[Decimal]) -> list[Decimal]:
+        w, x, y, z = named.attitude(state)
+        return [x, y, z, w]
+
     with path.open("w", encoding="ascii", newline="\n") as file:
-        file.write("\n".join(lines) + "\n")
-        file.writelines(line + "\n" for line in ccsds.data_lines(table, quaternion, tags, source.bits))
+        file.write("\n".join([*lines, "DATA_START", ""]))
+        rows = ccsds.data_lines(table, quaternion, named.epoch, source.bits, scalar_last)
+        file.writelines(line + "\n" for line in rows)
         file.write("DATA_STOP\n")
 
 

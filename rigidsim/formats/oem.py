@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 
 from rigidsim.formats import ccsds
+from rigidsim.formats.naming import labels
 from rigidsim.formats.registry import Format, Source
 from rigidsim.formats.tables import Table
 
@@ -17,44 +19,27 @@ def write_oem(table: Table, path: Path, source: Source) -> None:
     Args:
         table: along time.
         path: the file; replaced.
-        source: the run; its naming says epoch, object, frame and centre.
+        source: the run; its attributes or its naming say epoch and axes.
 
     Raises:
-        RigidsimError: no position and velocity were recorded, or something that the standard can't express.
+        RigidsimError: no position and velocity were recorded, epoch or axes are unknown, or something that
+            the standard can't express.
     """
     state = [
         *ccsds.columns_of(table, "position", "XYZ", "OEM"),
         *ccsds.columns_of(table, "velocity", "XYZ", "OEM"),
     ]
-    naming = source.naming
-    tags = ccsds.Tags(naming.epoch)
-    start, stop = ccsds.span(table, tags, source.bits)
-    lines = [
-        "CCSDS_OEM_VERS = 2.0",
-        *ccsds.comments(
-            [
-                f"rigidsim run {source.title}, numbers rounded to the 16 digits that the standard allows",
-                f"{naming.epoch} {ccsds.TIME_SYSTEM} is time zero of the scene",
-                f"{naming.frame} stands for the scene's space axes X Y Z, {naming.center} for its origin",
-            ]
-        ),
-        f"CREATION_DATE = {ccsds.created()}",
-        "ORIGINATOR = RIGIDSIM",
-        "",
-        "META_START",
-        ccsds.keyword("OBJECT_NAME", naming.object_name or source.title),
-        ccsds.keyword("OBJECT_ID", naming.object_id),
-        ccsds.keyword("CENTER_NAME", naming.center),
-        ccsds.keyword("REF_FRAME", naming.frame),
-        f"TIME_SYSTEM = {ccsds.TIME_SYSTEM}",
-        f"START_TIME = {start}",
-        f"STOP_TIME = {stop}",
-        "META_STOP",
-        "",
-    ]
+    named = labels(source.naming, source.attributes)
+    frames = [("CENTER_NAME", source.naming.center), ("REF_FRAME", named.frame)]
+    lines = ccsds.opening("OEM", table, source, named, frames)
+
+    def kilometres(state: list[Decimal]) -> list[Decimal]:
+        return [x.scaleb(_KILO) for x in [*named.vector(state[:3]), *named.vector(state[3:])]]
+
     with path.open("w", encoding="ascii", newline="\n") as file:
-        file.write("\n".join(lines) + "\n")
-        file.writelines(line + "\n" for line in ccsds.data_lines(table, state, tags, source.bits, _KILO))
+        file.write("\n".join([*lines, ""]))
+        rows = ccsds.data_lines(table, state, named.epoch, source.bits, kilometres)
+        file.writelines(line + "\n" for line in rows)
 
 
 FORMAT = Format(write_oem)

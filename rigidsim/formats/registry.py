@@ -11,7 +11,7 @@ from typing import Any
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats import FORMATS
-from rigidsim.formats.ccsds import Naming
+from rigidsim.formats.naming import Naming
 from rigidsim.formats.tables import Table
 
 
@@ -23,7 +23,7 @@ class Source:
         title: its name.
         bits: of its precision.
         attributes: of its dataset.
-        naming: what the dataset doesn't know of itself.
+        naming: what the dataset may not know of itself.
     """
 
     title: str

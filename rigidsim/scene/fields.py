@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.validation_messages import shown
 
 
 def refuse(text: str) -> PydanticCustomError:
@@ -24,8 +26,8 @@ def quantity(unit: str) -> Any:
         except ValueError as error:
             raise refuse(str(error)) from None
 
-    shown = {"anyOf": [{"type": "number"}, {"type": "string"}], "description": f"number, in {unit}"}
-    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(shown)]
+    schema = {"anyOf": [{"type": "number"}, {"type": "string"}], "description": f"number, in {unit}"}
+    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(schema)]
 
 
 def _exactly(count: int) -> BeforeValidator:
@@ -71,6 +73,19 @@ else:
     Acceleration = quantity("m/s^2")
     GravitationalParameter = quantity("m^3/s^2")
     Damping = quantity("kg m^2/s")
+
+
+def _instant(value: Any) -> Epoch:
+    if not isinstance(value, str):
+        raise refuse(f'given {shown(value)}; a string such as "2029-04-13T21:46:00 TDB" is allowed')
+    try:
+        return parse_epoch(value)
+    except ValueError as error:
+        raise refuse(str(error)) from None
+
+
+Instant = Annotated[Epoch, PlainValidator(_instant), WithJsonSchema({"type": "string"})]
+"""A date and time with its scale."""
 
 
 class ConfigTable(BaseModel):

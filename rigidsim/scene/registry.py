@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Protocol
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions import Expression
 from rigidsim.scene.fields import ConfigTable
@@ -31,6 +32,8 @@ class Surroundings:
         parameters: named constants of expressions.
         center_of_mass: of the body, from its reference point, body axes, m (mpf).
         free_flight: whether the body has a position.
+        axes: what the space axes are, where the config says it.
+        epoch: time 0 of the scene, where the config says it.
     """
 
     number: int
@@ -38,6 +41,8 @@ class Surroundings:
     parameters: Mapping[str, ExactNumber]
     center_of_mass: Vector
     free_flight: bool
+    axes: str | None = None
+    epoch: Epoch | None = None
 
     def fault(self, key: str, text: str) -> ConfigError:
         """The error that names a key of this load."""
@@ -52,11 +57,15 @@ class SceneLoad:
         described: with an article, for sentences.
         uniform_field: acceleration (mpf, m/s^2, space axes) of a field that is the same everywhere; such
             loads add up to the scene's gravity. None for all others.
+        axes: what the space axes are in its own equations; None where these hold in any.
+        epoch: time 0 of the scene in its own equations; None where they have none.
     """
 
     Fields: ClassVar[type[LoadFields] | None] = None
     described: str = "a load"
     uniform_field: Vector | None = None
+    axes: str | None = None
+    epoch: Epoch | None = None
 
     @classmethod
     def resolve(cls, fields: Any, around: Surroundings) -> SceneLoad:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
-from itertools import pairwise
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
@@ -14,52 +11,12 @@ from rigidsim.scene import attitude, schema
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, context_for, dot, transpose
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
-from rigidsim.scene.exact import rounded
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
-from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.sample_times import SampleTimes, sample_times
 
-_MOST_SAMPLES = 10**12
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class SampleTimes:
-    """Where samples lie, seconds, as exactly as they were written: ``begin + i * step``, or a list.
-
-    Attributes:
-        begin: of the motion.
-        step: from one sample of a grid to the next; zero for a list.
-        times: the list, or None.
-        count: number of samples.
-        context: of the scene.
-    """
-
-    begin: Fraction
-    step: Fraction
-    times: tuple[Fraction, ...] | None
-    count: int
-    context: Any
-
-    @classmethod
-    def listed(cls, begin: Fraction, times: Sequence[Fraction], context: Any) -> SampleTimes:
-        """A list."""
-        return cls(begin, Fraction(0), tuple(times), len(times), context)
-
-    @property
-    def exact_last(self) -> Fraction:
-        """Time of the last sample."""
-        return self.times[-1] if self.times is not None else self.begin + self.step * (self.count - 1)
-
-    @property
-    def start(self) -> Any:
-        """Of the motion (mpf)."""
-        return rounded(self.begin, self.context)
-
-    @property
-    def last(self) -> Any:
-        """Time of the last sample (mpf)."""
-        return rounded(self.exact_last, self.context)
 
 
 @dataclass(frozen=True)
@@ -75,6 +32,7 @@ class Scene:
         loads: the others, without those that are zero whatever happens.
         events: crossings that are recorded, or end the run.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
+        axes, epoch: what the space axes and time 0 are, where the config says it or a load implies it.
     """
 
     name: str
@@ -93,6 +51,8 @@ class Scene:
     start: Any
     end: Any
     samples: SampleTimes
+    axes: str | None
+    epoch: Epoch | None
     config: schema.Config
 
     @property
@@ -129,7 +89,7 @@ def build_scene(experiment: Experiment) -> Scene:
 
     body = attempt(build_body, config.body, context)
     orientation = attempt(_initial_attitude, config, context)
-    times = attempt(_times, config, context)
+    times = attempt(sample_times, config.time, context)
     attempt(_check_limits, config)
     if body is None or orientation is None or times is None or problems:
         raise ConfigError(problems, experiment.source)
@@ -163,6 +123,8 @@ def build_scene(experiment: Experiment) -> Scene:
             start=start,
             end=end,
             samples=samples,
+            axes=config.frame.axes or next((load.axes for load in resolved if load.axes), None),
+            epoch=config.time.epoch or next((load.epoch for load in resolved if load.epoch), None),
             config=config,
         )
     except ConfigError as error:
@@ -238,7 +200,8 @@ def _resolve_loads(
 ) -> list[SceneLoad]:
     found = []
     for number, fields in enumerate(config.loads):
-        around = Surroundings(number, context, config.parameters, body.center_of_mass, free_flight)
+        fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
+        around = Surroundings(number, context, *fixed)
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
         found.append(kind.resolve(fields, around))
     return found
@@ -268,75 +231,6 @@ def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[
     position = [x.at(context) for x in table.position] if table.position else zero
     velocity = [x.at(context) for x in table.velocity] if table.velocity else list(zero)
     return position, velocity
-
-
-def _times(config: schema.Config, context: Any) -> tuple[Any, Any, SampleTimes]:
-    table = config.time
-    ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
-    if len(ways) > 1:
-        raise _fail("time", ways[1], f"given beside {ways[0]}; only one of samples, every, times is allowed")
-
-    def shortly(time: Fraction, digits: int = 12) -> str:
-        return str(context.nstr(rounded(time, context), digits))
-
-    start = table.start.fraction(context)
-    if table.times is not None:
-        times = [t.fraction(context) for t in table.times]
-        if not times:
-            raise _fail("time", "times", "given an empty array; at least one time is needed")
-        for i, (a, b) in enumerate(pairwise(times)):
-            if not a < b:
-                raise _fail(
-                    "time", f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must increase"
-                )
-        if times[0] < start:
-            raise _fail(
-                "time",
-                "times[0]",
-                f"given {shortly(times[0])} s; start ({shortly(start)} s) or later is allowed",
-            )
-        end = table.end.fraction(context) if table.end is not None else times[-1]
-        if times[-1] > end:
-            raise _fail(
-                "time",
-                f"times[{len(times) - 1}]",
-                f"given {shortly(times[-1])} s; end ({shortly(end)} s) or earlier is allowed",
-            )
-        return rounded(start, context), rounded(end, context), SampleTimes.listed(start, times, context)
-    if table.end is None:
-        raise _fail("time", "end", "missing; it must be given, unless times are")
-    end = table.end.fraction(context)
-    if not end > start:
-        raise _fail("time", "end", f"given {shortly(end)} s; after start ({shortly(start)} s) is allowed")
-    if table.every is not None:
-        step = table.every.fraction(context)
-        if not step > 0:
-            raise _fail("time", "every", f"given {shortly(step)} s; a positive time is allowed")
-        irrational = any(t is not None and t.pi_power for t in (table.start, table.end, table.every))
-        slack = Fraction(1, 2**100) if irrational else 0  # an end on the grid is a sample, rounded or not
-        intervals = math.floor((end - start) / step + slack)
-        if intervals > _MOST_SAMPLES:
-            ratio = shortly((end - start) / step, 3)
-            raise _fail("time", "every", f"asks for {ratio} samples; at most 1e12 are allowed")
-        if intervals == 0:
-            raise _fail(
-                "time",
-                "every",
-                f"given {shortly(step)} s, longer than the whole run; at most end - start "
-                f"({shortly(end - start)} s) is allowed",
-            )
-    else:
-        count = table.samples if table.samples is not None else 1001
-        if not 2 <= count <= _MOST_SAMPLES:
-            raise _fail(
-                "time",
-                "samples",
-                f"given {shown(count)}; 2 to 1e12 are allowed (the first at start, the last at end)",
-            )
-        intervals = count - 1
-        step = (end - start) / intervals
-    samples = SampleTimes(start, step, None, intervals + 1, context)
-    return rounded(start, context), rounded(end, context), samples
 
 
 def _check_limits(config: schema.Config) -> None:

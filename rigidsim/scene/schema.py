@@ -28,6 +28,7 @@ from rigidsim.scene.fields import (
     ConfigTable,
     Dimensionless,
     Four,
+    Instant,
     Kilogram,
     Metre,
     Moment,
@@ -40,6 +41,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.shapes import DIMENSIONS, SHAPES
+from rigidsim.scene.space_axes import SpaceAxes
 from rigidsim.scene.validation_messages import nearest, shown
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
@@ -141,13 +143,20 @@ class Initial(ConfigTable):
 
 
 class Time(ConfigTable):
-    """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``."""
+    """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``; what time 0 is."""
 
     start: Second = ZERO
     end: Second | None = None
     samples: StrictInt | None = None
     every: Second | None = None
     times: list[Second] | None = None
+    epoch: Instant | None = Field(default=None, description="what time 0 is; scales TDB, TT and UTC")
+
+
+class Frame(ConfigTable):
+    """``[frame]``: what the scene's axes are, beside its own equations."""
+
+    axes: SpaceAxes | None = Field(default=None, description="of space; an ephemeris has ecliptic J2000")
 
 
 class Integrator(ConfigTable):
@@ -272,6 +281,7 @@ class Config(ConfigTable):
     initial: Initial
     loads: list[LoadFields] = Field(default_factory=list)
     events: list[EventTable] = Field(default_factory=list)
+    frame: Frame = Field(default_factory=Frame)
     time: Time
     integrator: Integrator = Field(default_factory=Integrator)
     output: Output = Field(default_factory=Output)

@@ -19,6 +19,7 @@ _TABLES = (
     "body",
     "initial",
     "loads",
+    "frame",
     "time",
     "integrator",
     "output",

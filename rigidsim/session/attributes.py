@@ -66,6 +66,8 @@ def root_attributes(
         inertia_tensor=json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
         body_source=scene.body.source,
         drawing=json.dumps(scene.body.drawing),
+        axes=scene.axes,
+        epoch=None if scene.epoch is None else str(scene.epoch),
         python_loads=" ".join(type(load).__name__ for load in prepared.python_loads),
         cpu_model=provenance.cpu_model(),
         started_at=provenance.now(),

@@ -20,7 +20,7 @@ from mpmath.libmp import from_rational, round_nearest
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.exact import fraction_of, rounded
-from rigidsim.scene.scene import SampleTimes
+from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
 _BLOCK = 1 << 16

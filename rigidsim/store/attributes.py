@@ -36,6 +36,8 @@ class RootAttributes(BaseModel):
         unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back: JSON.
         principal_moments, inertia_tensor: kg m^2.
         python_loads: names of classes.
+        axes: what the space axes are, where that is known.
+        epoch: time 0, where that is known: date, time and scale.
         started_at, finished_at: UTC.
         mixed_provenance: where the run was resumed with other versions or on another machine, what changed.
         warnings: one a line.
@@ -75,6 +77,8 @@ class RootAttributes(BaseModel):
     inertia_tensor: str
     body_source: str
     drawing: str
+    axes: str | None = None
+    epoch: str | None = None
     python_loads: str = ""
     cpu_model: Annotated[str, Use.REPEATED]
     started_at: Annotated[str, Use.REPEATED]

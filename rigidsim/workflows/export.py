@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.errors import RigidsimError, RunFolderError
-from rigidsim.formats.ccsds import Naming
+from rigidsim.formats.naming import Naming
 from rigidsim.formats.registry import Format, Source, format_named
 from rigidsim.formats.tables import Table, tables_of
 from rigidsim.store import atomic
@@ -35,7 +35,7 @@ def export(
         out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default. In csv and
             parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``.
         force: replace what is there.
-        naming: epoch, names and frames, for aem and oem.
+        naming: what the run's config leaves open of epoch, axes and names, for aem and oem.
 
     Returns:
         What was written; the table along time first.

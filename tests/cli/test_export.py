@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import rigidsim
 
@@ -99,34 +100,95 @@ def keywords(text: str) -> dict[str, str]:
     return dict(pairs)
 
 
+def attitudes(text: str) -> np.ndarray:
+    """Quaternions x y z w of a message."""
+    body = re.search(r"^DATA_START\n(.*)^DATA_STOP$", text, re.MULTILINE | re.DOTALL)
+    assert body is not None
+    return np.array([[float(x) for x in line.split()[1:]] for line in body[1].splitlines()])
+
+
+def states(text: str) -> np.ndarray:
+    """Positions and velocities of a message."""
+    rows = [line.split() for line in text.split("META_STOP")[1].splitlines() if line.strip()]
+    return np.array([[float(x) for x in row[1:]] for row in rows])
+
+
 def test_an_attitude_message_turns_the_space_axes_into_the_body_axes(exported: Callable[..., Path]) -> None:
     """CCSDS 504.0-B-2: Q1 Q2 Q3 QC is the rotation of frame A onto frame B, QC = cos(half the angle)."""
-    text = exported("aem", "", "--epoch", "2020-02-28T23:59:59.5", "--frame", "ICRF").read_text()
+    text = exported("aem", "", "--epoch", "2020-02-28T23:59:59.5 TT", "--axes", "ICRF").read_text()
     header = keywords(text)
     assert header["CCSDS_AEM_VERS"] == "2.0"
     assert (header["REF_FRAME_A"], header["REF_FRAME_B"]) == ("ICRF", "SC_BODY_1")
     assert header["ATTITUDE_TYPE"] == "QUATERNION"
+    assert header["TIME_SYSTEM"] == "TT"
     assert header["START_TIME"] == "2020-02-28T23:59:59.5"
     assert header["STOP_TIME"] == "2020-02-29T00:00:01.5"
     assert all(len(line) <= 254 and line.isascii() for line in text.splitlines())
-    body = re.search(r"^DATA_START\n(.*)^DATA_STOP$", text, re.MULTILINE | re.DOTALL)
-    assert body is not None
-    rows = [line.split() for line in body[1].splitlines()]
-    values = np.array([[float(x) for x in row[1:]] for row in rows])
     with rigidsim.open_run("runs/throw").dataset as dataset:
         expected = dataset.quaternion.values[:, [1, 2, 3, 0]]
-    assert np.abs(values - expected).max() < 1e-15  # 16 digits are what the standard allows
+    assert np.abs(attitudes(text) - expected).max() < 1e-15  # 16 digits are what the standard allows
 
 
 def test_an_orbit_message_is_in_kilometres(exported: Callable[..., Path]) -> None:
-    text = exported("oem").read_text()
+    text = exported("oem", "", "--epoch", "2016-12-31T23:59:59 UTC", "--axes", "LAB_1").read_text()
     header = keywords(text)
-    assert header["TIME_SYSTEM"] == "TT"
-    rows = [line.split() for line in text.split("META_STOP")[1].splitlines() if line.strip()]
-    values = np.array([[float(x) for x in row[1:]] for row in rows])
+    assert (header["TIME_SYSTEM"], header["REF_FRAME"]) == ("UTC", "LAB_1")
+    assert header["STOP_TIME"] == "2017-01-01T00:00:00"  # 2 s later: a leap second was between them
+    assert "2016-12-31T23:59:60.75 " in text
     with rigidsim.open_run("runs/throw").dataset as dataset:
         expected = np.hstack([dataset.position.values, dataset.velocity.values]) / 1000
-    np.testing.assert_allclose(values, expected, rtol=1e-15, atol=1e-18)
+    np.testing.assert_allclose(states(text), expected, rtol=1e-15, atol=1e-18)
+
+
+SKY = '[frame]\naxes = "ecliptic J2000"\n'
+TIMED = 'end = 2\nsamples = 9\nepoch = "2029-04-13T21:46:00 TDB"'
+
+
+def test_the_config_says_epoch_and_axes_and_the_ecliptic_is_turned_to_the_equator(
+    config: Config, rigidsim_command: Command
+) -> None:
+    """CCSDS knows no ecliptic. x_equator = (x, y cos e - z sin e, y sin e + z cos e), with the obliquity e of
+    IAU 2006, 84381.406 arcsec: also for body axes, the columns of the attitude's matrix.
+    """
+    assert rigidsim_command("run", config("sky", time=TIMED, rest=SKY, **FLIGHT)).exit_code == 0
+    for file_format in ("aem", "oem"):
+        assert rigidsim_command("export", "runs/sky", "--format", file_format).exit_code == 0
+    attitude, orbit = Path("sky.aem").read_text(), Path("sky.oem").read_text()
+    for text, frame in ((attitude, "REF_FRAME_A"), (orbit, "REF_FRAME")):
+        header = keywords(text)
+        assert (header[frame], header["TIME_SYSTEM"]) == ("EME2000", "TDB")
+        assert header["STOP_TIME"] == "2029-04-13T21:46:02"
+        assert "turned about X by the obliquity to EME2000: 84381.406 arcsec (IAU 2006)" in text
+    e = np.radians(84381.406 / 3600)
+    turn = np.array([[1, 0, 0], [0, np.cos(e), -np.sin(e)], [0, np.sin(e), np.cos(e)]])
+    with rigidsim.open_run("runs/sky").dataset as dataset:
+        assert dataset.attrs["axes"] == "ecliptic J2000"
+        assert dataset.attrs["epoch"] == "2029-04-13T21:46:00 TDB"
+        parts = dataset.position.values / 1000, dataset.velocity.values / 1000
+        expected = np.hstack([part @ turn.T for part in parts])
+        matrices = Rotation.from_quat(dataset.quaternion.values[:, [1, 2, 3, 0]]).as_matrix()
+    np.testing.assert_allclose(states(orbit), expected, rtol=0, atol=1e-17)
+    found = Rotation.from_quat(attitudes(attitude)).as_matrix()
+    np.testing.assert_allclose(found, turn @ matrices, rtol=0, atol=2e-15)  # a few roundings of each
+
+
+def test_no_message_names_what_nobody_said(config: Config, rigidsim_command: Command) -> None:
+    assert rigidsim_command("run", config("plain", time="end = 2\nsamples = 9")).exit_code == 0
+    assert rigidsim_command("run", config("sky", time=TIMED, rest=SKY)).exit_code == 0
+    refusals = {
+        ("plain",): "doesn't say what its time 0 is, which a message must: give [time] epoch in the config",
+        ("plain", "--epoch", "J2000"): "what its space axes are, which a message must: give [frame] axes",
+        ("plain", "--epoch", "2020-01-01"): '--epoch: given "2020-01-01"; a date and time with its scale',
+        ("plain", "--epoch", "J2000", "--axes", "ecliptic"): 'did you mean "ecliptic J2000"?',
+        ("plain", "--epoch", "J2000", "--axes", "EME200"): 'did you mean "EME2000"?',
+        ("sky", "--epoch", "J2000"): "given 2000-01-01T12:00:00 TDB, but time 0 of the run is 2029-04-13",
+        ("sky", "--axes", "EME2000"): 'but the run\'s axes are "ecliptic J2000"; leave the option out',
+    }
+    for (name, *options), phrase in refusals.items():
+        result = rigidsim_command("export", f"runs/{name}", "--format", "aem", *options)
+        assert result.exit_code == 2
+        assert phrase in result.output
+        assert not Path(f"{name}.aem").exists()
 
 
 def test_what_a_format_can_not_hold_is_said(config: Config, rigidsim_command: Command) -> None:

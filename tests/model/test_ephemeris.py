@@ -7,7 +7,7 @@ from pathlib import Path
 import heyoka as hy
 import numpy as np
 import pytest
-from support import run_text
+from support import config, run_text
 
 from rigidsim.model.ephemeris import MEAN_DISTANCE, source_position
 
@@ -74,3 +74,29 @@ def test_the_torque_of_the_ephemeris_is_that_of_the_place(runs: Path) -> None:
     assert np.abs(a - b).max() < 1e-3 * np.abs(a).max()
     assert np.abs(a).max() > 0
     assert moving.dataset.attrs["compact_mode"] == 1
+
+
+def test_time_zero_is_the_epoch(runs: Path) -> None:
+    """A scene that begins a day after J2000 by its epoch is the one that begins then by its clock; without an
+    epoch time zero is J2000, and the dataset says so.
+    """
+    text = config(
+        "principal_moments = [1, 2, 2.5]",
+        "angular_velocity = [0, 0, 0]\nquaternion = [0.7, 0.4, 0.5, 0.3]",
+        'kind = "gravity_gradient"\ngravitational_parameter = 1.32712440018e20\nephemeris = "sun"',
+        "end = 3600\nsamples = 2",
+    )
+    later = ["time.start=86400", "time.end=90000"]
+    epochs = {
+        "clock": later,
+        "epoch": ["time.epoch=2000-01-02T12:00:00 TDB"],
+        "J2000": [*later, "time.epoch=J2000"],
+    }
+    found = {name: run_text(text, runs, f"name={name}", *changes).dataset for name, changes in epochs.items()}
+    assert {data.attrs["axes"] for data in found.values()} == {"ecliptic J2000"}
+    assert found["clock"].attrs["epoch"] == found["J2000"].attrs["epoch"] == "2000-01-01T12:00:00 TDB"
+    assert found["epoch"].attrs["epoch"] == "2000-01-02T12:00:00 TDB"
+    rates = {name: data["angular_velocity"].values[-1] for name, data in found.items()}
+    np.testing.assert_array_equal(rates["clock"], rates["J2000"])
+    # the same times in two roundings: 1e-11 s of 9e4 s, in which the Sun moves by 2e-18 rad
+    np.testing.assert_allclose(rates["epoch"], rates["clock"], rtol=1e-12)

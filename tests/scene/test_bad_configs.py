@@ -68,7 +68,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "table misspelt": (
         {"more": '[integratr]\nprecision = "double"'},
         "integratr",
-        ["unknown key", 'did you mean "integrator"?', "allowed: body, description, events, initial"],
+        ["unknown key", 'did you mean "integrator"?', "allowed: body, description, events, frame, initial"],
     ),
     "top key misspelt": ({"top": 'name = "x"\nnmae = "y"'}, "nmae", ["unknown key", 'did you mean "name"?']),
     "body key misspelt": (
@@ -91,7 +91,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "time key unknown": (
         {"time": "end = 1\nstop = 3"},
         "[time] stop",
-        ["unknown key", "allowed: end, every"],
+        ["unknown key", "allowed: end, epoch, every"],
     ),
     "integrator key misspelt": (
         {"integrator": 'precison = "double"'},
@@ -272,6 +272,34 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         {"initial": 'angular_velocity = "fast"'},
         "[initial] angular_velocity",
         ['given "fast"; an array is allowed'],
+    ),
+    "epoch without a scale": (
+        {"time": 'end = 1\nepoch = "2029-04-13T21:46:00"'},
+        "[time] epoch",
+        ['given "2029-04-13T21:46:00"; a date and time with its scale (TDB, TT, UTC)'],
+    ),
+    "epoch a date": (
+        {"time": "end = 1\nepoch = 2029-04-13"},
+        "[time] epoch",
+        ["given 2029-04-13; a string such as"],
+    ),
+    "epoch in UTC that nobody knows": (
+        {"time": 'end = 1\nepoch = "2999-01-01 UTC"'},
+        "[time] epoch",
+        ["leap seconds of UTC are known from 1972-01-01 to", "write the epoch in TT or TDB"],
+    ),
+    "axes misspelt": (
+        {"more": '[frame]\naxes = "EME200"'},
+        "[frame] axes",
+        ['given "EME200"; did you mean "EME2000"?; allowed: EME2000, ICRF, GCRF, ecliptic J2000'],
+    ),
+    "axes that aren't the ephemeris's": (
+        {
+            "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\nephemeris = "sun"',
+            "more": '[frame]\naxes = "ICRF"',
+        },
+        "[frame] axes",
+        ['given "ICRF", but the ephemeris of [[loads]] number 1 is in "ecliptic J2000"; write that'],
     ),
     "end a bool": ({"time": "end = true"}, "[time] end", ["given true; a number (in s)", '"430 day"']),
     "end a word": ({"time": 'end = "ten"'}, "[time] end", ['given "ten"', TEXT]),

@@ -21,24 +21,34 @@ def export(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
     epoch: Annotated[
-        str | None, typer.Option("--epoch", metavar="TIME", help="Of time zero, for aem and oem (TT).")
+        str | None,
+        typer.Option(
+            "--epoch",
+            metavar="TIME",
+            help='For aem and oem: what time 0 is, where the config doesn\'t say: "2029-04-13T21:46:00 TDB".',
+        ),
+    ] = None,
+    axes: Annotated[
+        str | None,
+        typer.Option(
+            "--axes",
+            metavar="NAME",
+            help="For aem and oem: what the space axes are, where the config doesn't say: ICRF, EME2000, ...",
+        ),
     ] = None,
     object_name: Annotated[
         str | None, typer.Option("--object-name", metavar="NAME", help="For aem and oem.")
-    ] = None,
-    frame: Annotated[
-        str | None, typer.Option("--frame", metavar="NAME", help="Of the space axes, for aem and oem.")
     ] = None,
 ) -> None:
     """Write a run for other tools: tables with every digit, or CCSDS attitude and orbit messages.
 
     Example: rigidsim export runs/intermediate_axis --format csv
     """
-    from rigidsim.formats.ccsds import Naming
+    from rigidsim.formats.naming import Naming
     from rigidsim.store.run import open_run
     from rigidsim.workflows.export import export as write
 
-    given = {"epoch": epoch, "object_name": object_name, "frame": frame}
+    given = {"epoch": epoch, "axes": axes, "object_name": object_name}
     naming = Naming(**{key: value for key, value in given.items() if value is not None})
     for path in write(open_run(run_path), file_format, out, force=force, naming=naming):
         print(path)

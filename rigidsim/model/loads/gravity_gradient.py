@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import heyoka as hy
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
@@ -14,10 +15,13 @@ from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.epochs import J2000, Epoch
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.space_axes import ECLIPTIC
 
 
 class GravityGradientFields(LoadFields):
@@ -36,13 +40,16 @@ class GravityGradient(Load):
     """Torque (3 G M / R^3) c x (I c) of a distant body in direction c (MacCullagh).
 
     Exactly one of ``orbit``, ``position`` (space axes, m) and ``ephemeris`` says where it is; for an
-    ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from J2000.
+    ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from the scene's
+    epoch, by default J2000.
     """
 
     gravitational_parameter: Any
     orbit: KeplerOrbit | None = None
     position: Vector | None = None
     ephemeris: str | None = None
+    axes: str | None = None
+    epoch: Epoch | None = None
     Fields = GravityGradientFields
     title = "gravity_gradient"
     described = "a gravity-gradient load"
@@ -61,7 +68,12 @@ class GravityGradient(Load):
         if fields.orbit is not None:
             return cls(strength, orbit=resolve_orbit(fields.orbit, strength, around))
         if fields.position is None:
-            return cls(strength, ephemeris=fields.ephemeris)
+            if around.axes not in (None, ECLIPTIC):
+                what = f'given "{around.axes}", but the ephemeris of [[loads]] number {around.number + 1} '
+                what += f'is in "{ECLIPTIC}"; write that, or leave axes out'
+                raise ConfigError(Problem("[frame] axes", what))
+            epoch = around.epoch or J2000
+            return cls(strength, ephemeris=fields.ephemeris, axes=ECLIPTIC, epoch=epoch)
         position = [x.at(context) for x in fields.position]
         if all(x == 0 for x in position):
             raise around.fault("position", "given the origin, where the body is; another point is allowed")
@@ -85,8 +97,11 @@ class GravityGradient(Load):
 
     def _source(self, m: Kinematics) -> SourcePosition:
         assert self.ephemeris is not None
-        unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.time)
-        return source_position(self.ephemeris, m.number(unit) * hy.time)
+        context = m.scene.context
+        time = m.number(context.ldexp(context.one, m.scaling.time)) * hy.time
+        if self.epoch is not None and self.epoch != J2000:
+            time = time + m.number(ExactNumber(self.epoch.since_j2000()).at(context))
+        return source_position(self.ephemeris, time)
 
     def direction(self, m: Kinematics) -> list[Symbolic]:
         """Unit vector towards the attracting body, body axes."""

@@ -1,0 +1,145 @@
+"""What a CCSDS message says that no number of a run does: epoch, axes and names. None of it is made up."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any, get_args
+
+import mpmath
+
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.rotations import AXES, Rotations, product
+from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
+from rigidsim.scene.validation_messages import nearest, shown
+
+_BITS = 160  # far beyond the 16 digits of a message
+
+
+@dataclass(frozen=True)
+class Naming:
+    """What a run's config may have left open.
+
+    Attributes:
+        epoch: time zero of the scene, as in ``[time] epoch``; empty for the config's.
+        axes: the scene's space axes, as in ``[frame] axes``, or another name that sender and receiver agree
+            on (capitals, digits and underscores); empty for the config's.
+        object_name: of the body; empty for the run's name.
+        object_id: its international designator, or UNKNOWN.
+        center: what the origin of positions is called.
+    """
+
+    epoch: str = ""
+    axes: str = ""
+    object_name: str = ""
+    object_id: str = "UNKNOWN"
+    center: str = "UNKNOWN"
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Epoch and axes that a message names.
+
+    Attributes:
+        epoch: time zero of the scene.
+        axes: of the scene.
+        frame: of the message: the same, where the standard knows it.
+        turn: angle (mpf, rad) about X from the message's axes to the scene's; None where they are the same.
+    """
+
+    epoch: Epoch
+    axes: str
+    frame: str
+    turn: Any = None
+
+    @property
+    def notes(self) -> list[str]:
+        """For the message's comments."""
+        found = [f"{self.epoch} is time zero of the scene"]
+        if self.turn is not None:
+            arcsec = float(mpmath.degrees(self.turn)) * 3600
+            found.append(
+                f"its space axes, {self.axes}, were turned about X by the obliquity to {self.frame}: "
+                f"{arcsec:.3f} arcsec (IAU 2006)"
+            )
+        return found
+
+    def attitude(self, quaternion: list[Decimal]) -> list[Decimal]:
+        """Quaternions w x y z from body axes to the scene's, as ones to the message's."""
+        if self.turn is None:
+            return quaternion
+        context = mpmath.MPContext()
+        context.prec = _BITS
+        half = self.turn / 2
+        turn = [context.cos(half), context.sin(half), context.zero, context.zero]
+        return _decimals(product(turn, [context.mpf(str(x)) for x in quaternion]))
+
+    def vector(self, components: list[Decimal]) -> list[Decimal]:
+        """A vector of the scene's axes in the message's."""
+        if self.turn is None:
+            return components
+        context = mpmath.MPContext()
+        context.prec = _BITS
+        rotations = Rotations(
+            context.sin, context.cos, context.atan2, context.hypot, context.mpf, lambda x: x == 0
+        )
+        matrix = rotations.elementary(AXES.index("x"), self.turn)
+        return _decimals(rotations.apply(matrix, [context.mpf(str(x)) for x in components]))
+
+
+def _decimals(values: list[Any]) -> list[Decimal]:
+    return [Decimal(mpmath.nstr(x, 40)) for x in values]
+
+
+def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
+    """Epoch and axes of a message, from the options given and the run's own attributes.
+
+    Raises:
+        RigidsimError: neither says one of them, they contradict each other, or an option is malformed.
+    """
+    epoch = _epoch(naming.epoch, str(attributes.get("epoch", "")))
+    axes = _axes(naming.axes, str(attributes.get("axes", "")))
+    if axes != ECLIPTIC:
+        return Labels(epoch, axes, axes)
+    context = mpmath.MPContext()
+    context.prec = _BITS
+    return Labels(epoch, axes, EQUATOR, OBLIQUITY.at(context))
+
+
+def _epoch(given: str, known: str) -> Epoch:
+    try:
+        epoch = parse_epoch(given) if given else None
+    except ValueError as error:
+        raise RigidsimError(f"--epoch: {error}") from None
+    if not known and epoch is None:
+        raise RigidsimError(
+            "the run doesn't say what its time 0 is, which a message must: give [time] epoch in the config, "
+            'or --epoch "2029-04-13T21:46:00 TDB" here (scales TDB, TT and UTC)'
+        )
+    if known and epoch is not None and str(epoch) != known:
+        raise RigidsimError(f"--epoch: given {epoch}, but time 0 of the run is {known}; leave the option out")
+    return epoch or parse_epoch(known)
+
+
+def _axes(given: str, known: str) -> str:
+    names = get_args(SpaceAxes)
+    if not given and not known:
+        raise RigidsimError(
+            "the run doesn't say what its space axes are, which a message must: give [frame] axes in the "
+            f"config, or --axes here ({', '.join(names)}, or a name in capitals that sender and receiver "
+            "agree on); csv needs none"
+        )
+    if known and given and given != known:
+        raise RigidsimError(
+            f'--axes: given {shown(given)}, but the run\'s axes are "{known}"; leave the option out'
+        )
+    near = nearest(given, names)
+    if given and given not in names and (near or not re.fullmatch(r"[A-Z][A-Z0-9_]{0,60}", given)):
+        raise RigidsimError(
+            f"--axes: given {shown(given)}{near}; allowed: {', '.join(names)}, or another name in capitals, "
+            "digits and underscores"
+        )
+    return given or known

@@ -1,0 +1,127 @@
+"""Where a scene's samples lie: a grid or a list of times, kept as exactly as they were written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene import schema
+from rigidsim.scene.exact import rounded
+from rigidsim.scene.validation_messages import shown
+
+_MOST_SAMPLES = 10**12
+
+
+@dataclass(frozen=True)
+class SampleTimes:
+    """Where samples lie, seconds, as exactly as they were written: ``begin + i * step``, or a list.
+
+    Attributes:
+        begin: of the motion.
+        step: from one sample of a grid to the next; zero for a list.
+        times: the list, or None.
+        count: number of samples.
+        context: of the scene.
+    """
+
+    begin: Fraction
+    step: Fraction
+    times: tuple[Fraction, ...] | None
+    count: int
+    context: Any
+
+    @classmethod
+    def listed(cls, begin: Fraction, times: Sequence[Fraction], context: Any) -> SampleTimes:
+        """A list."""
+        return cls(begin, Fraction(0), tuple(times), len(times), context)
+
+    @property
+    def exact_last(self) -> Fraction:
+        """Time of the last sample."""
+        return self.times[-1] if self.times is not None else self.begin + self.step * (self.count - 1)
+
+    @property
+    def start(self) -> Any:
+        """Of the motion (mpf)."""
+        return rounded(self.begin, self.context)
+
+    @property
+    def last(self) -> Any:
+        """Time of the last sample (mpf)."""
+        return rounded(self.exact_last, self.context)
+
+
+def sample_times(table: schema.Time, context: Any) -> tuple[Any, Any, SampleTimes]:
+    """Start and end of the motion (s, mpf), and the samples, of a config's ``[time]``.
+
+    Raises:
+        ConfigError: a contradiction or a value out of range.
+    """
+    ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
+    if len(ways) > 1:
+        raise _fail(ways[1], f"given beside {ways[0]}; only one of samples, every, times is allowed")
+
+    def shortly(time: Fraction, digits: int = 12) -> str:
+        return str(context.nstr(rounded(time, context), digits))
+
+    start = table.start.fraction(context)
+    if table.times is not None:
+        times = [t.fraction(context) for t in table.times]
+        if not times:
+            raise _fail("times", "given an empty array; at least one time is needed")
+        for i, (a, b) in enumerate(pairwise(times)):
+            if not a < b:
+                raise _fail(f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must increase")
+        if times[0] < start:
+            raise _fail(
+                "times[0]",
+                f"given {shortly(times[0])} s; start ({shortly(start)} s) or later is allowed",
+            )
+        end = table.end.fraction(context) if table.end is not None else times[-1]
+        if times[-1] > end:
+            raise _fail(
+                f"times[{len(times) - 1}]",
+                f"given {shortly(times[-1])} s; end ({shortly(end)} s) or earlier is allowed",
+            )
+        return rounded(start, context), rounded(end, context), SampleTimes.listed(start, times, context)
+    if table.end is None:
+        raise _fail("end", "missing; it must be given, unless times are")
+    end = table.end.fraction(context)
+    if not end > start:
+        raise _fail("end", f"given {shortly(end)} s; after start ({shortly(start)} s) is allowed")
+    if table.every is not None:
+        step = table.every.fraction(context)
+        if not step > 0:
+            raise _fail("every", f"given {shortly(step)} s; a positive time is allowed")
+        irrational = any(t is not None and t.pi_power for t in (table.start, table.end, table.every))
+        slack = Fraction(1, 2**100) if irrational else 0  # an end on the grid is a sample, rounded or not
+        intervals = math.floor((end - start) / step + slack)
+        if intervals > _MOST_SAMPLES:
+            ratio = shortly((end - start) / step, 3)
+            raise _fail("every", f"asks for {ratio} samples; at most 1e12 are allowed")
+        if intervals == 0:
+            raise _fail(
+                "every",
+                f"given {shortly(step)} s, longer than the whole run; at most end - start "
+                f"({shortly(end - start)} s) is allowed",
+            )
+    else:
+        count = table.samples if table.samples is not None else 1001
+        if not 2 <= count <= _MOST_SAMPLES:
+            raise _fail(
+                "samples",
+                f"given {shown(count)}; 2 to 1e12 are allowed (the first at start, the last at end)",
+            )
+        intervals = count - 1
+        step = (end - start) / intervals
+    samples = SampleTimes(start, step, None, intervals + 1, context)
+    return rounded(start, context), rounded(end, context), samples
+
+
+def _fail(key: str, text: str) -> ConfigError:
+    return ConfigError(Problem(f"[time] {key}", text))
