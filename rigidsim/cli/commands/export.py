@@ -32,6 +32,7 @@ def export(
         str | None,
         typer.Option(
             "--axes",
+            "--frame",
             metavar="NAME",
             help="For aem and oem: what the space axes are, where the config doesn't say: ICRF, EME2000, ...",
         ),
