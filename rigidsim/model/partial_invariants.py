@@ -12,16 +12,17 @@ from rigidsim.model.drift_scales import linear_momentum_scale, momentum_scale, t
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables import (
     MOMENTUM,
-    NO_UNIT,
     SPACE,
     Observable,
     linear_momentum,
     mass_exponent,
+    only_when_named,
     same_unit,
     total_momentum,
 )
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Vector, apply, norm
 from rigidsim.scene.registry import register_observable
 
 
@@ -38,9 +39,15 @@ def _free_axis(which: int) -> Callable[[Mechanics], Vector | None]:
     return lambda m: fixed_axes.free_axis(m, which)
 
 
-def _direction(m: Mechanics) -> list[Symbolic]:
-    inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in m.momentum_body]))
-    return [x * inverse for x in m.momentum_space]
+def _across_its_beginning(m: Mechanics) -> list[Symbolic]:
+    """L - (L . d) d, d the direction of L at the start."""
+    scene, context = m.scene, m.scene.context
+    begun = apply(
+        attitude.rotation_matrix(scene.quaternion), apply(scene.body.inertia, scene.angular_velocity)
+    )
+    unit = [m.number(x / norm(context, begun)) for x in begun]
+    along = hy.sum([u * x for u, x in zip(unit, m.momentum_space, strict=True)])
+    return [x - u * along for u, x in zip(unit, m.momentum_space, strict=True)]
 
 
 def _across_gravity(m: Mechanics) -> list[Symbolic]:
@@ -57,10 +64,6 @@ def _brun_scale(m: Mechanics) -> tuple[Any, str]:
 def _bogoyavlensky_scale(m: Mechanics) -> tuple[Any, str]:
     value = fixed_axes.largest_bogoyavlensky(m, momentum_scale(m)[0])
     return value, "sum of 3 G M / R^3 times the scale of Brun's constant"
-
-
-def _unit_scale(m: Mechanics) -> tuple[Any, str]:
-    return m.scene.context.one, "1"
 
 
 _BUILT_IN: tuple[Observable, ...] = (
@@ -84,9 +87,10 @@ _BUILT_IN: tuple[Observable, ...] = (
         for i in range(3)
     ),
     Observable(
-        "angular_momentum_direction", SPACE, "1", "direction of the angular momentum",
-        _direction, same_unit(NO_UNIT, 3), "space axes", ("isotropic_damping",),
-        lambda m: "the damping is in proportion to the inertia tensor", _unit_scale,
+        "angular_momentum_across", SPACE, "kg m2 s-1", "angular momentum across its initial direction",
+        _across_its_beginning, same_unit(MOMENTUM, 3), "space axes", ("isotropic_damping",),
+        lambda m: "the damping is in proportion to the inertia tensor", momentum_scale,
+        by_default=only_when_named,  # zeros
     ),
     Observable(
         "brun_constant", (), "kg2 m4 s-2", "Brun's constant",

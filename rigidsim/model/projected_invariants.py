@@ -49,7 +49,7 @@ _NEVER = {
             "angular_momentum_x",
             "angular_momentum_y",
             "angular_momentum_z",
-            "angular_momentum_direction",
+            "angular_momentum_across",
             "brun_constant",
             "bogoyavlensky_constant",
             "total_angular_momentum_axial",
