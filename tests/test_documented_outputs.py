@@ -154,6 +154,19 @@ def test_every_marker_has_its_output() -> None:
     assert any(not shown.slow for shown in OUTPUTS)
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_what_a_page_names_is_there(page: Path) -> None:
+    """Files, modules and links."""
+    text = page.read_text(encoding="utf-8")
+    rooms = "tests|experiments|rigidsim|configs|docs"
+    paths = [ROOT / name for name in re.findall(rf"`((?:{rooms})/[\w/.-]+)`", text)]
+    found = re.findall(r"python -m ([a-z_]+(?:\.[a-z_]+)+)", text)
+    modules = [ROOT / name.replace(".", "/") for name in found]
+    links = [page.parent / name for name in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in name]
+    assert [path for path in paths + links if not path.exists()] == []
+    assert [module for module in modules if not module.with_suffix(".py").exists()] == []
+
+
 CHECKS = "| check | measured | expected | error | allowed | |\n"
 
 
