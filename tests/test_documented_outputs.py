@@ -30,6 +30,8 @@ from pathlib import Path
 
 import pytest
 
+from rigidsim.scene import schema
+
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), ROOT / "experiments" / "README.md"]
 _BLOCK = r"(```\n.*?^```$|(?:\|[^\n]*\n)+)"
@@ -165,6 +167,16 @@ def test_what_a_page_names_is_there(page: Path) -> None:
     links = [page.parent / name for name in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in name]
     assert [path for path in paths + links if not path.exists()] == []
     assert [module for module in modules if not module.with_suffix(".py").exists()] == []
+
+
+def test_the_readme_has_every_key_of_a_config() -> None:
+    text = PAGES[0].read_text(encoding="utf-8")
+    reference = text[text.index("## Config reference") : text.index("## Long runs")]
+    tables = [schema.Body, schema.Initial, schema.Frame, schema.Time, schema.Integrator, schema.Output]
+    keys = {key for table in [*tables, schema.EventTable, schema.Limits] for key in table.model_fields}
+    assert {key for key in keys if f"`{key}`" not in reference} == set()
+    named = {f"`{key}`" in reference or f"[{key}]" in reference for key in schema.config_model().model_fields}
+    assert named == {True}
 
 
 CHECKS = "| check | measured | expected | error | allowed | |\n"
