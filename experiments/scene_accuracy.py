@@ -61,7 +61,7 @@ def rows(path: Path, out: str) -> list[str]:
         drift = max(row["largest_drift"] / row["bound"] for row in result.summary["invariants"].values())
         found.append(
             f"| {path.stem} | {formulation} | {cost['steps']} | {error:.1e} | {3 * law:.1e} | "
-            f"{accuracy['amplification']:.2g} | {accuracy['estimated_attitude_error']:.1e} | {drift:.3f} |"
+            f"{accuracy['amplification']:.2g} | {accuracy['estimated_attitude_error']:.1e} | {drift:.1e} |"
         )
     return found
 

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import Context, Decimal, localcontext
 from typing import Any, get_args
 
 import mpmath
 
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.arithmetic import apply
 from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.rotations import AXES, Rotations, product
 from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
 from rigidsim.scene.validation_messages import nearest, shown
 
 _BITS = 160  # far beyond the 16 digits of a message
+_WIDE = Context(prec=60)
 
 
 @dataclass(frozen=True)
@@ -40,58 +44,68 @@ class Naming:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """From the scene's axes to those of a message that are turned about X.
+
+    Attributes:
+        quaternion: of the scene's axes in the message's, w x y z.
+        matrix: turns vectors of the scene's axes into the message's.
+        words: for the message's comments.
+    """
+
+    quaternion: list[Decimal]
+    matrix: list[list[Decimal]]
+    words: str
+
+    @classmethod
+    def by(cls, angle: ExactNumber, words: str) -> Turn:
+        """A turn of the scene's axes about X (rad)."""
+        context = mpmath.MPContext()
+        context.prec = _BITS
+        whole = angle.at(context)
+        functions = context.sin, context.cos, context.atan2, context.hypot, context.mpf
+        matrix = Rotations(*functions, negligible=lambda x: x == 0).elementary(AXES.index("x"), whole)
+        half = [context.cos(whole / 2), context.sin(whole / 2), context.zero, context.zero]
+        return cls(_decimals(half), [_decimals(row) for row in matrix], words)
+
+
+@dataclass(frozen=True)
 class Labels:
     """Epoch and axes that a message names.
 
     Attributes:
         epoch: time zero of the scene.
-        axes: of the scene.
-        frame: of the message: the same, where the standard knows it.
-        turn: angle (mpf, rad) about X from the message's axes to the scene's; None where they are the same.
+        frame: of the message: the scene's axes, where the standard knows them.
+        turn: from the scene's axes to the message's; None where they are the same.
     """
 
     epoch: Epoch
-    axes: str
     frame: str
-    turn: Any = None
+    turn: Turn | None = None
 
     @property
     def notes(self) -> list[str]:
         """For the message's comments."""
         found = [f"{self.epoch} is time zero of the scene"]
-        if self.turn is not None:
-            arcsec = float(mpmath.degrees(self.turn)) * 3600
-            found.append(
-                f"its space axes, {self.axes}, were turned about X by the obliquity to {self.frame}: "
-                f"{arcsec:.3f} arcsec (IAU 2006)"
-            )
-        return found
+        return found if self.turn is None else [*found, self.turn.words]
 
     def attitude(self, quaternion: list[Decimal]) -> list[Decimal]:
         """Quaternions w x y z from body axes to the scene's, as ones to the message's."""
         if self.turn is None:
             return quaternion
-        context = mpmath.MPContext()
-        context.prec = _BITS
-        half = self.turn / 2
-        turn = [context.cos(half), context.sin(half), context.zero, context.zero]
-        return _decimals(product(turn, [context.mpf(str(x)) for x in quaternion]))
+        with localcontext(_WIDE):
+            return product(self.turn.quaternion, quaternion)
 
     def vector(self, components: list[Decimal]) -> list[Decimal]:
         """A vector of the scene's axes in the message's."""
         if self.turn is None:
             return components
-        context = mpmath.MPContext()
-        context.prec = _BITS
-        rotations = Rotations(
-            context.sin, context.cos, context.atan2, context.hypot, context.mpf, lambda x: x == 0
-        )
-        matrix = rotations.elementary(AXES.index("x"), self.turn)
-        return _decimals(rotations.apply(matrix, [context.mpf(str(x)) for x in components]))
+        with localcontext(_WIDE):
+            return apply(self.turn.matrix, components)
 
 
 def _decimals(values: list[Any]) -> list[Decimal]:
-    return [Decimal(mpmath.nstr(x, 40)) for x in values]
+    return [Decimal(mpmath.nstr(x, 45)) for x in values]
 
 
 def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
@@ -103,10 +117,11 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
     epoch = _epoch(naming.epoch, str(attributes.get("epoch", "")))
     axes = _axes(naming.axes, str(attributes.get("axes", "")))
     if axes != ECLIPTIC:
-        return Labels(epoch, axes, axes)
-    context = mpmath.MPContext()
-    context.prec = _BITS
-    return Labels(epoch, axes, EQUATOR, OBLIQUITY.at(context))
+        return Labels(epoch, axes)
+    arcsec = float(OBLIQUITY) * 180 / math.pi * 3600
+    words = f"turned about X by the obliquity to {EQUATOR}: {arcsec:.3f} arcsec (IAU 2006)"
+    turn = Turn.by(OBLIQUITY, f"its space axes, {axes}, were {words}")
+    return Labels(epoch, EQUATOR, turn)
 
 
 def _epoch(given: str, known: str) -> Epoch:

@@ -54,6 +54,7 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
             key, value_text = _parts(assignment)
             try:
                 value: Any = tomlkit.parse(f"value = {value_text}\n").item("value")
+                value.trivia.comment = value.trivia.comment_ws = ""
             except (ValueError, RecursionError):
                 value = tomlkit.string(value_text)
             _assign(document, key, value, assignment)

@@ -80,7 +80,7 @@ def time_variable(parts: int) -> Variable:
     return Variable(
         "time",
         (),
-        {"units": "s", "long_name": "time since the start of the scene", "axis": "T"},
+        {"units": "s", "long_name": "time of the scene", "axis": "T"},
         parts,
     )
 

@@ -124,6 +124,16 @@ def test_the_saved_config_is_the_run(config: Config, rigidsim_command: Command) 
     same_bits(rigidsim.open_run("runs/free"), rigidsim.open_run("again/free"))
 
 
+def test_comments_of_an_earlier_version_are_told_of(config: Config, rigidsim_command: Command) -> None:
+    path = Path(config(time="end = 2\nsamples = 3"))
+    path.write_text(path.read_text() + "#:set time.end=1\n")
+    result = rigidsim_command("run", str(path))
+    assert result.exit_code == 0
+    assert "#:set comments at its end set nothing" in result.stderr
+    with rigidsim.open_run("runs/free").dataset as dataset:
+        assert dataset.time[-1] == 2
+
+
 @pytest.mark.parametrize("override", ["time.end", "=3", "time.bogus=1", "time.times[3]=1", "body[0]=1"])
 def test_a_bad_set_is_a_message(override: str, config: Config, rigidsim_command: Command) -> None:
     result = rigidsim_command("run", config(), "--set", override)

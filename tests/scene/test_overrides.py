@@ -92,6 +92,7 @@ SETTINGS = [
     "name=b c",
     'x={a="b"}',
     "time.end = 3 # s",
+    "body.mass=2 # kg",
 ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,7 @@ def run(
     Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
     """
     from rigidsim.cli import progress
+    from rigidsim.scene.config import has_earlier_settings
     from rigidsim.workflows.read import load
     from rigidsim.workflows.run import run as run_experiment
 
@@ -41,6 +43,13 @@ def run(
         experiments.append(embedded(dataset, overrides=overrides or []))
     if not experiments:
         raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
+    for experiment in experiments:
+        if has_earlier_settings(experiment.given):
+            print(
+                f"rigidsim: {experiment.source}: #:set comments at its end set nothing (an earlier version "
+                "kept there what --set had replaced); write the values where their keys stand",
+                file=sys.stderr,
+            )
     worst = 0
     for experiment in experiments:
         with progress.observer() as observer:

@@ -1,0 +1,105 @@
+"""Numbers in the comments of configs/ are those of the scenes below them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import CONFIGS
+
+import rigidsim
+from rigidsim.scene.scene import Scene, build_scene
+
+SOLAR = 86400 / 86164.0905  # sidereal days in a mean solar one
+
+
+def top(scene: Scene) -> tuple[float, float, float, float]:
+    """A, C, M g l and the spin of a heavy symmetric top."""
+    a, c = (float(scene.body.principal_moments[i]) for i in (0, 2))
+    assert scene.gravity is not None
+    assert scene.body.mass is not None
+    pull = float(scene.body.mass * scene.body.center_of_mass[2] * -scene.gravity[2])
+    return a, c, pull, float(scene.angular_velocity[2])
+
+
+def threshold(scene: Scene) -> list[str]:
+    a, c, pull, _ = top(scene)
+    return [f"{2 * math.sqrt(a * pull) / c:.2f} rad/s here"]
+
+
+def falling(scene: Scene) -> list[str]:
+    a, c, pull, spin = top(scene)
+    return [*threshold(scene), f"= {math.sqrt(pull / a - (c * spin / (2 * a)) ** 2):.2f} per second"]
+
+
+def fast(scene: Scene) -> list[str]:
+    a, c, pull, spin = top(scene)
+    return [f"{pull / (c * spin):.3f} rad/s", f"{c / a * spin:.0f} rad/s"]
+
+
+def regular(scene: Scene) -> list[str]:
+    a, c, pull, spin = top(scene)
+    needed = (a * 2**2 * math.cos(math.pi / 3) + pull) / (2 * c)  # of A p^2 cos - C w3 p + M g l, p = 2 rad/s
+    assert spin == pytest.approx(needed, rel=1e-12)
+    return [f"w3 = {needed:.3f} rad/s"]
+
+
+def nutation(scene: Scene) -> float:
+    """Sidereal days of a free nutation of the Earth."""
+    a, c = (float(scene.body.principal_moments[i]) for i in (0, 2))
+    return a / (c - a)
+
+
+def symmetric(scene: Scene) -> list[str]:
+    a, c = (float(scene.body.principal_moments[i]) for i in (0, 2))
+    return [f"= {(c - a) / a * float(scene.angular_velocity[2]):.1f} rad/s"]
+
+
+STATED: dict[str, Callable[[Scene], list[str]]] = {
+    "earth_free_nutation": lambda s: [f"{nutation(s):.3f} sidereal", f"{nutation(s) / SOLAR:.2f} mean solar"],
+    "earth_free_nutation_axes": lambda s: [f"{nutation(s):.1f} sid", f"{nutation(s) / SOLAR:.1f} mean solar"],
+    "free_symmetric_top": symmetric,
+    "heavy_top_fast": fast,
+    "heavy_top_regular_precession": regular,
+    "heavy_top_sleeping_stable": threshold,
+    "heavy_top_sleeping_unstable": falling,
+    "intermediate_axis": lambda s: [", ".join(f"{float(m):g}" for m in s.body.principal_moments)],
+    "tumbling_planet": lambda s: [f"{float(s.body.principal_moments[2]):.0e} kg m^2".replace("+", "")],
+}
+
+
+def given(name: str) -> tuple[str, str]:
+    """A config's text, and the same without line breaks in its comments."""
+    (path,) = (path for path in CONFIGS if path.stem == name)
+    text = path.read_text(encoding="utf-8")
+    return text, text.replace("\n# ", " ")
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_what_a_scene_gives_at_once(name: str) -> None:
+    text, comments = given(name)
+    for phrase in STATED[name](build_scene(rigidsim.parse(text))):
+        assert phrase in comments
+
+
+def test_what_the_asymmetric_top_runs_through(runs: Path) -> None:
+    text, comments = given("asymmetric_top")
+    run = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs)
+    with run.dataset as dataset:
+        rates = np.linalg.norm(dataset.angular_velocity.values, axis=1)
+        turned = np.trapezoid(rates, dataset.time.values)
+    assert f"by {turned:.0f} rad in {run.summary['cost']['steps']} steps" in comments
+
+
+def test_the_water_molecule_flips(runs: Path) -> None:
+    text, comments = given("water_molecule")
+    run = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs)
+    with run.dataset as dataset:
+        spin = dataset.angular_velocity.sel(body_axis="z").values
+        flips = dataset.time.values[np.flatnonzero(np.diff(np.sign(spin)))]
+        last = float(dataset.time[-1])
+    assert f"every {np.diff(flips).mean() * 1e12:.2f} ps" in comments
+    assert f"steps of {10 ** round(math.log10(last / run.summary['cost']['steps'])):.0e} s" in comments
