@@ -68,6 +68,7 @@ def assemble_states(
         list(hy.make_vars(*VELOCITY)) if flies else None,
         number,
         plan.orbit_tags,
+        plan.surfaces,
         loads=list(plan.loads),
     )
     blocks = [_canonical_block(m, canonical, plan)] if canonical else _rotation_blocks(m, plan)

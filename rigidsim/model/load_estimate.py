@@ -56,10 +56,10 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     """
     if not loads:
         return None
-    m = _probe(scene, requirements, loads)
+    m = probe(scene, requirements, loads)
     torque = [term for load in loads for term in load.torque(m)]
     force = [term for load in loads for term in load.force(m)] if m.velocity is not None else []
-    names, start = _start(m, loads)
+    names, start = start_of(m, loads)
     narrow = [u for load in loads for u in load.narrow(m)]
     samples = _Samples(m, names, start, narrow)
     context, scaling = scene.context, m.scaling
@@ -93,7 +93,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     )
 
 
-def _probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
+def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
     """The scene in double precision and quaternions, in units that know nothing of these loads."""
     scaling = choose_scaling(scene)
     numbers = scaled_numbers(scene, scaling)
@@ -110,7 +110,7 @@ def _probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> M
     )
 
 
-def _start(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
+def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
     """Names and initial values of all states that the loads may read, internal units."""
     scene, scaling, context = m.scene, m.scaling, m.scene.context
     values = {

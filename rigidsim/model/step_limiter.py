@@ -34,7 +34,7 @@ def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     for event in m.scene.events:
         names = state_names(m, event.reads)
         found += [
-            (f"event {event.name}", to_heyoka(part, names, m.number, m.scene.context))
+            (f"event {event.name}", to_heyoka(part, names, m.number, m.scene.context, m.sides))
             for part in narrow_parts(event.expression)
         ]
     return found
@@ -56,10 +56,18 @@ def pace_derivative(found: Sequence[Symbolic], derivatives: Mapping[str, Symboli
 
 def along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
     """Time derivative of an expression of time and the states, internal units."""
+    by_time, by_state = slopes(u)
+    terms = [slope * derivatives[name] for name, slope in by_state.items()]
+    return hy.sum([*terms, *by_time]) if terms or by_time else hy.expression(0.0)
+
+
+def slopes(u: Symbolic) -> tuple[list[Symbolic], dict[str, Symbolic]]:
+    """Partial derivatives of an expression: by time, where it depends on it, and by states."""
     clock = hy.make_vars(_CLOCK)
     plain = hy.subs(u, {hy.time: clock})
-    terms = []
-    for name in hy.get_variables(plain):
-        slope = hy.subs(hy.diff(plain, hy.make_vars(name)), {clock: hy.time})
-        terms.append(slope if name == _CLOCK else slope * derivatives[name])
-    return hy.sum(terms) if terms else hy.expression(0.0)
+    found = {
+        name: hy.subs(hy.diff(plain, hy.make_vars(name)), {clock: hy.time})
+        for name in hy.get_variables(plain)
+    }
+    by_time = [found.pop(_CLOCK)] if _CLOCK in found else []
+    return by_time, found

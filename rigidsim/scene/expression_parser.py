@@ -25,6 +25,7 @@ from rigidsim.scene.expressions import (
     FUNCTIONS,
     LARGEST_POWER,
     ONE,
+    PIECEWISE,
     RESERVED,
     Constant,
     Expression,
@@ -35,11 +36,16 @@ from rigidsim.scene.expressions import (
     constant_value,
     operation,
 )
+from rigidsim.scene.piecewise import power, written_out
 from rigidsim.scene.validation_messages import nearest
 
 LONGEST_TEXT = 2000
 DEEPEST_NESTING = 64
-_INSTEAD = {"abs": "; write sqrt((...)^2)", "ln": "; write log(...)", "pow": "; write x^2"}
+MOST_NODES = 5000
+_FUNCTIONS = {**FUNCTIONS, **PIECEWISE}
+_INSTEAD = {"ln": "; write log(...)", "pow": "; write x^2", "sgn": "; write sign(...)"}
+_INSTEAD |= {"heaviside": "; write step(...)", "mod": "; write wrap(...), which takes off full turns"}
+_USAGE = {"atan2": "y, x", "min": "a, b", "max": "a, b", "pulse": "x, begin, end"}
 _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4, "**": 4}
 _SIGN_BINDS = 3
 _OPERATORS = {"+": "sum", "-": "sum", "*": "product", "/": "quotient"}
@@ -157,13 +163,14 @@ class _Parser:
         while self.at(*_BINDS) and _BINDS[self.token] > weakest:
             sign = self.advance()
             if sign in ("^", "**"):
-                operator, right = "power", self.exponent()
-            else:
-                operator, right = _OPERATORS[sign], self.binary(_BINDS[sign])
-                right = operation("negative", (right,), right.span) if sign == "-" else right
-                if sign == "/" and self.constant(right) == 0:
-                    raise Expression(self.text, right).error("division by the zero", right)
-            left = operation(operator, (left, right), (start, self.end))
+                exponent = self.exponent()
+                left = self.bounded(power(left, exponent, (start, self.end)), start)
+                continue
+            right = self.binary(_BINDS[sign])
+            right = operation("negative", (right,), right.span) if sign == "-" else right
+            if sign == "/" and self.constant(right) == 0:
+                raise Expression(self.text, right).error("division by the zero", right)
+            left = operation(_OPERATORS[sign], (left, right), (start, self.end))
         return left
 
     def exponent(self) -> Node:
@@ -191,7 +198,7 @@ class _Parser:
         if self.kind != "name":
             self.fail(f'a number, a name or "(" is missing before {self.token or "the end"}')
         name = self.advance()
-        if name in FUNCTIONS or self.at("("):
+        if name in _FUNCTIONS or self.at("("):
             return self.call(name, start)
         span = (start, self.end)
         if name in self.names:
@@ -206,14 +213,25 @@ class _Parser:
     def call(self, name: str, start: int) -> Node:
         if name in self.known:
             self.fail(f'"{name}" is no function; a product has its *, as in {name}*(...)', start)
-        if name not in FUNCTIONS:
-            near = _INSTEAD.get(name) or nearest(name, FUNCTIONS)
-            self.fail(f'unknown function "{name}"{near}; allowed: {", ".join(FUNCTIONS)}', start)
-        usage = f"write {name}({'y, x' if FUNCTIONS[name] == 2 else 'x'})"
+        if name not in _FUNCTIONS:
+            near = _INSTEAD.get(name) or nearest(name, _FUNCTIONS)
+            self.fail(f'unknown function "{name}"{near}; allowed: {", ".join(_FUNCTIONS)}', start)
+        usage = f"write {name}({_USAGE.get(name, 'x')})"
         if not self.at("("):
             self.fail(f'the function "{name}" has its arguments in parentheses; {usage}', start)
-        arguments = self.arguments(FUNCTIONS[name], f'"{name}" takes {FUNCTIONS[name]}; {usage}')
-        return Operation(name, tuple(arguments), (start, self.end))
+        arguments = self.arguments(_FUNCTIONS[name], f'"{name}" takes {_FUNCTIONS[name]}; {usage}')
+        return self.bounded(written_out(name, arguments, (start, self.end)), start)
+
+    def bounded(self, node: Node, start: int) -> Node:
+        """A node that isn't too large: arguments of piecewise functions are written out several times."""
+        waiting, count = [node], 0
+        while waiting:
+            inner = waiting.pop()
+            waiting += inner.operands if isinstance(inner, Operation) else ()
+            count += 1
+            if count > MOST_NODES:
+                self.fail("too many piecewise functions within one another; write fewer", start)
+        return node
 
     def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[Node]:
         """What stands in parentheses."""

@@ -20,7 +20,8 @@ _FLAT = frozenset({"exp", "sinh", "cosh", "tanh", "erf", "sigmoid", "atan"})
 """Functions with an end at which they hardly change."""
 _STEEP_POWER = 8  # higher ones vanish to an order near that of the Taylor method
 _BOUNDED: Mapping[str, float] = {
-    "sin": 1, "cos": 1, "tanh": 1, "erf": 1, "sigmoid": 1, "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
+    "sin": 1, "cos": 1, "sign": 1, "tanh": 1, "erf": 1, "sigmoid": 1,
+    "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
     "qw": 1, "qx": 1, "qy": 1, "qz": 1, "phi": 4, "theta": 4, "psi": 4,
 }  # fmt: skip
 

@@ -132,6 +132,8 @@ def closing_words(
         ending = next(f for f in log.found if log.stops[f.index])
         name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
         return f"{text}: {name} at {when:.9g} s"
+    if progress.status is Status.UNRESOLVED:
+        return f"{text}: {progress.detail} (at {progress.time:.9g} s, after {progress.steps} steps)"
     if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
         return text
     text += f"; last good state at {progress.time:.9g} s after {progress.steps} steps"
