@@ -10,6 +10,9 @@ nowhere, and its series converge as far as its poles, which lie B widths from th
 shorten in proportion to the distance, and the cost of a pulse grows with the logarithm of its width alone.
 (A pulse of width 1e-4 s in a run of 100 s: 143 steps, where steps capped by the width would be a million.)
 With B = 4 a function of u is seen on its own account by then, so a wide one costs hardly a step.
+
+To a root of v, which has a kink where v touches zero, belongs the term log(v) / 64: where v does vanish, its
+series end there, and so does the run, with steps that collapse, instead of going on along the wrong branch.
 """
 
 from __future__ import annotations
@@ -40,14 +43,22 @@ def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     return found
 
 
-def pace_derivative(found: Sequence[Symbolic], derivatives: Mapping[str, Symbolic]) -> Symbolic:
+def roots(m: Mechanics) -> list[tuple[str, Symbolic]]:
+    """(of what, what a root is taken of) of all loads."""
+    return [(load.title, v) for load in m.loads for v in load.roots(m)]
+
+
+def pace_derivative(
+    found: Sequence[Symbolic], under_roots: Sequence[Symbolic], derivatives: Mapping[str, Symbolic]
+) -> Symbolic:
     """The state's right-hand side.
 
     Args:
         found: arguments, dimensionless.
+        under_roots: what roots are taken of.
         derivatives: of the states that they read.
     """
-    terms = []
+    terms = [0.5 * (along_the_motion(v, derivatives) / v) for v in under_roots]
     for u in found:
         rate = along_the_motion(u, derivatives)
         terms.append(rate * (u / (WIDE**2 + u * u)))

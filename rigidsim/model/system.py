@@ -267,9 +267,14 @@ class System:
         return list(m.carried(m.attitude).quaternion) if carries_sign(m) else []
 
     @property
+    def parameters(self) -> int:
+        """How many the equations and events may have."""
+        return len(self.surfaces) + len(self.turning) + bool(self.signed)
+
+    @property
     def switches(self) -> bool:
-        """Whether its equations or events have parameters."""
-        return bool(self.surfaces or self.turning or self.signed)
+        """Whether there are any."""
+        return self.parameters > 0
 
 
 def build_system(scene: Scene, number: Rounder, extra_loads: Sequence[Load] = ()) -> System:

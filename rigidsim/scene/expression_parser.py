@@ -45,6 +45,7 @@ MOST_NODES = 5000
 _FUNCTIONS = {**FUNCTIONS, **PIECEWISE}
 _INSTEAD = {"ln": "; write log(...)", "pow": "; write x^2", "sgn": "; write sign(...)"}
 _INSTEAD |= {"heaviside": "; write step(...)", "mod": "; write wrap(...), which takes off full turns"}
+_JUMPS = ("sign", "step", "pulse")
 _USAGE = {"atan2": "y, x", "min": "a, b", "max": "a, b", "pulse": "x, begin, end"}
 _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4, "**": 4}
 _SIGN_BINDS = 3
@@ -64,7 +65,11 @@ _CHECKING = context_for("quadruple")
 
 
 def parse_expression(
-    text: str, names: Collection[str], *, parameters: Mapping[str, ExactNumber] | None = None
+    text: str,
+    names: Collection[str],
+    *,
+    parameters: Mapping[str, ExactNumber] | None = None,
+    jumps: bool = True,
 ) -> Expression:
     """Read an expression.
 
@@ -72,6 +77,7 @@ def parse_expression(
         text: one line of at most ``LONGEST_TEXT`` characters (which bounds the tree as well).
         names: of time and the state, as far as they are allowed here.
         parameters: named constants; they enter as exact numbers.
+        jumps: whether functions that are constant but for jumps are allowed.
 
     Raises:
         ExpressionError: with what was given, what is allowed, and a caret under the place. Constant parts
@@ -87,7 +93,7 @@ def parse_expression(
         raise ExpressionError(f"an expression of {len(text)} characters; at most {LONGEST_TEXT} are allowed")
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
-    expression = Expression(text, _Parser(text, names, parameters).all())
+    expression = Expression(text, _Parser(text, names, parameters, jumps).all())
     constant_value(expression, _CHECKING)
     return expression
 
@@ -95,8 +101,10 @@ def parse_expression(
 class _Parser:
     """Recursive descent over one token of lookahead: its ``kind``, ``token`` (text) and ``start``."""
 
-    def __init__(self, text: str, names: Collection[str], parameters: Mapping[str, ExactNumber]) -> None:
-        self.text, self.names = text, names
+    def __init__(
+        self, text: str, names: Collection[str], parameters: Mapping[str, ExactNumber], jumps: bool
+    ) -> None:
+        self.text, self.names, self.jumps = text, names, jumps
         self.constants = {**parameters, "pi": ExactNumber(Fraction(1), 1)}
         self.known = [*names, *self.constants, "e"]
         self.depth = self.start = self.end = 0
@@ -216,6 +224,8 @@ class _Parser:
         if name not in _FUNCTIONS:
             near = _INSTEAD.get(name) or nearest(name, _FUNCTIONS)
             self.fail(f'unknown function "{name}"{near}; allowed: {", ".join(_FUNCTIONS)}', start)
+        if name in _JUMPS and not self.jumps:
+            self.fail(f'"{name}" jumps, and a jump crosses zero nowhere; write its argument instead', start)
         usage = f"write {name}({_USAGE.get(name, 'x')})"
         if not self.at("("):
             self.fail(f'the function "{name}" has its arguments in parentheses; {usage}', start)

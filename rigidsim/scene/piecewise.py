@@ -41,7 +41,7 @@ def power(base: Node, exponent: Node, span: Span) -> Node:
         root, rest = inner, 2 * rest
     if root is None:
         return operation("power", (base, exponent), span)
-    if rest.numerator % 2 or rest.denominator != 1:
+    if (rest.numerator % 2 or rest.denominator != 1) and _square_root(root) is None:
         root = _abs([root], span)
     return root if rest == 1 else operation("power", (root, Constant(ExactNumber(rest), exponent.span)), span)
 

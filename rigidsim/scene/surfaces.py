@@ -35,16 +35,13 @@ class Surface:
     """One surface, where ``expression`` is zero.
 
     Attributes:
+        text: the function with the kink or jump, as it was written.
         where: it stands in the config.
     """
 
     expression: Expression
+    text: str
     where: str
-
-    @property
-    def text(self) -> str:
-        """The argument as it was written, or the function that it belongs to."""
-        return self.expression.text[slice(*self.expression.root.span)]
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,8 @@ def surfaces_of(scene: Scene) -> Surfaces:
             if isinstance(node, Operation) and node.operator == "sign":
                 argument = Expression(expression.text, node.operands[0])
                 if names_used(argument):
-                    arguments.setdefault(argument.root, Surface(argument, where))
+                    text = expression.text[slice(*node.span)]
+                    arguments.setdefault(argument.root, Surface(argument, text, where))
     names = frozenset().union(*(names_used(expression) for _, expression in expressions))
     if not arguments and not names & set(ATTITUDE_NAMES):
         return Surfaces()

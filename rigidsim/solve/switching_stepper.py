@@ -335,7 +335,7 @@ class SwitchingStepper(SwitchedEngines):
     def _fail(self, j: int, why: str) -> bool:
         surface = self.system.plan.surfaces.found[j]
         self.failure = (
-            f'at the zero of "{surface.text}" ({surface.where}) {why}; make the change smooth, for instance '
-            "tanh(u/width) in place of sign(u)"
+            f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; make the change smooth, for '
+            "instance tanh(u/width) in place of sign(u)"
         )
         return False

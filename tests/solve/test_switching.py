@@ -26,6 +26,7 @@ from rigidsim.solve.status import Status
 pytestmark = pytest.mark.compact
 SPHERE = "principal_moments = [1, 1, 1]"
 REST = "angular_velocity = [0, 0, 0]"
+FRICTION = 'kind = "torque"\ncomponents = ["0", "0", "-0.3*sign(wz)"]'
 TILTED = "angular_velocity = [0.3, 1.2, 2]\nquaternion = [0.5, 0.4, -0.3, 0.7]"
 """Far from the singularity of the Euler angles."""
 
@@ -229,3 +230,52 @@ def test_a_load_odd_in_the_quaternion_is_refused(formulation: str) -> None:
     for words in ("[[loads]] number 1", "sign of the quaternion", "qw*qx", "sign(qw)*qx"):
         assert words in str(refused.value)
     prepare(rigidsim.parse(text.replace("0.5*qx", "qw*qx").replace("0.2*qw", "sign(qw)*qx")))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (config(loads=FRICTION, output="lyapunov = true"), ["[output] lyapunov", "sign(wz)", "tanh"]),
+        (
+            config(
+                initial="angular_velocity = [0, 0, 1]\neuler_angles = [0.1, -0.3, 0.2]",
+                loads='kind = "torque"\ncomponents = ["0", "0", "sin(psi)"]',
+            ),
+            ["[initial] euler_angles", "-0.3", "0 to pi", "zxz"],
+        ),
+        (
+            config(more='[[events]]\nname = "a"\nexpression = "step(t - 2)*wy"'),
+            ["step", "crosses zero nowhere"],
+        ),
+    ],
+    ids=["spectrum", "other triple of angles", "event that jumps"],
+)
+def test_what_would_be_wrong_is_refused(text: str, words: list[str]) -> None:
+    with pytest.raises(ConfigError) as refused:
+        prepare(rigidsim.parse(text))
+    for word in words:
+        assert word in str(refused.value)
+
+
+def test_a_plan_lists_the_surfaces_each_once() -> None:
+    """2*wz and -wz are zero together; smooth powers have no surface."""
+    torque = '"sign(2*wz)", "abs(-wz)*min(t, 3)", "-0.1*psi + sqrt(wx^4)"'
+    text = config(initial=TILTED, loads=f'kind = "torque"\ncomponents = [{torque}]')
+    plan = rigidsim.plan(rigidsim.parse(text), pilot_seconds=0.0)
+    assert [surface["surface"] for surface in plan["switching"]] == ["sign(2*wz)", "min(t, 3)"]
+    assert plan["turning"] == ["psi"]
+
+
+def test_a_norm_that_vanishes_is_not_passed_over() -> None:
+    """About one axis sqrt(wx^2 + wy^2 + wz^2) is |wz|, whose series go on with the wrong sign; abs gives the
+    motion, the norm ends where wz does.
+    """
+    drag = "cos(t) - 0.3*{}*wz"
+    start = "angular_velocity = [0, 0, -0.5]"
+    progress, _ = about_z(drag.format("sqrt(wx^2 + wy^2 + wz^2)"), initial=start)
+    assert progress.status in (Status.NON_FINITE, Status.COLLAPSED)
+    assert progress.time < 0.6
+    progress, _ = about_z(drag.format("abs(wz)"), initial=start)
+    assert progress.status is Status.FINISHED
+    smooth, _ = about_z(drag.format("sqrt(1 + wx^2 + wy^2 + wz^2)"), initial=start)
+    assert smooth.status is Status.FINISHED
