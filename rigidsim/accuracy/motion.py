@@ -16,6 +16,7 @@ from rigidsim.solve.error_growth import Growth, measure_growth
 from rigidsim.solve.problem import double_twin, prepare_scene
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.steppers import stepper_of
 
 PILOT_STEPS = 20_000
 """Of double precision at its epsilon: some tens of milliseconds."""
@@ -120,7 +121,7 @@ def motion_of(
     prepared = compactly(prepare_scene(experiment, scene, loads=loads))
     clock, precision = prepared.clock, prepared.precision
     begin, end = float(clock.start), float(clock.at(clock.count - 1))
-    pilot = run_pilot(Stepper(prepared.system, precision, None, clock.start), clock, steps=pilot_steps)
+    pilot = run_pilot(stepper_of(prepared.system, precision, None, clock.start), clock, steps=pilot_steps)
     return Motion(
         steps=pilot.whole,
         rate=float(prepared.system.rate_bound),

@@ -177,6 +177,11 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     out.print(Text.assemble((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}"))
     for effect in plan["loads"]:
         out.print(Text("  " + effect))
+    for surface in plan["switching"]:
+        where = f"steps end on the kinks and jumps of {surface['surface']} ({surface['where']})"
+        out.print(Text("  " + where))
+    if plan["turning"]:
+        out.print(Text(f"  turns of {', '.join(plan['turning'])} count: steps are taken one by one"))
     table = _table("states", "carried because")
     for row in plan["reasons"]:
         table.add_row(row["states"], row["why"])

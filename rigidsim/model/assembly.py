@@ -23,7 +23,7 @@ from rigidsim.model.observables import WORK
 from rigidsim.model.orbital_frame import orbital_states
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
-from rigidsim.model.step_limiter import PACE, arguments, pace_derivative
+from rigidsim.model.step_limiter import PACE, arguments, pace_derivative, roots
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.orbits import KeplerOrbit
@@ -68,6 +68,7 @@ def assemble_states(
         list(hy.make_vars(*VELOCITY)) if flies else None,
         number,
         plan.orbit_tags,
+        plan.surfaces,
         loads=list(plan.loads),
     )
     blocks = [_canonical_block(m, canonical, plan)] if canonical else _rotation_blocks(m, plan)
@@ -168,11 +169,12 @@ def _work_block(m: Mechanics) -> StateBlock:
 
 def _pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
     """The state by which no step passes over a pulse or a switch, where there is any."""
-    watched = arguments(m)
-    if not watched:
+    watched, rooted = arguments(m), roots(m)
+    if not (watched or rooted):
         return []
     carried = dict(zip(before.names, before.derivatives, strict=True))
-    titles = ", ".join(dict.fromkeys(title for title, _ in watched))
-    derivative = pace_derivative([u for _, u in watched], carried)
-    why = f"{titles}: no step may pass over what is narrow in it"
+    titles = ", ".join(dict.fromkeys(title for title, _ in [*watched, *rooted]))
+    derivative = pace_derivative([u for _, u in watched], [v for _, v in rooted], carried)
+    what = " or ".join(["what is narrow"] * bool(watched) + ["a root of zero"] * bool(rooted))
+    why = f"{titles}: no step may pass over {what} in it"
     return [StateBlock([PACE], [derivative], [m.scene.context.zero], why=why)]

@@ -6,7 +6,8 @@ What heyoka does with expressions on its own account, and what is done about it 
   and reduced in the scene's arithmetic before they get there.
 - The Taylor series of ``x**n`` divides by x for every n but 2, so a state that passes through zero ends as
   NaN: whole powers are products of squares.
-- ``x**0.5`` and the other fractional powers have no series at zero; ``sqrt(x^2)`` is no way past it.
+- ``x**0.5`` and the other fractional powers have no series at zero; what is a square there is rewritten with
+  a sign (``rigidsim.scene.piecewise``).
 - The step is chosen from the series' last terms. They vanish at x = 0 for powers above the method's order
   (20 in double, less with a loose tolerance), and far from a short pulse in t: both can be stepped over.
 """
@@ -23,8 +24,16 @@ from rigidsim.model.two_part import rounded
 from rigidsim.scene import expressions
 from rigidsim.scene.expressions import Expression, Name, Node
 
+_NO_SIDES: Mapping[Node, Any] = {}
 
-def to_heyoka(expression: Expression, variables: Mapping[str, Any], number: Rounder, context: Any) -> Any:
+
+def to_heyoka(
+    expression: Expression,
+    variables: Mapping[str, Any],
+    number: Rounder,
+    context: Any,
+    sides: Mapping[Node, Any] = _NO_SIDES,
+) -> Any:
     """The expression over heyoka's variables.
 
     Args:
@@ -32,6 +41,9 @@ def to_heyoka(expression: Expression, variables: Mapping[str, Any], number: Roun
             unless it is given here.
         number: from an mpf to the working precision's scalar, rounded once.
         context: mpmath context with guard bits, in which constant parts are worked out.
+        sides: heyoka expressions for the signs of arguments that are switching surfaces; those of others are
+            found wherever the expression is evaluated, which is right for values alone: a series would go on
+            past the jump.
 
     Raises:
         ExpressionError: a constant has no finite value, or lies beyond the range of the numbers.
@@ -54,6 +66,9 @@ def to_heyoka(expression: Expression, variables: Mapping[str, Any], number: Roun
             return hy.time if node.name == "t" and "t" not in variables else variables[node.name]
         if not any(isinstance(operand, hy.expression) for operand in operands):
             return expressions.operate(expression, node, operands, context)
+        if node.operator == "sign":
+            side = sides.get(node.operands[0])
+            return hy.select(hy.gte(operands[0], 0.0), 1.0, -1.0) if side is None else side
         if node.operator == "quotient" and not isinstance(operands[1], hy.expression):
             inverse = expressions.operate(expression, node, [context.one, operands[1]], context)
             return operands[0] * literal(node, inverse)

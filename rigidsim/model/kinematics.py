@@ -19,8 +19,10 @@ from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector, dot, negligible
+from rigidsim.scene.expressions import Node
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.surfaces import Surfaces
 
 T = TypeVar("T")
 
@@ -36,6 +38,7 @@ class Kinematics:
         position, velocity: states in their own units; None unless carried.
         number: mpf to the working precision.
         orbit_tags: what makes the names of each prescribed orbit's states unique.
+        surfaces: on whose sides expressions are smooth.
     """
 
     scene: Scene
@@ -48,7 +51,14 @@ class Kinematics:
     velocity: list[Symbolic] | None
     number: Rounder
     orbit_tags: Mapping[KeplerOrbit, str] = field(default_factory=dict)
+    surfaces: Surfaces = field(default_factory=Surfaces)
     _orbits: dict[KeplerOrbit, OrbitStates] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def sides(self) -> Mapping[Node, Symbolic]:
+        """For the sign of each surface's argument the side that the motion is on, as a parameter."""
+        places = self.surfaces.places
+        return {node: hy.par[index] if sign > 0 else -hy.par[index] for node, (index, sign) in places.items()}
 
     @cached_property
     def rates(self) -> list[Symbolic]:

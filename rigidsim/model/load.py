@@ -103,6 +103,10 @@ class Load(SceneLoad):
         """
         return []
 
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        """Expressions that stand under a root and may touch zero, where no step may pass over the kink."""
+        return []
+
     # --- estimates, from which units and the scales of drifts are chosen ---------------------------------
 
     def amplitude(self, scene: Scene) -> Any | None:

@@ -18,16 +18,20 @@ import numpy as np
 
 from rigidsim.model.equations import vertical_from_attitude
 from rigidsim.model.formulations import BUILDERS
+from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling
+from rigidsim.model.state_names import state_names
 from rigidsim.model.state_selection import Requirements
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
+from rigidsim.scene.expressions import names_used
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.surfaces import surfaces_of
 
 _TIMES = 2048  # over the run
 _LARGEST = 1e100  # of a torque or force in SI that is looked at
@@ -56,11 +60,13 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     """
     if not loads:
         return None
-    m = _probe(scene, requirements, loads)
+    m = probe(scene, requirements, loads)
     torque = [term for load in loads for term in load.torque(m)]
     force = [term for load in loads for term in load.force(m)] if m.velocity is not None else []
-    names, start = _start(m, loads)
+    names, start = start_of(m, loads)
     narrow = [u for load in loads for u in load.narrow(m)]
+    in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})
+    narrow += [to_heyoka(u, state_names(m, ("t",)), m.number, m.scene.context) for u in in_time]
     samples = _Samples(m, names, start, narrow)
     context, scaling = scene.context, m.scaling
     inverse = np.array([[float(x) for x in row] for row in m.numbers.inverse_inertia])
@@ -93,7 +99,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     )
 
 
-def _probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
+def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
     """The scene in double precision and quaternions, in units that know nothing of these loads."""
     scaling = choose_scaling(scene)
     numbers = scaled_numbers(scene, scaling)
@@ -110,7 +116,7 @@ def _probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> M
     )
 
 
-def _start(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
+def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
     """Names and initial values of all states that the loads may read, internal units."""
     scene, scaling, context = m.scene, m.scaling, m.scene.context
     values = {

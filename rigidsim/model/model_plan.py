@@ -10,10 +10,12 @@ from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbital_frame import corotating_orbit
+from rigidsim.model.parity import refuse_odd_loads
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import Requirements, choose_requirements
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.surfaces import Surfaces, surfaces_of
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class ModelPlan:
         loads: all that act, all uniform fields as one.
         orbit_tags: of each prescribed orbit, what makes the names of its states unique.
         frame_orbit: the orbit in whose frame the attitude is carried; None where that is space.
+        surfaces: on which the equations change.
     """
 
     scene: Scene
@@ -34,6 +37,7 @@ class ModelPlan:
     numbers: ScaledNumbers
     orbit_tags: Mapping[KeplerOrbit, str]
     frame_orbit: KeplerOrbit | None
+    surfaces: Surfaces
 
     @property
     def wide(self) -> bool:
@@ -48,13 +52,15 @@ def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
         extra_loads: given from Python, beside those of the config.
 
     Raises:
-        ConfigError: a record that the scene or the formulation can't give.
+        ConfigError: a record that the scene or the formulation can't give, or a load that depends on the
+            quaternion's sign.
     """
     if extra_loads:
         scene = replace(scene, loads=(*scene.loads, *extra_loads))
     loads: list[Load] = [*UniformGravity.of(scene), *scene.loads]  # type: ignore[list-item]
     requirements = choose_requirements(scene, loads)
     unknown = [load for load in loads if load.amplitude(scene) is None]
+    refuse_odd_loads(scene, requirements, unknown)
     scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if requirements.canonical:
         scaling = replace(scaling, rates=(0, 0, 0))
@@ -70,4 +76,5 @@ def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
         scaled_numbers(scene, scaling),
         tags,
         corotating_orbit(scene, loads, requirements.formulation),
+        surfaces_of(scene),
     )

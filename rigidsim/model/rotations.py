@@ -39,9 +39,16 @@ quaternion_product = _HEYOKA.product
 quaternion_from_euler = _HEYOKA.quaternion_from_euler
 
 
-def quaternion_from_matrix(r: SymbolicMatrix) -> list[Symbolic]:
-    """Quaternion of R up to sign; the component with the largest square is selected when it is evaluated."""
+def quaternion_from_matrix(r: SymbolicMatrix, *, differentiable: bool = False) -> list[Symbolic]:
+    """Quaternion of R up to sign; the component with the largest square is selected when it is evaluated.
+
+    Args:
+        differentiable: heyoka's derivative of a selection multiplies what isn't selected by zero, so that it
+            must be finite.
+    """
     squares, pairs = rotations.shepperd(r)
+    if differentiable:  # the largest is at least 1
+        squares = [hy.select(hy.gt(square, 0.5), square, 0.5) for square in squares]
     branches = []
     for largest in range(4):
         divisor = 2.0 * hy.sqrt(squares[largest])

@@ -7,12 +7,28 @@ from collections.abc import Collection
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.rotations import Symbolic, euler_from_matrix
+from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
 from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
+
+
+def plain_angles(m: Kinematics) -> list[Symbolic]:
+    """Euler angles of the scene's sequence without their turns."""
+    sequence = m.scene.config.integrator.euler_sequence
+    if m.attitude is not None and m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
+        return list(hy.make_vars(*m.attitude.names))
+    return euler_from_matrix(sequence, m.matrix)
+
+
+def carries_sign(m: Kinematics) -> bool:
+    """Whether the quaternion's sign is a parameter: where it matters, and the formulation loses it."""
+    return m.surfaces.signed and m.attitude is not None and m.attitude.quaternion_sign != "state"
 
 
 def state_names(m: Kinematics, names: Collection[str]) -> dict[str, Symbolic]:
     """Expressions in SI units of the names that a user's expression reads.
+
+    Parameters ``par[..]`` stand for what the state doesn't tell where that matters: after the sides of the
+    surfaces the full turns of angles, then the sign of the quaternion.
 
     Raises:
         KeyError: a name that the scene doesn't carry.
@@ -26,13 +42,17 @@ def state_names(m: Kinematics, names: Collection[str]) -> dict[str, Symbolic]:
     for name, state, e in zip(RATE_NAMES, m.rate_states, scaling.rates, strict=True):
         found[name] = si(state, e - scaling.time)
     if m.attitude is not None and set(names) & set(ATTITUDE_NAMES):
-        found |= zip(ATTITUDE_NAMES[:4], m.attitude.quaternion, strict=True)
-        sequence = m.scene.config.integrator.euler_sequence
-        if m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
-            angles = list(hy.make_vars(*m.attitude.names))
-        else:
-            angles = euler_from_matrix(sequence, m.matrix)
-        found |= zip(ATTITUDE_NAMES[4:], angles, strict=True)
+        quaternion = m.attitude.quaternion
+        if m.attitude.quaternion_sign == "nearest" and m.surfaces.found:
+            quaternion = quaternion_from_matrix(m.matrix, differentiable=True)
+        if carries_sign(m):
+            sign = hy.par[len(m.surfaces.found) + len(m.surfaces.turning)]
+            quaternion = [sign * x for x in quaternion]
+        found |= zip(ATTITUDE_NAMES[:4], quaternion, strict=True)
+        found |= zip(ATTITUDE_NAMES[4:], plain_angles(m), strict=True)
+        turn = m.number(2 * context.pi)
+        for number, name in enumerate(m.surfaces.turning, start=len(m.surfaces.found)):
+            found[name] = found[name] + turn * hy.par[number]
     if m.position is not None and m.velocity is not None:
         found |= {n: si(x, scaling.length) for n, x in zip(FLIGHT_NAMES[:3], m.position, strict=True)}
         found |= {n: si(v, scaling.speed) for n, v in zip(FLIGHT_NAMES[3:], m.velocity, strict=True)}

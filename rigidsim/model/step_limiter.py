@@ -10,6 +10,9 @@ nowhere, and its series converge as far as its poles, which lie B widths from th
 shorten in proportion to the distance, and the cost of a pulse grows with the logarithm of its width alone.
 (A pulse of width 1e-4 s in a run of 100 s: 143 steps, where steps capped by the width would be a million.)
 With B = 4 a function of u is seen on its own account by then, so a wide one costs hardly a step.
+
+To a root of v, which has a kink where v touches zero, belongs the term log(v) / 64: where v does vanish, its
+series end there, and so does the run, with steps that collapse, instead of going on along the wrong branch.
 """
 
 from __future__ import annotations
@@ -34,20 +37,28 @@ def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     for event in m.scene.events:
         names = state_names(m, event.reads)
         found += [
-            (f"event {event.name}", to_heyoka(part, names, m.number, m.scene.context))
+            (f"event {event.name}", to_heyoka(part, names, m.number, m.scene.context, m.sides))
             for part in narrow_parts(event.expression)
         ]
     return found
 
 
-def pace_derivative(found: Sequence[Symbolic], derivatives: Mapping[str, Symbolic]) -> Symbolic:
+def roots(m: Mechanics) -> list[tuple[str, Symbolic]]:
+    """(of what, what a root is taken of) of all loads."""
+    return [(load.title, v) for load in m.loads for v in load.roots(m)]
+
+
+def pace_derivative(
+    found: Sequence[Symbolic], under_roots: Sequence[Symbolic], derivatives: Mapping[str, Symbolic]
+) -> Symbolic:
     """The state's right-hand side.
 
     Args:
         found: arguments, dimensionless.
+        under_roots: what roots are taken of.
         derivatives: of the states that they read.
     """
-    terms = []
+    terms = [0.5 * (along_the_motion(v, derivatives) / v) for v in under_roots]
     for u in found:
         rate = along_the_motion(u, derivatives)
         terms.append(rate * (u / (WIDE**2 + u * u)))
@@ -56,10 +67,18 @@ def pace_derivative(found: Sequence[Symbolic], derivatives: Mapping[str, Symboli
 
 def along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
     """Time derivative of an expression of time and the states, internal units."""
+    by_time, by_state = slopes(u)
+    terms = [slope * derivatives[name] for name, slope in by_state.items()]
+    return hy.sum([*terms, *by_time]) if terms or by_time else hy.expression(0.0)
+
+
+def slopes(u: Symbolic) -> tuple[list[Symbolic], dict[str, Symbolic]]:
+    """Partial derivatives of an expression: by time, where it depends on it, and by states."""
     clock = hy.make_vars(_CLOCK)
     plain = hy.subs(u, {hy.time: clock})
-    terms = []
-    for name in hy.get_variables(plain):
-        slope = hy.subs(hy.diff(plain, hy.make_vars(name)), {clock: hy.time})
-        terms.append(slope if name == _CLOCK else slope * derivatives[name])
-    return hy.sum(terms) if terms else hy.expression(0.0)
+    found = {
+        name: hy.subs(hy.diff(plain, hy.make_vars(name)), {clock: hy.time})
+        for name in hy.get_variables(plain)
+    }
+    by_time = [found.pop(_CLOCK)] if _CLOCK in found else []
+    return by_time, found

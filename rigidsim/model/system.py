@@ -23,8 +23,9 @@ from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_inva
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling, largest_rates
 from rigidsim.model.state_blocks import StateBlock, joined
-from rigidsim.model.state_names import state_names
+from rigidsim.model.state_names import carries_sign, plain_angles, state_names
 from rigidsim.model.state_selection import Requirements
+from rigidsim.scene.expressions import ATTITUDE_NAMES, names_used
 from rigidsim.scene.scene import Scene
 
 _LARGEST_EXPONENT = 1000
@@ -233,6 +234,48 @@ class System:
         """Events to be found along the way."""
         return _crossings(self.mechanics)
 
+    # --- what it switches on --------------------------------------------------------------------------------
+
+    @cached_property
+    def surfaces(self) -> list[Symbolic]:
+        """The arguments whose zeros are switching surfaces; on which side the motion is, +1 or -1, says the
+        equations' parameter of the same number.
+        """
+        m = self.mechanics
+        return [
+            to_heyoka(
+                surface.expression,
+                state_names(m, names_used(surface.expression)),
+                m.number,
+                m.scene.context,
+                m.sides,
+            )
+            for surface in self.plan.surfaces.found
+        ]
+
+    @cached_property
+    def turning(self) -> list[Symbolic]:
+        """Euler angles whose full turns are parameters, after the sides; here without them."""
+        names = self.plan.surfaces.turning
+        angles = dict(zip(ATTITUDE_NAMES[4:], plain_angles(self.mechanics), strict=True)) if names else {}
+        return [angles[name] for name in names]
+
+    @cached_property
+    def signed(self) -> list[Symbolic]:
+        """The quaternion where its sign is the last parameter; here without it. Empty elsewhere."""
+        m = self.mechanics
+        return list(m.carried(m.attitude).quaternion) if carries_sign(m) else []
+
+    @property
+    def parameters(self) -> int:
+        """How many the equations and events may have."""
+        return len(self.surfaces) + len(self.turning) + bool(self.signed)
+
+    @property
+    def switches(self) -> bool:
+        """Whether there are any."""
+        return self.parameters > 0
+
 
 def build_system(scene: Scene, number: Rounder, extra_loads: Sequence[Load] = ()) -> System:
     """Build the least system that the scene needs.
@@ -263,7 +306,7 @@ def _crossings(m: Mechanics) -> list[Crossing]:
     return [
         Crossing(
             event.name,
-            to_heyoka(event.expression, state_names(m, event.reads), m.number, m.scene.context),
+            to_heyoka(event.expression, state_names(m, event.reads), m.number, m.scene.context, m.sides),
             signs[event.direction],
             event.stop,
         )

@@ -48,7 +48,7 @@ def resolve_events(config: Config, *, free_flight: bool) -> tuple[Event, ...]:
     for number, table in enumerate(config.events):
         where = f"[[events]] number {number + 1} expression"
         try:
-            expression = parse_expression(table.expression, names, parameters=config.parameters)
+            expression = parse_expression(table.expression, names, parameters=config.parameters, jumps=False)
         except ExpressionError as error:
             raise ConfigError(Problem(where, str(error))) from None
         if not names_used(expression):

@@ -25,6 +25,7 @@ from rigidsim.scene.expressions import (
     FUNCTIONS,
     LARGEST_POWER,
     ONE,
+    PIECEWISE,
     RESERVED,
     Constant,
     Expression,
@@ -35,11 +36,17 @@ from rigidsim.scene.expressions import (
     constant_value,
     operation,
 )
+from rigidsim.scene.piecewise import power, written_out
 from rigidsim.scene.validation_messages import nearest
 
 LONGEST_TEXT = 2000
 DEEPEST_NESTING = 64
-_INSTEAD = {"abs": "; write sqrt((...)^2)", "ln": "; write log(...)", "pow": "; write x^2"}
+MOST_NODES = 5000
+_FUNCTIONS = {**FUNCTIONS, **PIECEWISE}
+_INSTEAD = {"ln": "; write log(...)", "pow": "; write x^2", "sgn": "; write sign(...)"}
+_INSTEAD |= {"heaviside": "; write step(...)", "mod": "; write wrap(...), which takes off full turns"}
+_JUMPS = ("sign", "step", "pulse")
+_USAGE = {"atan2": "y, x", "min": "a, b", "max": "a, b", "pulse": "x, begin, end"}
 _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4, "**": 4}
 _SIGN_BINDS = 3
 _OPERATORS = {"+": "sum", "-": "sum", "*": "product", "/": "quotient"}
@@ -58,7 +65,11 @@ _CHECKING = context_for("quadruple")
 
 
 def parse_expression(
-    text: str, names: Collection[str], *, parameters: Mapping[str, ExactNumber] | None = None
+    text: str,
+    names: Collection[str],
+    *,
+    parameters: Mapping[str, ExactNumber] | None = None,
+    jumps: bool = True,
 ) -> Expression:
     """Read an expression.
 
@@ -66,6 +77,7 @@ def parse_expression(
         text: one line of at most ``LONGEST_TEXT`` characters (which bounds the tree as well).
         names: of time and the state, as far as they are allowed here.
         parameters: named constants; they enter as exact numbers.
+        jumps: whether functions that are constant but for jumps are allowed.
 
     Raises:
         ExpressionError: with what was given, what is allowed, and a caret under the place. Constant parts
@@ -81,7 +93,7 @@ def parse_expression(
         raise ExpressionError(f"an expression of {len(text)} characters; at most {LONGEST_TEXT} are allowed")
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
-    expression = Expression(text, _Parser(text, names, parameters).all())
+    expression = Expression(text, _Parser(text, names, parameters, jumps).all())
     constant_value(expression, _CHECKING)
     return expression
 
@@ -89,8 +101,10 @@ def parse_expression(
 class _Parser:
     """Recursive descent over one token of lookahead: its ``kind``, ``token`` (text) and ``start``."""
 
-    def __init__(self, text: str, names: Collection[str], parameters: Mapping[str, ExactNumber]) -> None:
-        self.text, self.names = text, names
+    def __init__(
+        self, text: str, names: Collection[str], parameters: Mapping[str, ExactNumber], jumps: bool
+    ) -> None:
+        self.text, self.names, self.jumps = text, names, jumps
         self.constants = {**parameters, "pi": ExactNumber(Fraction(1), 1)}
         self.known = [*names, *self.constants, "e"]
         self.depth = self.start = self.end = 0
@@ -157,13 +171,14 @@ class _Parser:
         while self.at(*_BINDS) and _BINDS[self.token] > weakest:
             sign = self.advance()
             if sign in ("^", "**"):
-                operator, right = "power", self.exponent()
-            else:
-                operator, right = _OPERATORS[sign], self.binary(_BINDS[sign])
-                right = operation("negative", (right,), right.span) if sign == "-" else right
-                if sign == "/" and self.constant(right) == 0:
-                    raise Expression(self.text, right).error("division by the zero", right)
-            left = operation(operator, (left, right), (start, self.end))
+                exponent = self.exponent()
+                left = self.bounded(power(left, exponent, (start, self.end)), start)
+                continue
+            right = self.binary(_BINDS[sign])
+            right = operation("negative", (right,), right.span) if sign == "-" else right
+            if sign == "/" and self.constant(right) == 0:
+                raise Expression(self.text, right).error("division by the zero", right)
+            left = operation(_OPERATORS[sign], (left, right), (start, self.end))
         return left
 
     def exponent(self) -> Node:
@@ -191,7 +206,7 @@ class _Parser:
         if self.kind != "name":
             self.fail(f'a number, a name or "(" is missing before {self.token or "the end"}')
         name = self.advance()
-        if name in FUNCTIONS or self.at("("):
+        if name in _FUNCTIONS or self.at("("):
             return self.call(name, start)
         span = (start, self.end)
         if name in self.names:
@@ -206,14 +221,27 @@ class _Parser:
     def call(self, name: str, start: int) -> Node:
         if name in self.known:
             self.fail(f'"{name}" is no function; a product has its *, as in {name}*(...)', start)
-        if name not in FUNCTIONS:
-            near = _INSTEAD.get(name) or nearest(name, FUNCTIONS)
-            self.fail(f'unknown function "{name}"{near}; allowed: {", ".join(FUNCTIONS)}', start)
-        usage = f"write {name}({'y, x' if FUNCTIONS[name] == 2 else 'x'})"
+        if name not in _FUNCTIONS:
+            near = _INSTEAD.get(name) or nearest(name, _FUNCTIONS)
+            self.fail(f'unknown function "{name}"{near}; allowed: {", ".join(_FUNCTIONS)}', start)
+        if name in _JUMPS and not self.jumps:
+            self.fail(f'"{name}" jumps, and a jump crosses zero nowhere; write its argument instead', start)
+        usage = f"write {name}({_USAGE.get(name, 'x')})"
         if not self.at("("):
             self.fail(f'the function "{name}" has its arguments in parentheses; {usage}', start)
-        arguments = self.arguments(FUNCTIONS[name], f'"{name}" takes {FUNCTIONS[name]}; {usage}')
-        return Operation(name, tuple(arguments), (start, self.end))
+        arguments = self.arguments(_FUNCTIONS[name], f'"{name}" takes {_FUNCTIONS[name]}; {usage}')
+        return self.bounded(written_out(name, arguments, (start, self.end)), start)
+
+    def bounded(self, node: Node, start: int) -> Node:
+        """A node that isn't too large: arguments of piecewise functions are written out several times."""
+        waiting, count = [node], 0
+        while waiting:
+            inner = waiting.pop()
+            waiting += inner.operands if isinstance(inner, Operation) else ()
+            count += 1
+            if count > MOST_NODES:
+                self.fail("too many piecewise functions within one another; write fewer", start)
+        return node
 
     def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[Node]:
         """What stands in parentheses."""

@@ -20,8 +20,10 @@ LARGEST_POWER = 64
 
 _ONE_ARGUMENT = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt erf sigmoid"
 FUNCTIONS = {**dict.fromkeys(_ONE_ARGUMENT.split(), 1), "atan2": 2}
-"""Every function and the number of its arguments."""
-RESERVED = frozenset({*FUNCTIONS, "pi", "e"})
+"""Every smooth function and the number of its arguments."""
+PIECEWISE = {"abs": 1, "sign": 1, "min": 2, "max": 2, "step": 1, "pulse": 3, "wrap": 1}
+"""Those with kinks and jumps; ``rigidsim.scene.piecewise`` writes them out."""
+RESERVED = frozenset({*FUNCTIONS, *PIECEWISE, "pi", "e"})
 """Names that no parameter may have."""
 ONE = ExactNumber(Fraction(1))
 
@@ -65,7 +67,9 @@ class Name:
 
 @dataclass(frozen=True)
 class Operation:
-    """sum or product (of two or more operands), quotient, power, negative, or a function."""
+    """sum or product (of two or more operands), quotient, power, negative, or a function: a smooth one or
+    ``sign``.
+    """
 
     operator: str
     operands: tuple[Node, ...]

@@ -37,10 +37,11 @@ def check_start(scene: Scene) -> None:
     """Evaluate the components of loads and the events once.
 
     Raises:
-        ConfigError: some have no finite value; all of them are named.
+        ConfigError: some have no finite value; all of them are named. Or they read Euler angles of which the
+            start has the other triple.
     """
     values = start_values(scene)
-    problems = []
+    problems = _check_branch(scene)
     for load in scene.loads:
         for where, expression in load.formulas():
             problems += _check(where, expression, values, scene.context)
@@ -49,6 +50,29 @@ def check_start(scene: Scene) -> None:
         problems += _check(where, event.expression, values, scene.context)
     if problems:
         raise ConfigError(problems)
+
+
+def _check_branch(scene: Scene) -> list[Problem]:
+    """Every attitude has two triples of Euler angles; expressions mean the one whose middle angle is in its
+    range, which other formulations find as well.
+    """
+    expressions = [e for load in scene.loads for _, e in load.formulas()]
+    expressions += [event.expression for event in scene.events]
+    read = frozenset().union(*(names_used(e) for e in expressions)) & set(ATTITUDE_NAMES[4:])
+    if scene.euler_angles is None or not read:
+        return []
+    sequence, middle, pi = scene.config.integrator.euler_sequence, scene.euler_angles[1], scene.context.pi
+    low, high, shown = (
+        (0, pi, "0 to pi") if sequence[0] == sequence[2] else (-pi / 2, pi / 2, "-pi/2 to pi/2")
+    )
+    if low <= middle <= high:
+        return []
+    what = (
+        f"given {scene.context.nstr(middle, 8)} rad for the middle angle, while {', '.join(sorted(read))} "
+        f"stands in an expression; there {shown} is allowed for {sequence}: give the same attitude so, or "
+        "as a quaternion"
+    )
+    return [Problem("[initial] euler_angles", what)]
 
 
 def _check(where: str, expression: Expression, values: dict[str, Any], context: Any) -> list[Problem]:

@@ -3,15 +3,18 @@
 A pulse such as ``exp(-((t-50)/0.01)^2)`` or a switch such as ``tanh((t-5)/0.001)`` is flat almost everywhere:
 its Taylor series say nothing of what comes, and a step chosen by them passes over it. What happens there
 happens where the function's argument is of order one, and the argument itself isn't flat: see
-``rigidsim.model.step_limiter``.
+``rigidsim.model.step_limiter``. A root of what touches zero, such as a norm that vanishes for a moment, goes
+on smoothly along the wrong branch likewise.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions import Constant, Expression, Node, Operation, fold, operation
 
 WIDE = 4.0
@@ -20,7 +23,8 @@ _FLAT = frozenset({"exp", "sinh", "cosh", "tanh", "erf", "sigmoid", "atan"})
 """Functions with an end at which they hardly change."""
 _STEEP_POWER = 8  # higher ones vanish to an order near that of the Taylor method
 _BOUNDED: Mapping[str, float] = {
-    "sin": 1, "cos": 1, "tanh": 1, "erf": 1, "sigmoid": 1, "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
+    "sin": 1, "cos": 1, "sign": 1, "tanh": 1, "erf": 1, "sigmoid": 1,
+    "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
     "qw": 1, "qx": 1, "qy": 1, "qz": 1, "phi": 4, "theta": 4, "psi": 4,
 }  # fmt: skip
 
@@ -52,6 +56,59 @@ def narrow_parts(expression: Expression) -> list[Expression]:
         if part is not None and _bound(Expression(expression.text, part)) > WIDE:
             found[part] = None
     return [Expression(expression.text, part) for part in found if not _constant(part)]
+
+
+def root_parts(expression: Expression) -> list[Expression]:
+    """What may touch zero under a root, each once: there the root has a kink, though no power shows it.
+
+    Left out is what is a sum of squares and a positive number, or is positive by its form otherwise.
+    """
+    found: dict[Node, None] = {}
+    waiting = [expression.root]
+    while waiting:
+        node = waiting.pop()
+        if not isinstance(node, Operation):
+            continue
+        waiting += node.operands
+        part: Node | None = None
+        if node.operator == "sqrt":
+            part = node.operands[0]
+        elif node.operator == "power":
+            base, power = node.operands
+            whole = isinstance(power, Constant) and not power.value.pi_power
+            if not (whole and power.value.rational.denominator == 1):  # type: ignore[union-attr]
+                part = base
+        elif node.operator in ("asin", "acos"):
+            (x,) = node.operands
+            two, one = (Constant(ExactNumber(Fraction(n)), x.span) for n in (2, 1))
+            square = operation("power", (x, two), x.span)
+            part = operation("sum", (one, operation("negative", (square,), x.span)), x.span)
+        if part is not None and not _least(Expression(expression.text, part)) > 0:
+            found[part] = None
+    return [Expression(expression.text, part) for part in found if not _constant(part)]
+
+
+def _least(expression: Expression) -> float:
+    """Lower bound of the value, -infinity where there is none."""
+
+    def combine(node: Node, operands: list[Any]) -> float:
+        if isinstance(node, Constant):
+            return float(node.value)
+        if not isinstance(node, Operation):
+            return -_BOUNDED.get(node.name, math.inf)
+        if node.operator == "sum":
+            return float(sum(operands))
+        if node.operator in ("exp", "sqrt", "sigmoid"):
+            return 0.0
+        if node.operator in ("product", "quotient") and min(operands) >= 0:
+            return 0.0 if node.operator == "quotient" or 0 in operands else math.prod(operands)
+        if node.operator == "power" and isinstance(node.operands[1], Constant):
+            exponent = node.operands[1].value
+            even = not exponent.pi_power and exponent.rational % 2 == 0
+            return 0.0 if even or operands[0] >= 0 else -math.inf
+        return -_BOUNDED.get(node.operator, math.inf)
+
+    return float(fold(expression, combine))
 
 
 def _constant(node: Node) -> bool:

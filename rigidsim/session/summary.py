@@ -132,6 +132,8 @@ def closing_words(
         ending = next(f for f in log.found if log.stops[f.index])
         name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
         return f"{text}: {name} at {when:.9g} s"
+    if progress.status is Status.UNRESOLVED:
+        return f"{text}: {progress.detail} (at {progress.time:.9g} s, after {progress.steps} steps)"
     if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
         return text
     text += f"; last good state at {progress.time:.9g} s after {progress.steps} steps"
@@ -146,6 +148,11 @@ def closing_words(
             f'the singularity of {prepared.system.sequence}: choose formulation = "quaternion"'
         )
     else:
+        if any(load.roots(prepared.system.mechanics) for load in prepared.system.plan.loads):
+            text += (
+                "; a root of zero has no series: if one of the loads vanished there, such as a norm, write "
+                "abs(u) for the component u that moves, or add a small number under the root"
+            )
         largest = int(np.argmax(np.abs(state[0].astype(np.float64))))
         text += f"; the largest state there was {prepared.system.states[largest]}"
     return text

@@ -16,6 +16,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import Projection, steps_between
 from rigidsim.solve.sampler import Check, Sampler, SampleReceiver
 from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.steppers import stepper_of
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context)
     log = EventLog([c.stop for c in system.crossings], wrapping)
-    stepper = Stepper(system, precision, prepared.tolerance, start, log)
+    stepper = stepper_of(system, precision, prepared.tolerance, start, log)
     projection = None
     if prepared.holds_invariants:
         projection = Projection(system, precision, start)

@@ -52,8 +52,8 @@ class CorrectedStepper:
     Attributes:
         projection: puts invariants back, where asked for.
         stride: natural steps between corrections.
-        whole_times: whether time is a single number at each stride's start. Not where events are looked
-            for: a step back could cross one twice.
+        whole_times: whether time is a single number at each stride's start. Not where events or switching
+            surfaces are looked for: a step back could cross one twice.
         charts: of a run in Euler angles; None without.
 
     Args:
@@ -76,7 +76,7 @@ class CorrectedStepper:
         self.stride = min(stride, STEPS_BETWEEN) if wrapping.positions else stride
         if projection is not None:
             self.stride = min(self.stride, projection_interval)
-        self.whole_times = not stepper.has_events
+        self.whole_times = not (stepper.has_events or stepper.single_steps)
         self.charts: Charts | None = None
         system = stepper.system
         if system.partner is not None:

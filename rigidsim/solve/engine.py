@@ -18,13 +18,14 @@ class Integrator(Protocol):
 
     Attributes:
         time, dtime: where it stands, internal units; the second as two numbers whose sum it is.
-        state: (states,), a view that can be assigned to.
+        state: (states,), a view that can be assigned to; pars: likewise, up to the last that is read.
         order: of the Taylor series.
     """
 
     time: Scalar
     dtime: tuple[Scalar, Scalar]
     state: np.ndarray
+    pars: np.ndarray
     order: int
 
     def step(self, max_delta_t: Scalar, *, write_tc: bool = False) -> tuple[Any, Scalar]:

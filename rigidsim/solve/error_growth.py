@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.solve.precision import Precision
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.steppers import stepper_of
 
 PILOT_STEPS = 2000
 _CHUNK = 4  # steps between comparisons
@@ -72,14 +72,14 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
     """
     apart = ("x", "y", "z", "vx", "vy", "vz", "pace")
     followed = [i for i, name in enumerate(system.states) if name not in apart]
-    reference = Stepper(system, precision, None, precision.scalar(start))
+    reference = stepper_of(system, precision, None, precision.scalar(start))
     marks = [reference.mark()]
     while reference.steps < PILOT_STEPS and float(reference.time) < end and reference.skip(_CHUNK):
         marks.append(reference.mark())
     times = [float(mark.time[0]) for mark in marks]
     rate = math.ldexp(float(system.rate_bound), system.scaling.time)
     generator = np.random.default_rng(0)  # the same offsets each time
-    other = Stepper(system, precision, None, precision.scalar(start))
+    other = stepper_of(system, precision, None, precision.scalar(start))
     largest, slopes, window = 0.0, [], 0.0
     passing: list[float] = []
     for launch in np.linspace(0, max(len(marks) - 2, 0), _LAUNCHES).astype(int):
@@ -88,6 +88,7 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
         offset *= _OFFSET / np.linalg.norm(offset)
         other.back_to(marks[launch])
         other.state[:] = marks[launch].state + offset
+        other.settle()
         grown: list[float] = []
         for look in range(launch + 1, min(launch + 1 + _WINDOW, len(marks))):
             if not other.to(times[look]):

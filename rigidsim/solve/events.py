@@ -52,12 +52,16 @@ class EventLog:
         stops: for each of the system's events whether it ends the run.
         wrapping: knows what the angle states stand for; None where there are none.
         stop: time of the first crossing that ends the run, or None.
+        quiet_until: crossings up to this time are known already; None where there are none.
+        muted: whether a step is taken again whose crossings are known already.
     """
 
     stops: list[bool] = field(default_factory=list)
     wrapping: AngleWrapping | None = None
     found: list[FoundEvent] = field(default_factory=list)
     stop: Scalar | None = None
+    quiet_until: Scalar | None = None
+    muted: bool = False
 
     def note(self, index: int, time: Scalar, state: np.ndarray) -> None:
         """Take a crossing from the engine.
@@ -65,6 +69,8 @@ class EventLog:
         Raises:
             StoppedError: there are too many.
         """
+        if self.muted or (self.quiet_until is not None and time <= self.quiet_until):
+            return
         if len(self.found) >= MOST_EVENTS:
             raise StoppedError(
                 f"more than {MOST_EVENTS} events; give them a direction, or an expression that crosses zero "
@@ -90,6 +96,14 @@ class EventLog:
         if count > len(self.found):
             raise ValueError(f"{len(self.found)} events are known, not {count}")
         del self.found[count:]
+        self._find_stop()
+
+    def drop_after(self, count: int, limit: Scalar) -> None:
+        """Forget those past a time, but none of the first ``count``."""
+        self.found[count:] = [f for f in self.found[count:] if f.time <= limit]
+        self._find_stop()
+
+    def _find_stop(self) -> None:
         self.stop = next((f.time for f in self.found if self.stops[f.index]), None)
 
 

@@ -80,7 +80,7 @@ class IntegrationLoop:
                 self.buffer.drop_after(self.stepper.log.stop)
                 return self._ended(Status.EVENT)
             if not finite:
-                return self._ended(Status.NON_FINITE)
+                return self._ended(Status.UNRESOLVED if self.progress.detail else Status.NON_FINITE)
             self._hand_over(patiently=True)
             if self.ways.steps_left > _HOPELESS_STEPS:
                 self.progress.last_good = self.corrected.boundary()
@@ -249,6 +249,7 @@ class IntegrationLoop:
         while True:
             boundary = self.corrected.boundary()
             if not self.stepper.step():
+                self.progress.detail = self.stepper.failure
                 self.corrected.back_to(boundary)
                 self.progress.last_good = boundary
                 return False

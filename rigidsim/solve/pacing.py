@@ -128,7 +128,7 @@ class WayFinder:
         corrected, pacing, stepper = self._corrected, self._pacing, self._corrected.stepper
         # steps of a tumbling body vary a lot: predict with the longest of late, which fades slowly
         self.longest = size = max(stepper.largest, pacing.fading * self.longest)
-        if size <= 0:
+        if size <= 0 or stepper.single_steps:
             return Way.STEP, self._most(Way.STEP)
         limit = 2**62
         if self._cheap:

@@ -109,6 +109,7 @@ def prepare_scene(
         step_control = _auto(precision) if step_control is None else step_control
         check_start(scene)
         system = build_system(scene, precision.number, loads)
+        _refuse_spectrum(system)
         if loads:
             _refuse_non_finite_start(system, precision)
         closed = _closed_form(scene, system, driven=bool(loads))
@@ -199,21 +200,36 @@ def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | 
         raise ConfigError(Problem("[integrator] method", what)) from None
 
 
+def _refuse_spectrum(system: System) -> None:
+    """Tangent vectors jump where a motion switches sides, which variational equations don't know.
+
+    Raises:
+        ConfigError: Lyapunov exponents are asked for of such a motion.
+    """
+    found = system.plan.surfaces.found
+    if system.scene.config.output.lyapunov and found:
+        what = (
+            f"given true, but the equations switch at a kink or jump of {found[0].text} ({found[0].where}), "
+            "where variational equations end; set it to false, or make the change smooth with tanh"
+        )
+        raise ConfigError(Problem("[output] lyapunov", what))
+
+
 def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     """Evaluate the equations once: a load from Python may have no value at the start.
 
     Raises:
         ConfigError: names the states whose derivatives aren't finite.
     """
-    rhs = hy.cfunc(
-        [right for _, right in system.equations],
-        system.variables,
-        compact_mode=True,
-        **precision.options,
-    )
+    outputs = [right for _, right in system.equations]
+    sides = {}
+    if system.switches:  # whichever side it is on
+        outputs.append(hy.par[system.parameters - 1])
+        sides["pars"] = precision.array([mpmath.mpf(1)] * system.parameters)
+    rhs = hy.cfunc(outputs, system.variables, compact_mode=True, **precision.options)
     start = precision.number(system.scene.context.ldexp(system.scene.start, -system.scaling.time))
-    values = rhs(precision.array(system.initial), time=start)
-    lost = [n for n, v in zip(system.states, values, strict=True) if not math.isfinite(float(v))]
+    values = rhs(precision.array(system.initial), time=start, **sides)
+    lost = [n for n, v in zip(system.states, values, strict=False) if not math.isfinite(float(v))]
     if lost and system.partner is not None:  # a chart's own singularity is no fault of a load
         _refuse_non_finite_start(system.partner, precision)
     elif lost:

@@ -25,6 +25,7 @@ class Progress:
         redone_steps: taken back since they went past a sample.
         integration_seconds: wall time in the engine, without recording.
         last_good: a step boundary whose state is finite, for a run that broke down.
+        detail: why it did, where more is known.
     """
 
     samples: int
@@ -37,6 +38,7 @@ class Progress:
     status: Status = Status.RUNNING
     integration_seconds: float = 0.0
     last_good: StepBoundary | None = None
+    detail: str = ""
 
     @property
     def fraction(self) -> float:

@@ -17,6 +17,7 @@ class Status(Enum):
     MAX_DRIFT = "stopped: max_drift"
     NON_FINITE = "stopped: non-finite state"
     COLLAPSED = "stopped: step size collapsed"
+    UNRESOLVED = "stopped: switching unresolved"
 
     @property
     def message(self) -> str:
@@ -33,9 +34,10 @@ class Status(Enum):
     @property
     def final(self) -> bool:
         """True where going on could not help, so that the dataset is completed as it is."""
-        return self in (Status.FINISHED, Status.EVENT, Status.NON_FINITE, Status.COLLAPSED)
+        return self in (Status.FINISHED, Status.EVENT, *_BROKEN)
 
 
+_BROKEN = (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED)
 _MESSAGES = {
     Status.RUNNING: "the run is under way, or was killed",
     Status.FINISHED: "the run reached its last sample",
@@ -46,4 +48,5 @@ _MESSAGES = {
     Status.MAX_DRIFT: "an invariant drifted past the guard [limits] max_drift; what was integrated is kept",
     Status.NON_FINITE: "the state stopped being finite; the samples before it are kept",
     Status.COLLAPSED: "the steps became too small to ever arrive; the samples so far are kept",
+    Status.UNRESOLVED: "the motion can't be continued past a switching surface; the samples so far are kept",
 }

@@ -35,12 +35,14 @@ class Mark:
         time: two numbers whose sum it is, internal units.
         state: (states,), internal units.
         events, steps: how many were found and taken so far.
+        switching: what a motion with switching surfaces remembers (``rigidsim.solve.switching``).
     """
 
     time: tuple[Scalar, Scalar]
     state: np.ndarray
     events: int = 0
     steps: int = 0
+    switching: tuple[float, ...] = ()
 
 
 class Watcher(Protocol):
@@ -64,7 +66,11 @@ class Stepper:
         log: the events found along the way.
         has_events: whether the engine looks for any.
         smallest, largest: step sizes of the latest call, internal units.
+        single_steps: whether all ways go step by step.
+        failure: why the latest step couldn't be taken, where its state is finite; empty otherwise.
     """
+
+    single_steps = False
 
     def __init__(
         self,
@@ -88,6 +94,10 @@ class Stepper:
         self._longest = self._bounds[0]
         self.steps = 0
         self.smallest = self.largest = 0.0
+        self.failure = ""
+
+    def settle(self) -> None:
+        """Take note that the state was set from outside."""
 
     def _compiled(self, system: System) -> Integrator:
         options = dict(self.precision.options)

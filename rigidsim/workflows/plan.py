@@ -86,6 +86,8 @@ def plan(
         "loads": [load.effect for load in system.plan.loads],
         "reasons": [{"states": s, "why": w} for s, w in system.reasons],
         "left_out": [{"what": s, "why": w} for s, w in system.requirements.left_out],
+        "switching": [{"surface": s.text, "where": s.where} for s in system.plan.surfaces.found],
+        "turning": list(system.plan.surfaces.turning),
         "equations": [f"{v}' = {rhs}" for v, rhs in system.equations],
         "internal_units": {
             "time_s": math.ldexp(1.0, system.scaling.time),

@@ -19,7 +19,7 @@ from rigidsim.session.session import Session
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.steppers import stepper_of
 from rigidsim.store import atomic, netcdf
 from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
@@ -269,7 +269,7 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
             f"{last}: has schema version {version}; only runs of versions {oldest} to {SCHEMA_VERSION} can "
             "be resumed; begin a new run"
         )
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
+    stepper = stepper_of(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
     now = attributes_now(prepared, stepper, chain.run)
     for name, then, value in saved.changed(Use.SYSTEM, now):
         raise RunFolderError(f"{last}: cannot be resumed from: its {name} is {then}, now {value}")

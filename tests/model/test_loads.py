@@ -505,13 +505,13 @@ def test_a_load_reads_the_attitude_and_the_path(formulation: str, sequence: str)
         "principal_moments = [1, 2, 2.5]\nmass = 1",
         f"angular_velocity = {array(w)}\neuler_angles = {angles}\n"
         f"position = {array(x)}\nvelocity = {array(v)}",
-        'kind = "torque"\ncomponents = ["qw*qx", "phi - psi*theta", "x*qz + qy"]',
+        'kind = "torque"\ncomponents = ["qw*qx", "sin(phi) - sin(psi)*theta", "x*qw*qz + qy^2"]',
         integrator=f'formulation = "{formulation}"\neuler_sequence = "{sequence}"',
     ).system
     state = travel(system, [0.0])[0]
     rotation = Rotation.from_euler(sequence.upper(), angles)
     qx, qy, qz, qw = rotation.as_quat(canonical=True)
-    torque = np.array([qw * qx, angles[0] - angles[2] * angles[1], x[0] * qz + qy])
+    torque = np.array([qw * qx, np.sin(angles[0]) - np.sin(angles[2]) * angles[1], x[0] * qw * qz + qy**2])
     expected = turning(np.diag([1, 2, 2.5]), w, torque)
     np.testing.assert_allclose(derivative(system, state)[:3], expected, rtol=0, atol=CLOSE)
 
@@ -544,7 +544,7 @@ BODY_TORQUE = 'kind = "torque"\ncomponents = ["wy", "sin(t)", 1]'
 READERS = {
     "torque": [
         'kind = "torque"\ncomponents = ["1", "0", "0"]\nframe = "space"',
-        'kind = "torque"\ncomponents = ["qw", "0", "0"]',
+        'kind = "torque"\ncomponents = ["qw*qx", "0", "0"]',
         'kind = "torque"\ncomponents = ["cos(psi)", "0", "0"]',
     ],
     "force": ['kind = "force"\ncomponents = ["1", "0", "0"]\npoint = [1, 0, 0]'],

@@ -204,7 +204,7 @@ def test_fold_needs_no_recursion() -> None:
         ("wx + why", 6, 'unknown name "why"; did you mean "wy"?; allowed: t, wx, wy, k, zero, turn, pi, e'),
         ("2*WX", 3, 'unknown name "WX"; did you mean "wx"?'),
         ("1+sine(t)", 3, 'unknown function "sine"; did you mean "sin"?; allowed: sin, cos, '),
-        ("abs(t)", 1, 'unknown function "abs"; write sqrt((...)^2)'),
+        ("sgn(t)", 1, 'unknown function "sgn"; write sign(...)'),
         ("t(2)", 1, '"t" is no function; a product has its *, as in t*(...)'),
         ("sin t", 1, 'the function "sin" has its arguments in parentheses; write sin(x)'),
         ("sin()", 4, 'given 0 arguments; "sin" takes 1; write sin(x)'),

@@ -26,6 +26,11 @@ TOP = {
     "loads": 'kind = "uniform_gravity"',
 }
 DRIVEN = {"loads": 'kind = "torque"\ncomponents = ["0.1*sin(t)", "0", "0.05*wx"]'}
+SWITCHING = {
+    "loads": 'kind = "torque"\ncomponents = ["0.1*sign(sin(3*t))", "-0.2*abs(wy)*wy", "0.05*max(wx, wz)"]'
+}
+TURNING = {"loads": 'kind = "torque"\ncomponents = ["0", "-0.05*wrap(phi)", "-0.01*psi"]'}
+FRICTION = {"loads": 'kind = "torque"\ncomponents = ["0", "-0.05*wy", "-0.2*sign(wz)"]'}
 LIBRATION = {
     "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
     "orbit = {semi_major_axis = 2, eccentricity = 0.1, inclination = 0.3, period = 17}"
@@ -58,6 +63,10 @@ CASES = {
     "extended, held invariants, events": (FREE, 'hold_invariants = true\nprecision = "extended"',
                                           "end = 600\nsamples = 601", EVENTS),
     "double, driven": (DRIVEN, "", "end = 60\nsamples = 121", ""),
+    "double, switching": (SWITCHING, "", "end = 40\nsamples = 81", EVENTS),
+    "double, switching, Euler angles": (TURNING, 'formulation = "euler_angles"',
+                                        "end = 40\nsamples = 81", ""),
+    "extended, sliding": (FRICTION, 'precision = "extended"', "end = 20\nsamples = 41", EVENTS),
     "double, gravity gradient": (LIBRATION, "", "end = 60\nsamples = 121", ""),
     "double, six degrees of freedom": (FLIGHT, "", "end = 60\nsamples = 121", ""),
     "double, events": (FREE, "", "end = 100\nsamples = 101", EVENTS),

@@ -28,7 +28,7 @@ from rigidsim.scene.expressions import (
 from rigidsim.scene.fields import Metre, Triple, refuse
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.transitions import narrow_parts
+from rigidsim.scene.transitions import narrow_parts, root_parts
 from rigidsim.scene.validation_messages import shown
 
 
@@ -134,7 +134,7 @@ class Applied(Load):
     def _components(self, m: Kinematics) -> list[Symbolic]:
         variables = state_names(m, self.names)
         context = m.scene.context
-        return [to_heyoka(c, variables, m.number, context) for c in self.components]
+        return [to_heyoka(c, variables, m.number, context, m.sides) for c in self.components]
 
     def _in_body(self, m: Kinematics) -> list[Symbolic]:
         found = self._components(m)
@@ -164,7 +164,13 @@ class Applied(Load):
         """Arguments of pulses and switches in the components."""
         variables = state_names(m, self.names)
         parts = {part.root: part for c in self.components for part in narrow_parts(c)}
-        return [to_heyoka(part, variables, m.number, m.scene.context) for part in parts.values()]
+        return [to_heyoka(p, variables, m.number, m.scene.context, m.sides) for p in parts.values()]
+
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        """What roots in the components are taken of."""
+        variables = state_names(m, self.names)
+        parts = {part.root: part for c in self.components for part in root_parts(c)}
+        return [to_heyoka(p, variables, m.number, m.scene.context, m.sides) for p in parts.values()]
 
 
 def _vanishes(component: Expression) -> bool:

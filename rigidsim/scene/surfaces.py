@@ -1,0 +1,184 @@
+"""Switching surfaces of a scene: where the argument of a ``sign`` in one of its expressions passes zero.
+
+Surfaces are the same whatever the formulation and the precision; arguments in a constant ratio share one.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rigidsim.scene.expressions import (
+    ATTITUDE_NAMES,
+    FLIGHT_NAMES,
+    RATE_NAMES,
+    Expression,
+    ExpressionError,
+    Node,
+    Operation,
+    evaluate,
+    names_used,
+)
+from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.scene import Scene
+
+_STATES = 4  # at which expressions are compared; two that agree at all of them are the same
+_TRIALS = 32  # some expressions have no value everywhere
+_BITS = 60  # of agreement, far fewer than the scene's arithmetic has
+_OUTER = ("phi", "psi")  # of the Euler angles, those that turn without end
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One surface, where ``expression`` is zero.
+
+    Attributes:
+        text: the function with the kink or jump, as it was written.
+        where: it stands in the config.
+    """
+
+    expression: Expression
+    text: str
+    where: str
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """All surfaces of a scene.
+
+    Attributes:
+        found: in the order in which they stand in the config.
+        places: for each argument of a sign the index of its surface, and 1 or -1: the ratio's sign.
+        turning: Euler angles whose full turns matter to some expression.
+        signed: whether the sign of the quaternion matters to one.
+    """
+
+    found: tuple[Surface, ...] = ()
+    places: Mapping[Node, tuple[int, int]] = field(default_factory=dict)
+    turning: tuple[str, ...] = ()
+    signed: bool = False
+
+
+def surfaces_of(scene: Scene) -> Surfaces:
+    """Find the surfaces in the loads and events of a scene."""
+    expressions = list(_expressions(scene))
+    arguments: dict[Node, Surface] = {}
+    for where, expression in expressions:
+        for node in _nodes(expression):
+            if isinstance(node, Operation) and node.operator == "sign":
+                argument = Expression(expression.text, node.operands[0])
+                if names_used(argument):
+                    text = expression.text[slice(*node.span)]
+                    arguments.setdefault(argument.root, Surface(argument, text, where))
+    names = frozenset().union(*(names_used(expression) for _, expression in expressions))
+    if not arguments and not names & set(ATTITUDE_NAMES):
+        return Surfaces()
+    states = random_states(scene)
+    context = scene.context
+    found: list[Surface] = []
+    known: list[list[Any]] = []
+    places: dict[Node, tuple[int, int]] = {}
+    for node, surface in arguments.items():
+        values = [_value(surface.expression, state, context) for state in states]
+        for index, others in enumerate(known):
+            sign = _ratio(values, others, context)
+            if sign:
+                places[node] = index, sign
+                break
+        else:
+            places[node] = len(found), 1
+            found.append(surface)
+            known.append(values)
+    parts = [*(expression for _, expression in expressions), *(s.expression for s in found)]
+    turn = 2 * context.pi
+    turning = tuple(
+        name
+        for name in _OUTER
+        if any(changes(part, states, {name: lambda x: x + turn}, context) for part in parts)
+    )
+    opposite = {name: lambda x: -x for name in ATTITUDE_NAMES[:4]}
+    signed = any(changes(part, states, opposite, context) for part in parts)
+    return Surfaces(tuple(found), places, turning, signed)
+
+
+def random_states(scene: Scene) -> list[dict[str, Any]]:
+    """Values (mpf, SI) of all names at states like the start, the same each time."""
+    context, generator = scene.context, random.Random(0)
+    start = start_values(scene)
+    rates = max((abs(w) for w in scene.angular_velocity), default=context.zero) or context.one
+    states = []
+    for _ in range(_TRIALS):
+        q = [context.mpf(generator.gauss(0, 1)) for _ in range(4)]
+        size = context.sqrt(sum(x * x for x in q))
+        state = {"t": scene.start + (scene.end - scene.start) * context.mpf(generator.random())}
+        state |= {name: rates * context.mpf(generator.uniform(-1, 1)) for name in RATE_NAMES}
+        state |= {name: x / size for name, x in zip(ATTITUDE_NAMES[:4], q, strict=True)}
+        state |= {name: context.mpf(generator.uniform(-3, 3)) for name in ATTITUDE_NAMES[4:]}
+        for name in FLIGHT_NAMES:
+            if name in start:
+                state[name] = start[name] * context.mpf(generator.uniform(0.5, 2)) + context.mpf(
+                    generator.uniform(-1, 1)
+                )
+        states.append(state)
+    return states
+
+
+def changes(
+    expression: Expression, states: Sequence[Mapping[str, Any]], moved: Mapping[str, Any], context: Any
+) -> bool:
+    """Whether an expression changes where names are moved.
+
+    Args:
+        moved: functions of a value, by name.
+    """
+    if not names_used(expression) & set(moved):
+        return False
+    compared = 0
+    for state in states:
+        other = {**state, **{name: move(state[name]) for name, move in moved.items()}}
+        before, after = _value(expression, state, context), _value(expression, other, context)
+        if before is None or after is None:
+            continue
+        if abs(before - after) > context.ldexp(abs(before) + abs(after), -_BITS):
+            return True
+        compared += 1
+        if compared == _STATES:
+            break
+    return False
+
+
+def _expressions(scene: Scene) -> Iterator[tuple[str, Expression]]:
+    for load in scene.loads:
+        yield from load.formulas()
+    for number, event in enumerate(scene.events):
+        yield f"[[events]] number {number + 1} expression", event.expression
+
+
+def _nodes(expression: Expression) -> Iterator[Node]:
+    waiting = [expression.root]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        if isinstance(node, Operation):
+            waiting += node.operands
+
+
+def _value(expression: Expression, state: Mapping[str, Any], context: Any) -> Any | None:
+    try:
+        return evaluate(expression, state, context)
+    except ExpressionError:
+        return None
+
+
+def _ratio(values: Sequence[Any], others: Sequence[Any], context: Any) -> int:
+    """The sign of the constant ratio of two rows of values; 0 where it isn't constant."""
+    pairs = [(a, b) for a, b in zip(values, others, strict=True) if a is not None and b is not None]
+    pairs = pairs[:_STATES]
+    if len(pairs) < _STATES or any(b == 0 or a == 0 for a, b in pairs):
+        return 0
+    first = pairs[0][0] / pairs[0][1]
+    if any(abs(a / b - first) > context.ldexp(abs(first), -_BITS) for a, b in pairs):
+        return 0
+    return 1 if first > 0 else -1

@@ -1,0 +1,223 @@
+"""The engines of a motion with switching surfaces, and what the state doesn't tell of it.
+
+Sides are parameters of the equations, and so are the turns of angles and the sign of the quaternion where an
+expression depends on them: both go on from step to step by continuity. Along surfaces the motion has
+equations of its own, which are compiled when they are first needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import heyoka as hy
+import mpmath
+import numpy as np
+
+from rigidsim.model.system import System
+from rigidsim.solve.engine import Integrator
+from rigidsim.solve.events import EventLog, engine_events
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.sliding import sliding
+from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.switching import SLIDES, Look, Probe, continued
+
+_BISECTIONS = 4  # of a step for each bit of the precision
+
+Root = tuple[Any, int, int]
+"""Time, number of a surface, and the side that it leads to."""
+
+
+class SwitchedEngines(Stepper):
+    """What a stepper with surfaces has beside its steps: an engine for each way to go on, and a memory."""
+
+    single_steps = True
+
+    def __init__(
+        self,
+        system: System,
+        precision: Precision,
+        tolerance: Scalar | None,
+        start: Scalar,
+        log: EventLog | None = None,
+    ) -> None:
+        self._roots: list[Root] = []
+        self._probes: dict[int, Probe] = {}
+        self._slid: dict[tuple[int, tuple[int, ...]], Integrator] = {}
+        self._chart = 0
+        surfaces = system.plan.surfaces
+        self._modes = [1] * len(surfaces.found)
+        self._fresh, self._count, self._since = False, 0, 0.0
+        super().__init__(system, precision, tolerance, start, log)
+        probe = self._probe
+        pars = self._pars([0.0] * probe.angles, 1.0)
+        _, plain, quaternion = probe.values(self.state, self.time, pars)
+        begun = dict(zip(("phi", "theta", "psi"), system.scene.euler_angles or (), strict=False))
+        asked = [float(begun.get(name, a)) for name, a in zip(surfaces.turning, plain, strict=True)]
+        # in the partner chart, where a run may begin, angles are plain already
+        self._angles = [a + 2 * np.pi * continued(b, a) for a, b in zip(plain, asked, strict=True)]
+        given = [float(x) for x in system.scene.quaternion]
+        same = not quaternion or float(np.dot(given, quaternion)) >= 0
+        self._quaternion = [x if same else -x for x in quaternion]
+        self._dense = self._integrator
+
+    # --- what it remembers ----------------------------------------------------------------------------------
+
+    @property
+    def _along(self) -> tuple[int, ...]:
+        return tuple(j for j, mode in enumerate(self._modes) if mode == SLIDES)
+
+    @property
+    def _probe(self) -> Probe:
+        if self._chart not in self._probes:
+            system = self.system if self._chart == 0 else self.system.partner
+            assert system is not None
+            self._probes[self._chart] = Probe(system, self.precision)
+        return self._probes[self._chart]
+
+    def mark(self) -> Mark:
+        """Remember this boundary."""
+        memory = (
+            *map(float, self._modes),
+            *self._angles,
+            *self._quaternion,
+            float(self._fresh),
+            float(self._count),
+            self._since,
+        )
+        return replace(super().mark(), switching=memory)
+
+    def back_to(self, mark: Mark) -> None:
+        """Return to a boundary."""
+        memory = list(mark.switching)
+        s, a, q = len(self._modes), len(self._angles), len(self._quaternion)
+        self._modes = [int(x) for x in memory[:s]]
+        self._angles, self._quaternion = memory[s : s + a], memory[s + a : s + a + q]
+        fresh, count, self._since = memory[s + a + q :]
+        self._fresh, self._count = bool(fresh), int(count)
+        self.failure = ""
+        self._enter()
+        super().back_to(mark)
+
+    def use(self, chart: int) -> None:
+        """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
+        self._chart = chart
+        self._enter()
+        self._longest = self._bounds[chart]
+
+    def _enter(self) -> None:
+        """Go on with the equations of this chart along these surfaces."""
+        key = self._chart, self._along
+        if key not in self._slid:
+            system = self.system if self._chart == 0 else self.system.partner
+            assert system is not None
+            first = key == (0, ()) and hasattr(self, "_integrator")
+            self._slid[key] = self._integrator if first else self._compiled(system, key[1])
+        entered = self._slid[key]
+        if entered is not self._integrator:
+            entered.dtime = self._integrator.dtime
+            entered.state[:] = self._integrator.state
+            self._integrator = entered
+
+    def _compiled(self, system: System, along: tuple[int, ...] = ()) -> Integrator:
+        options = dict(self.precision.options)
+        equations, kind = system.equations, self.precision.scalar
+        events = [
+            hy.nt_event(u, self._noting(j), fp_type=kind)
+            for j, u in enumerate(system.surfaces)
+            if j not in along
+        ]
+        if along:
+            found = sliding(system, along)
+            equations = found.equations
+            for j, side in zip(along, found.sides, strict=True):
+                for end, way in ((1, hy.event_direction.positive), (-1, hy.event_direction.negative)):
+                    leaves = self._noting(j, end)
+                    events.append(hy.nt_event(side - float(end), leaves, direction=way, fp_type=kind))
+        if self.has_events:
+            events += engine_events(system, self.precision, self.log)
+        if self._tolerance is not None:
+            options["tol"] = self._tolerance
+        integrator = hy.taylor_adaptive(
+            equations,
+            self.precision.array(system.initial),
+            time=self._start,
+            nt_events=events,
+            compact_mode=self.precision.compact or system.wide or len(along) > 1,
+            **options,
+        )
+        self._slid[(self._chart, along)] = integrator
+        return integrator
+
+    def _noting(self, j: int, end: int = 0) -> Callable[[Integrator, Scalar, int], None]:
+        def called(_: Integrator, time: Scalar, way: int) -> None:
+            self._roots.append((time, j, end or way))
+
+        return called
+
+    # --- parameters -----------------------------------------------------------------------------------------
+
+    def _pars(self, turns: list[float], sign: float, over: dict[int, int] | None = None) -> np.ndarray:
+        sides = [float((over or {}).get(j, mode) or 1) for j, mode in enumerate(self._modes)]
+        numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
+        return np.array([self.precision.number(mpmath.mpf(x)) for x in numbers], dtype=self.precision.scalar)
+
+    def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
+        """At this boundary; turns and sign go on from the latest step."""
+        turns, sign = self._joined(self.state, self.time)
+        return self._pars(turns, sign, over)
+
+    def _look(self, state: np.ndarray, time: Scalar) -> Look:
+        """At a state of the latest step."""
+        return self._probe.look(state, time, self._pars(*self._joined(state, time)))
+
+    def _values(self, state: np.ndarray, time: Scalar) -> np.ndarray:
+        """The arguments alone, likewise."""
+        return self._probe.values(state, time, self._pars(*self._joined(state, time)))[0]
+
+    def _joined(self, state: np.ndarray, time: Scalar) -> tuple[list[float], float]:
+        if not (self._angles or self._quaternion):
+            return [], 1.0
+        zeros = self._pars([0.0] * len(self._angles), 1.0)
+        _, plain, quaternion = self._probe.values(state, time, zeros)
+        turns = [continued(b, a) for a, b in zip(plain, self._angles, strict=True)]
+        same = not quaternion or float(np.dot(quaternion, self._quaternion)) >= 0
+        return turns, 1.0 if same else -1.0
+
+    def _follow(self) -> None:
+        """Continue angles and quaternion to the end of the step just taken."""
+        if not (self._angles or self._quaternion):
+            return
+        turns, sign = self._joined(self.state, self.time)
+        zeros = self._pars([0.0] * len(self._angles), 1.0)
+        _, plain, quaternion = self._probe.values(self.state, self.time, zeros)
+        self._angles = [a + 2 * np.pi * n for a, n in zip(plain, turns, strict=True)]
+        self._quaternion = [sign * x for x in quaternion]
+
+    @staticmethod
+    def _set(engine: Integrator, pars: np.ndarray) -> None:
+        engine.pars[:] = pars[: len(engine.pars)]  # along a surface the last ones may have no meaning
+
+    def _keep_to_surfaces(self) -> None:
+        """Take off what rounding moved the state away from the surfaces that it slides along."""
+        state = self._integrator.state
+        look = self._look(state, self.time)
+        for j in self._along:
+            gradient = look.gradients[j]
+            square = sum((g * g for g in gradient), gradient[0] * 0)
+            if square != 0:
+                state[:] = state - (look.u[j] / square) * gradient
+
+    def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
+        """A root that the engine missed."""
+        for _ in range(_BISECTIONS * self.precision.bits):
+            middle = begin + (end - begin) / 2
+            if not begin < middle < end:
+                break
+            value = self._values(self._integrator.update_d_output(middle), middle)[j]
+            if self._modes[j] * float(value) > 0:
+                begin = middle
+            else:
+                end = middle
+        return end

@@ -1,0 +1,281 @@
+"""Kinks and jumps of loads: steps end on them, and the fields of both sides say how it goes on.
+
+Truth is what each side integrates to by itself, in closed form.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from support import EPSILON, angles_between, config, run_text
+
+import rigidsim
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import try_setting
+from rigidsim.errors import ConfigError
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.status import Status
+
+pytestmark = pytest.mark.compact
+SPHERE = "principal_moments = [1, 1, 1]"
+REST = "angular_velocity = [0, 0, 0]"
+FRICTION = 'kind = "torque"\ncomponents = ["0", "0", "-0.3*sign(wz)"]'
+TILTED = "angular_velocity = [0.3, 1.2, 2]\nquaternion = [0.5, 0.4, -0.3, 0.7]"
+"""Far from the singularity of the Euler angles."""
+
+
+class Kept(SampleReceiver):
+    """The states of all samples."""
+
+    def __init__(self) -> None:
+        self.states: list[Any] = []
+
+    def take(self, block: SampleBlock) -> None:
+        self.states += list(block.states)
+
+
+def about_z(
+    torque: str, *, initial: str = REST, end: str = "10", precision: str = "double", **rest: str
+) -> Any:
+    """A sphere under a torque about z: status, message and, in SI, the states at the end (mpf)."""
+    text = config(
+        SPHERE,
+        initial,
+        f'kind = "torque"\ncomponents = ["0", "0", "{torque}"]',
+        f"end = {end}\nsamples = 2",
+        f'precision = "{precision}"\n' + rest.pop("integrator", ""),
+        **rest,
+    )
+    prepared = prepare(rigidsim.parse(text))
+    kept = Kept()
+    progress = sampler(prepared, assemble(prepared), kept).run()
+    system = prepared.system
+    found = {
+        name: mpmath.ldexp(prepared.precision.exact(kept.states[-1][i]), system.state_exponents[i])
+        for i, name in enumerate(system.states)
+        if kept.states
+    }
+    return progress, found
+
+
+@pytest.mark.parametrize(
+    "torque", ["abs(t - 5.3)", "sqrt((t - 5.3)^2)", "((5.3 - t)^4)^(1/4)", "max(t, 10.6 - t) - 5.3"]
+)
+@pytest.mark.parametrize("precision", ["double", "quadruple"])
+def test_a_torque_with_a_kink_in_time(torque: str, precision: str) -> None:
+    """With a = 5.3 and b = 4.7 it turns by a^3/3 until the kink, by a^2 b/2 + b^3/6 from there on."""
+    progress, found = about_z(torque, precision=precision)
+    assert progress.status is Status.FINISHED
+    with mpmath.workdps(50):
+        a, b = mpmath.mpf("5.3"), mpmath.mpf("4.7")
+        rate = (a**2 + b**2) / 2
+        angle = a**3 / 3 + a**2 / 2 * b + b**3 / 6
+        # some roundings of the largest rate and angle (at most 63 rad)
+        assert abs(found["wz"] - rate) < 8 * EPSILON[precision] * rate
+        for name, value in (("qw", mpmath.cos(angle / 2)), ("qz", mpmath.sin(angle / 2))):
+            assert abs(found[name] - value) < 8 * EPSILON[precision] * angle
+
+
+@pytest.mark.parametrize("precision", ["double", "quadruple"])
+def test_dry_friction_brings_the_body_to_rest_and_holds_it(precision: str) -> None:
+    """w = 1 - 0.3 t until t = 10/3, after a turn by 1/0.6 rad."""
+    progress, found = about_z("-0.3*sign(wz)", initial="angular_velocity = [0, 0, 1]", precision=precision)
+    assert progress.status is Status.FINISHED
+    assert found["wz"] == 0
+    assert abs(found["work"] + mpmath.mpf(1) / 2) < 8 * EPSILON[precision]
+    with mpmath.workdps(50):
+        half = mpmath.mpf(10) / 12
+        assert abs(found["qw"] - mpmath.cos(half)) < 16 * EPSILON[precision]
+        assert abs(found["qz"] - mpmath.sin(half)) < 16 * EPSILON[precision]
+
+
+def test_it_sticks_until_what_pulls_is_stronger() -> None:
+    """From rest under -0.3 sign(w) + 0.1 t it slips at t = 3: then w = 0.05 (t - 3)^2."""
+    _, found = about_z("-0.3*sign(wz) + 0.1*t")
+    assert abs(float(found["wz"]) - 2.45) < 8 * EPSILON["double"] * 2.45
+
+
+def test_friction_about_three_axes_ends_in_rest() -> None:
+    """Three surfaces at once; the work is minus the energy at the start."""
+    friction = ", ".join(f'"-0.3*sign(w{axis})"' for axis in "xyz")
+    text = config(
+        "principal_moments = [1, 1.3, 2]",
+        "angular_velocity = [0.5, 0.7, 1]",
+        f'kind = "torque"\ncomponents = [{friction}]',
+        "end = 20\nsamples = 3",
+    )
+    prepared = prepare(rigidsim.parse(text))
+    kept = Kept()
+    progress = sampler(prepared, assemble(prepared), kept).run()
+    assert progress.status is Status.FINISHED
+    states = dict(zip(prepared.system.states, kept.states[-1], strict=True))
+    energy = np.ldexp((0.25 + 1.3 * 0.49 + 2) / 2, -prepared.system.scaling.energy)
+    assert max(abs(states[name]) for name in ("wx", "wy", "wz")) < 8 * EPSILON["double"]
+    assert abs(states["work"] + energy) < 32 * EPSILON["double"] * energy
+
+
+@pytest.mark.parametrize(
+    ("torque", "rate"),
+    [
+        ("sign((t - 5)^2)", 10.0),  # touched, never crossed
+        ("sign((t - 5)^2 - 1e-10)", 10 - 4e-5),
+        ("1000*pulse(t, 5, 5.001)", 1.0),
+        ("step(t - 2.5)*min(t, 4)", (16 - 6.25) / 2 + 24),
+        ("abs(abs(t - 5) - 2)", 4 + 9.0),
+        ("sign(sign(t - 3) + 0.5)", 7 - 3.0),  # an argument that jumps itself
+        ("abs(t)", 50.0),  # from a surface on
+        ("1 - 0.3*abs(wx)", 10.0),  # never left
+    ],
+)
+def test_each_side_integrates_by_itself(torque: str, rate: float) -> None:
+    progress, found = about_z(torque)
+    assert progress.status is Status.FINISHED
+    # pulses: 1e3 times the rounding of their ends' times
+    assert abs(float(found["wz"]) - rate) < 16 * EPSILON["double"] * (rate + 5e3 * ("pulse" in torque))
+
+
+@pytest.mark.parametrize(
+    ("torque", "initial", "why"),
+    [
+        ("0.3*sign(wz)", REST, "isn't unique"),  # from rest to either side
+        (
+            "-sign(wrap(psi - 1)) - 0.3*sign(wz)",
+            "angular_velocity = [0, 0, 0.5]\n" + TILTED.split("\n")[1],
+            "again",
+        ),
+    ],
+)
+def test_what_cannot_be_continued_ends_in_a_status_of_its_own(torque: str, initial: str, why: str) -> None:
+    """Two ways to go on; and switches that accumulate: each swing is shorter by a constant factor."""
+    progress, _ = about_z(torque, initial=initial, end="30")
+    assert progress.status is Status.UNRESOLVED
+    assert why in progress.detail
+    assert "[[loads]] number 1 components[2]" in progress.detail
+    assert "tanh" in progress.detail
+
+
+SCENES = {
+    "turns count": '"0", "0", "-0.2*psi"',
+    "turns are taken off": '"0", "0", "-0.2*wrap(psi)"',
+    "sign of the quaternion": '"sign(qw)*qx", "0", "0"',
+    "rates": '"0.3*max(wx, wy)", "-0.1*sqrt(wy^2)*wy", "-0.5*min(wz, 0.3)"',
+    "an angle of the state": '"0.3*atan2(wx, wy)", "0", "-0.1*step(sin(psi))"',
+}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_all_formulations_agree(scene: str) -> None:
+    """Within 1e-11 rad of extended precision: the law gives some 1e-14 for 20 rad, and these motions amplify
+    errors up to a hundred times.
+    """
+    text = config(
+        "principal_moments = [1, 1.3, 2]",
+        TILTED,
+        f'kind = "torque"\ncomponents = [{SCENES[scene]}]',
+        "end = 10\nsamples = 3",
+    )
+    experiment = rigidsim.parse(text)
+    truth = try_setting(experiment, Setting("extended"), compact=True)
+    for formulation in ("quaternion", "euler_angles", "rotation_matrix"):
+        found = try_setting(experiment, Setting("double", formulation=formulation), compact=True)
+        assert found.status is Status.FINISHED
+        assert angles_between(truth.attitudes, found.attitudes).max() < 1e-11
+
+
+def test_an_event_on_a_surface_is_found_once(runs: Path) -> None:
+    """The torque's own surface as an event, and one whose own kink lies there."""
+    text = config(
+        SPHERE,
+        "angular_velocity = [0, 0, 1]",
+        'kind = "torque"\ncomponents = ["0", "0", "-1 - 0.5*sign(wz)"]',
+        "end = 5\nsamples = 3",
+        more='[[events]]\nname = "still"\nexpression = "wz"\n'
+        '[[events]]\nname = "half"\nexpression = "abs(wz) - 0.5"\n',
+    )
+    dataset = run_text(text, runs).dataset
+    # 1 - 1.5 t, then -0.5 (t - 2/3)
+    assert dataset["still_time"].values == pytest.approx([2 / 3], rel=8 * EPSILON["double"])
+    assert dataset["half_time"].values == pytest.approx([1 / 3, 5 / 3], rel=8 * EPSILON["double"])
+
+
+def test_a_certificate_knows_the_kink(runs: Path) -> None:
+    """The scene on which the reference and the run once shared an error of 0.086 rad."""
+    text = config(
+        SPHERE,
+        REST,
+        'kind = "torque"\ncomponents = ["0", "0", "sqrt((t - 5.3)^2)"]',
+        "end = 10\nsamples = 11",
+        "accuracy = 0.05",
+    )
+    run = run_text(text, runs)
+    angle = 5.3**3 / 3 + 5.3**2 / 2 * 4.7 + 4.7**3 / 6
+    w, _, _, z = run.dataset["quaternion"].values[-1]
+    error = abs(np.angle(np.exp(1j * (2 * np.arctan2(z, w) - angle))))
+    assert error < run.summary["accuracy"]["certified"] < 0.05
+
+
+@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix"])
+def test_a_load_odd_in_the_quaternion_is_refused(formulation: str) -> None:
+    load = 'kind = "torque"\ncomponents = ["0.5*qx", "0", "0.2*qw"]'
+    text = config(loads=load, integrator=f'formulation = "{formulation}"')
+    with pytest.raises(ConfigError) as refused:
+        prepare(rigidsim.parse(text))
+    for words in ("[[loads]] number 1", "sign of the quaternion", "qw*qx", "sign(qw)*qx"):
+        assert words in str(refused.value)
+    prepare(rigidsim.parse(text.replace("0.5*qx", "qw*qx").replace("0.2*qw", "sign(qw)*qx")))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (config(loads=FRICTION, output="lyapunov = true"), ["[output] lyapunov", "sign(wz)", "tanh"]),
+        (
+            config(
+                initial="angular_velocity = [0, 0, 1]\neuler_angles = [0.1, -0.3, 0.2]",
+                loads='kind = "torque"\ncomponents = ["0", "0", "sin(psi)"]',
+            ),
+            ["[initial] euler_angles", "-0.3", "0 to pi", "zxz"],
+        ),
+        (
+            config(more='[[events]]\nname = "a"\nexpression = "step(t - 2)*wy"'),
+            ["step", "crosses zero nowhere"],
+        ),
+    ],
+    ids=["spectrum", "other triple of angles", "event that jumps"],
+)
+def test_what_would_be_wrong_is_refused(text: str, words: list[str]) -> None:
+    with pytest.raises(ConfigError) as refused:
+        prepare(rigidsim.parse(text))
+    for word in words:
+        assert word in str(refused.value)
+
+
+def test_a_plan_lists_the_surfaces_each_once() -> None:
+    """2*wz and -wz are zero together; smooth powers have no surface."""
+    torque = '"sign(2*wz)", "abs(-wz)*min(t, 3)", "-0.1*psi + sqrt(wx^4)"'
+    text = config(initial=TILTED, loads=f'kind = "torque"\ncomponents = [{torque}]')
+    plan = rigidsim.plan(rigidsim.parse(text), pilot_seconds=0.0)
+    assert [surface["surface"] for surface in plan["switching"]] == ["sign(2*wz)", "min(t, 3)"]
+    assert plan["turning"] == ["psi"]
+
+
+def test_a_norm_that_vanishes_is_not_passed_over() -> None:
+    """About one axis sqrt(wx^2 + wy^2 + wz^2) is |wz|, whose series go on with the wrong sign; abs gives the
+    motion, the norm ends where wz does.
+    """
+    drag = "cos(t) - 0.3*{}*wz"
+    start = "angular_velocity = [0, 0, -0.5]"
+    progress, _ = about_z(drag.format("sqrt(wx^2 + wy^2 + wz^2)"), initial=start)
+    assert progress.status in (Status.NON_FINITE, Status.COLLAPSED)
+    assert progress.time < 0.6
+    progress, _ = about_z(drag.format("abs(wz)"), initial=start)
+    assert progress.status is Status.FINISHED
+    smooth, _ = about_z(drag.format("sqrt(1 + wx^2 + wy^2 + wz^2)"), initial=start)
+    assert smooth.status is Status.FINISHED
