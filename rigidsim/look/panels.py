@@ -115,9 +115,15 @@ def _rates(axes: Axes, dataset: xarray.Dataset) -> None:
 
 def _attitude(axes: Axes, dataset: xarray.Dataset) -> None:
     if "euler_angles" in dataset:
-        values, labels = _without_growth(dataset, np.rad2deg(_values(dataset, "euler_angles")))
+        values = np.rad2deg(_values(dataset, "euler_angles"))
+        lost = "angles_wrapped_from" in dataset.attrs
+        labels = ["φ", "θ", "ψ"]
+        if lost:  # within one turn, and sampled too sparsely for lines from one to the next
+            axes.set_prop_cycle(linestyle=["none"], marker=["."])
+        else:
+            values, labels = _without_growth(dataset, values)
         _curves(axes, dataset, values, labels, PALETTE)
-        axes.set_title("Euler angles")
+        axes.set_title("Euler angles" + (", within one turn" if lost else ""))
         axes.set_ylabel("angle [deg]")
         return
     axis = rotation_matrix(_values(dataset, "quaternion"))[..., 2]

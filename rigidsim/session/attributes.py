@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 from rigidsim.session.timings import Effort
@@ -76,8 +77,14 @@ def root_attributes(
     )
 
 
-def of_complete(attributes: RootAttributes, summary: Summary, effort: Effort) -> RootAttributes:
-    """Those of the dataset of a run that ended."""
+def of_complete(
+    attributes: RootAttributes, summary: Summary, effort: Effort, angles_wrapped_from: float = math.nan
+) -> RootAttributes:
+    """Those of the dataset of a run that ended.
+
+    Args:
+        angles_wrapped_from: as of ``SampleStatistics``.
+    """
     put_back = {name: row.put_back for name, row in summary.invariants.items()}
     return attributes.having(
         status=summary.status,
@@ -88,4 +95,5 @@ def of_complete(attributes: RootAttributes, summary: Summary, effort: Effort) ->
         cpu_seconds=effort.cpu,
         finished_at=provenance.now(),
         put_back=json.dumps(put_back) if summary.hold_invariants else None,
+        angles_wrapped_from=None if math.isnan(angles_wrapped_from) else angles_wrapped_from,
     )

@@ -74,12 +74,16 @@ class Completion:
             checkpoint = self.folder.checkpoint, arrays, self.recorder.all_events()
         self.writer.complete(
             self.folder.dataset,
-            of_complete(self.attributes, self.summary, self.effort).as_dict(),
+            self._attributes().as_dict(),
             self.extras,
             checkpoint=checkpoint,
             conclude=self._conclude,
         )
         self.phases.next("dataset")
+
+    def _attributes(self) -> RootAttributes:
+        wrapped_from = self.recorder.statistics.angles_wrapped_from
+        return of_complete(self.attributes, self.summary, self.effort, wrapped_from)
 
     def _conclude(self) -> None:
         """The dataset is in place, the segments are still there."""

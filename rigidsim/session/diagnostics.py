@@ -157,7 +157,15 @@ class Diagnostics:
     def _joining(self) -> Iterator[Caution]:
         system = self.prepared.system
         turns = float(system.rate_bound) * largest_spacing(self.prepared) / math.pi
-        joined = [r.name for r in system.recorded if r.continuity in ("unwrap", "nearest")]
+        joined = [r.name for r in system.recorded if r.continuity == "nearest"]
+        lost = self.statistics.angles_wrapped_from
+        if not math.isnan(lost):
+            names = " and ".join(r.name for r in system.recorded if r.continuity == "unwrap")
+            yield Caution(
+                WarningCode.NOT_JOINED,
+                f"the turns of {names} aren't known from {lost:.6g} s on, where they are recorded within one "
+                'turn; sample more often, or choose formulation = "euler_angles", which carries them',
+            )
         if joined and turns > 1:
             yield Caution(
                 WarningCode.NOT_JOINED,

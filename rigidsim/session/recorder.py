@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rigidsim.session.statistics import SampleStatistics
@@ -55,10 +57,15 @@ class Recorder(SampleReceiver):
         for name, values in put_back_by_invariant(self._prepared.projected_scalars, block.put_back).items():
             recorded[put_back_name(name)] = [values[:, None]]
             self.statistics.put_back[name] = float(values[-1])
+        self._note_lost_turns()
         factors = self._evaluator.singular_factors(block.states, block.chart)
         if factors is not None:
             self.statistics.see_singular(factors, recorded["time"][0])
         self._writer.add(recorded)
+
+    def _note_lost_turns(self) -> None:
+        lost = self._evaluator.continuity.wrapped_from
+        self.statistics.angles_wrapped_from = math.ldexp(lost, self._prepared.clock.exponent)
 
     def due(self) -> bool:
         """Whether what is collected is much, or the last segment old."""
@@ -103,6 +110,7 @@ class Recorder(SampleReceiver):
         seen.put_back |= statistics.put_back
         seen.nearest_singularity = statistics.nearest_singularity
         seen.singularity_time = statistics.singularity_time
+        self._note_lost_turns()
         progress.smallest_step, progress.largest_step = statistics.smallest_step, statistics.largest_step
         progress.redone_steps = statistics.redone_steps
         progress.integration_seconds = statistics.integration_seconds

@@ -17,6 +17,8 @@ class SampleStatistics:
         put_back: of projected invariants, what was put back before the latest sample.
         nearest_singularity: smallest absolute singular factor at a sample.
         singularity_time: of that sample, seconds.
+        angles_wrapped_from: time of the first sample whose angles are within one turn, since their turns
+            aren't known, seconds; nan where all are.
     """
 
     largest: dict[str, float] = field(default_factory=dict)
@@ -24,6 +26,7 @@ class SampleStatistics:
     put_back: dict[str, float] = field(default_factory=dict)
     nearest_singularity: float = math.inf
     singularity_time: float = math.nan
+    angles_wrapped_from: float = math.nan
 
     def see(self, invariant: str, drifts: np.ndarray) -> None:
         """Follow one invariant through a block of samples.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.checkpoint import Position
@@ -14,9 +15,15 @@ from rigidsim.solve.loop import IntegrationLoop
 from rigidsim.solve.pacing import MEASURED, Pacing
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import Projection, steps_between
-from rigidsim.solve.sampler import Check, Sampler, SampleReceiver
+from rigidsim.solve.sampler import Check, Progress, Sampler, SampleReceiver
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.turn_count import MOST_OF_A_CLOSED_FORM, radians_between
+
+_RADIANS_AT_ONCE = 2e5
+_PATIENCE = 0.25  # seconds, in place of those of other runs
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,17 @@ def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly
         projection = Projection(system, precision, start)
     interval = steps_between(precision)
     corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
-    return Assembly(wrapping, log, stepper, projection, corrected, Evaluator(system, precision, wrapping))
+    # on which side of its surfaces a motion is, and whether it slides there, a sample doesn't tell
+    countable = not system.switches
+    if prepared.closed is not None:
+        countable = radians_between_samples(prepared) <= MOST_OF_A_CLOSED_FORM
+    evaluator = Evaluator(system, precision, wrapping, countable=countable)
+    return Assembly(wrapping, log, stepper, projection, corrected, evaluator)
+
+
+def radians_between_samples(prepared: InitialValueProblem) -> float:
+    """By how much the body turns at most."""
+    return radians_between(prepared.scene.samples, float(prepared.system.rate_bound))
 
 
 def sampler(
@@ -73,9 +90,35 @@ def sampler(
         start: where to go on; None begins.
     """
     clock, precision = prepared.clock, prepared.precision
+    if parts.evaluator.sparse:
+        check = _following(check, parts.evaluator, clock)
+        pacing = _in_small_blocks(pacing, radians_between_samples(prepared))
     if prepared.closed is None:
         return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing)
     begin = parts.corrected.boundary()
     return ClosedFormSampler(
         prepared.closed, prepared.system, begin, clock, precision, receiver, check, start, pacing
+    )
+
+
+def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
+    """The check, before which turns are counted as far as the run has come, a part of a chunk's time each."""
+
+    def checked(progress: Progress) -> Status | None:
+        if progress.next_sample < clock.count:
+            reached = math.ldexp(progress.time, -clock.exponent)
+            evaluator.follow(min(reached, float(clock.at(progress.next_sample))))
+        return check(progress)
+
+    return checked
+
+
+def _in_small_blocks(pacing: Pacing, radians: float) -> Pacing:
+    """Blocks of samples between which turns are counted within a fraction of a second."""
+    rows = max(1, int(_RADIANS_AT_ONCE / radians))
+    return replace(
+        pacing,
+        patience=min(pacing.patience, _PATIENCE),
+        rows_at_once=min(pacing.rows_at_once, rows),
+        wide_rows_at_once=min(pacing.wide_rows_at_once, rows),
     )

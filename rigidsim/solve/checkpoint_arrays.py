@@ -99,6 +99,10 @@ def pack_checkpoint(checkpoint: Checkpoint, precision: Precision, invariants: Se
         arrays["joined_angles"] = continuity.last_angles
     if continuity.last_quaternion is not None:
         arrays["joined_quaternion"] = continuity.last_quaternion
+    if continuity.last_state is not None:
+        arrays["joined_state"] = continuity.last_state
+        arrays["joined_time"] = np.array([continuity.last_time])
+    arrays["joined_wrapped"] = np.array([continuity.wrapped_from])
     drifts = counted.largest_drift, counted.final_drift
     arrays["watched"] = np.array([_values(found, invariants) for found in drifts])
     arrays["put_back"] = np.array(_values(counted.put_back, invariants))
@@ -141,6 +145,9 @@ def unpack_checkpoint(
         np.asarray(arrays.get("joined_turns", np.zeros(3)), dtype=np.int64),
         arrays.get("joined_angles"),
         arrays.get("joined_quaternion"),
+        float(arrays.get("joined_time", [math.nan])[0]),
+        arrays.get("joined_state"),
+        float(arrays.get("joined_wrapped", [math.nan])[0]),
     )
     largest, final = np.reshape(arrays.get("watched", ()), (2, len(invariants)))
     nearest, when = _numbers(arrays, "singularity", 2)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import heyoka as hy
@@ -18,6 +19,14 @@ from rigidsim.solve.charts import Lift
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.turn_count import (
+    Place,
+    TurnCounter,
+    angles_to_join,
+    doubtful_rows,
+    is_sparse,
+    nearest,
+)
 
 _GROUP = 64  # rows; a multiple of every SIMD width
 
@@ -119,11 +128,17 @@ class Continuity:
         turns: full turns added to derived Euler angles, (3,).
         last_angles, last_quaternion: of the latest sample, float64, the angles before those turns; None
             before the first block.
+        last_time, last_state: of the latest sample, float64, internal units, where turns are counted from it.
+        wrapped_from: time (internal units) of the first sample whose turns aren't known: from there on angles
+            are recorded within one turn; nan where all are known.
     """
 
     turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
     last_angles: np.ndarray | None = None
     last_quaternion: np.ndarray | None = None
+    last_time: float = math.nan
+    last_state: np.ndarray | None = None
+    wrapped_from: float = math.nan
 
 
 class Evaluator:
@@ -132,9 +147,15 @@ class Evaluator:
     Attributes:
         initial: initial values of the invariants' components, in internal units.
         continuity: to the next block.
+        sparse: whether there are angles whose turns the samples are too sparse to tell.
+
+    Args:
+        countable: whether the motion between such samples can be followed.
     """
 
-    def __init__(self, system: System, precision: Precision, wrapping: AngleWrapping) -> None:
+    def __init__(
+        self, system: System, precision: Precision, wrapping: AngleWrapping, *, countable: bool = True
+    ) -> None:
         self._system = system
         self._precision = precision
         self._wrapping = wrapping
@@ -145,6 +166,9 @@ class Evaluator:
         initial = precision.array(system.initial)
         self.initial = evaluate_rows(self._invariants, initial[None, :])[:, 0] if components else initial[:0]
         self._parameters = len(components)
+        joined = angles_to_join(system)
+        self.sparse = joined is not None and is_sparse(system)
+        self._counter = None if joined is None or not countable else TurnCounter(system, joined)
         factor = system.singular_factor
         self._singular = None if factor is None else self._compile([factor])
 
@@ -192,7 +216,7 @@ class Evaluator:
         result: RecordedParts = {}
         for variable in self._system.recorded:
             columns = values[variable.first : variable.first + variable.count].T
-            columns = self._joined(variable, columns, block.turns)
+            columns = self._joined(variable, columns, block)
             if angles is not None and variable.continuity == "wrapped":
                 columns[in_partner] = angles
             parts = self._precision.parts(columns)
@@ -207,14 +231,19 @@ class Evaluator:
         return result
 
     def evaluate_apart(self, block: SampleBlock) -> RecordedParts:
-        """As ``evaluate``, for states that aren't among the samples: nothing is joined to them later."""
+        """As ``evaluate``, for states that aren't among the samples: nothing is joined to them later, and
+        angles that aren't states are within one turn where samples are too sparse to tell their turns.
+        """
         before = copy.deepcopy(self.continuity)
+        if self.sparse:
+            self.continuity.wrapped_from = -math.inf
         try:
             return self.evaluate(block)
         finally:
             self.continuity = before
 
-    def _joined(self, variable: Recorded, block: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    def _joined(self, variable: Recorded, block: np.ndarray, samples: SampleBlock) -> np.ndarray:
+        turns = samples.turns
         if variable.continuity == "wrapped":
             return self._wrapping.unwrapped(block, turns)
         if variable.continuity == "parity":
@@ -225,7 +254,8 @@ class Evaluator:
         if variable.continuity == "nearest":
             return self._nearest(block)
         if variable.continuity == "unwrap":
-            return self._unwrapped(block)
+            known = variable.name == "euler_angles"
+            return self._counted(block, samples) if known and self.sparse else self._unwrapped(block, samples)
         return block
 
     def _nearest(self, block: np.ndarray) -> np.ndarray:
@@ -241,13 +271,66 @@ class Evaluator:
         self.continuity.last_quaternion = plain[-1] * signs[-1]
         return block
 
-    def _unwrapped(self, block: np.ndarray) -> np.ndarray:
-        """Add the full turns that make each angle nearest to the sample before."""
-        plain = block.astype(np.float64)
-        before = plain[0] if self.continuity.last_angles is None else self.continuity.last_angles
-        jumps = np.diff(np.vstack([before, plain]), axis=0)
-        turns = self.continuity.turns - np.cumsum(np.rint(jumps / (2 * np.pi)), axis=0).astype(np.int64)
-        self.continuity.turns, self.continuity.last_angles = turns[-1], plain[-1]
+    def _unwrapped(self, block: np.ndarray, samples: SampleBlock) -> np.ndarray:
+        """Add the full turns that make each angle nearest to the sample before, but for those of Euler angles
+        near their pole, whose way is followed.
+        """
+        plain, known = block.astype(np.float64), self.continuity
+        before = plain[0] if known.last_angles is None else known.last_angles
+        angles = np.vstack([before, plain])
+        made = -np.rint(np.diff(angles, axis=0) / (2 * np.pi)).astype(np.int64)
+        if self._counter is not None:
+            jumps = nearest(np.diff(angles, axis=0))
+            times, states = samples.times.astype(np.float64), samples.states.astype(np.float64)
+            for row in doubtful_rows(jumps, angles, self._system.sequence):
+                latest = Place(times[row - 1], states[row - 1], plain[row - 1]) if row else self._latest()
+                if latest is not None:
+                    self._counter.begin(latest)
+                    found = self._counter.turns(Place(times[row], states[row], plain[row]))
+                    made[row] = made[row] if found is None else found
+            known = replace(known, last_time=float(times[-1]), last_state=states[-1])
+        turns = known.turns + np.cumsum(made, axis=0)
+        self.continuity = replace(known, turns=turns[-1], last_angles=plain[-1])
+        return self._wrapping.unwrapped(block, turns)
+
+    def follow(self, time: float) -> None:
+        """Count turns from the latest sample on as far as the run has come, for a tenth of a second at most.
+
+        Args:
+            time: internal units.
+        """
+        if self._counter is not None and (latest := self._latest()) is not None:
+            self._counter.begin(latest)
+            self._counter.follow(time)
+
+    def _latest(self) -> Place | None:
+        """The latest sample; None without one, and where the turns are lost."""
+        known = self.continuity
+        if known.last_state is None or known.last_angles is None or not math.isnan(known.wrapped_from):
+            return None
+        return Place(known.last_time, known.last_state, known.last_angles)
+
+    def _counted(self, block: np.ndarray, samples: SampleBlock) -> np.ndarray:
+        """Add the full turns that the motion from each sample to the next makes; none once they are lost."""
+        plain, turns = block.astype(np.float64), np.zeros(block.shape, dtype=np.int64)
+        times, states = samples.times.astype(np.float64), samples.states.astype(np.float64)
+        for row, (time, state, angles) in enumerate(zip(times.tolist(), states, plain, strict=True)):
+            known, latest, here = self.continuity, self._latest(), Place(time, state, angles)
+            if not math.isnan(known.wrapped_from):
+                break
+            made: np.ndarray | None = None
+            if self._counter is not None and latest is not None:
+                self._counter.begin(latest)
+                made = self._counter.turns(here)
+            elif self._counter is not None and known.last_angles is None:  # the first sample
+                made = known.turns
+            if made is None:
+                self.continuity = replace(known, wrapped_from=time, turns=turns[row])
+                break
+            turns[row] = known.turns + made
+            self.continuity = replace(
+                known, turns=turns[row], last_angles=angles, last_time=time, last_state=state
+            )
         return self._wrapping.unwrapped(block, turns)
 
     def initial_invariants(self) -> dict[str, list[float]]:

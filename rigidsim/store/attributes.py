@@ -42,6 +42,8 @@ class RootAttributes(BaseModel):
         mixed_provenance: where the run was resumed with other versions or on another machine, what changed.
         warnings: one a line.
         wall_seconds, cpu_seconds: of all sessions.
+        angles_wrapped_from: from this time on (s) Euler angles are within one turn, since nobody knows their
+            turns; none where all are known.
     """
 
     model_config = ConfigDict(frozen=True, strict=True, defer_build=True)
@@ -103,6 +105,7 @@ class RootAttributes(BaseModel):
     cpu_seconds: float | None = None
     finished_at: str | None = None
     put_back: str | None = None
+    angles_wrapped_from: float | None = None
 
     def having(self, **known: Any) -> Self:
         """A copy with what has become known since."""

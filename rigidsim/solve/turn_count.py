@@ -1,0 +1,227 @@
+"""Turns of angles between sparse samples, counted along the motion and not guessed from the samples.
+
+Angles that are functions of the state (Euler angles where a quaternion is carried) are known up to full
+turns. Where the body may turn far between two samples, the motion from the one to the other is integrated
+once more, in double precision from the recorded state on, and its angles are followed in small parts. Whole
+turns are all that is taken from it, so that it needn't be exact: it has to arrive near the second sample,
+which is checked. The run itself, its steps and what it records of the state know nothing of it.
+
+Near a pole of the angles two of them swing by up to half a turn at once; there the path is followed in ever
+smaller parts. A pass nearer than that resolves has no direction of its own, and the nearest one is taken.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clock_time
+from dataclasses import dataclass
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.euler_charts import is_proper
+from rigidsim.model.outputs import Recorded
+from rigidsim.model.system import System
+from rigidsim.scene.scene import SampleTimes
+from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.precision import precision_of
+
+DENSE = 1.0
+"""Angle (rad) by which a body turns at most between samples whose angles are joined to the nearest."""
+
+_PART = 0.5  # rad, that the body turns from one point to the next
+_CHUNK = 4096  # points, always as many, so that turns don't depend on timing
+_STEPS = 50  # for each point, at most; a motion that takes more isn't followed
+_DOUBTFUL = 2.0  # rad: a jump by more is looked at in parts; one that is missed by a turn is larger than 4
+_FINER = 16  # parts of a part
+_DEPTH = 4
+_POLE = 1e-6  # rad, within which dense samples aren't looked at in parts
+_OFTEN = 0.05  # of the parts; where more are doubtful, the motion rests in a pole, and no path tells more
+_FAR = 0.05  # of a state of the attitude, from which the motion followed is another than the run's
+_TOLERANCE = 1e-11
+_SPARE = 1.25  # over the fastest rate of a chunk, for the next
+_SLOWER = 64.0  # than its bound, at most: the next chunk is not to be an age
+_WORTH_BUILDING = 2e5  # rad: code that is built in a tenth of the time is half as fast
+_TURN = 2 * math.pi
+MOST_OF_A_CLOSED_FORM = 1e6
+"""Angle between samples of a closed form up to which turns are counted: about a second's work."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A sample from which turns are counted.
+
+    Attributes:
+        time: internal units.
+        state: (states,) float64, internal units.
+        angles: (3,) float64, as the run has them, without turns.
+    """
+
+    time: float
+    state: np.ndarray
+    angles: np.ndarray
+
+
+def radians_between(samples: SampleTimes, rate: float) -> float:
+    """By how much a body turns at most between neighbouring samples.
+
+    Args:
+        rate: bound of each component of the angular velocity, rad/s.
+    """
+    if samples.times is None:
+        return math.sqrt(3) * rate * float(samples.step)
+    spacing = [float(b - a) for a, b in zip(samples.times, samples.times[1:], strict=False)]
+    return math.sqrt(3) * rate * max(spacing, default=0.0)
+
+
+def angles_to_join(system: System) -> Recorded | None:
+    """The recorded Euler angles that are no states; None without any."""
+    joined = [r for r in system.recorded if r.continuity == "unwrap" and r.name == "euler_angles"]
+    return joined[0] if joined else None
+
+
+def is_sparse(system: System) -> bool:
+    """Whether samples lie so far apart that they don't tell turns."""
+    return radians_between(system.scene.samples, float(system.rate_bound)) > DENSE
+
+
+def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.ndarray:
+    """Where angles change by nearly half a turn between dense samples: near their pole, not within rounding.
+
+    Args:
+        jumps: (n, 3) from the row before, to the nearest.
+        angles: (n + 1, 3), the row before the first among them.
+    """
+    middle = angles[:, 1]
+    factor = np.abs(np.sin(middle) if is_proper(sequence) else np.cos(middle)) > _POLE
+    return np.flatnonzero((np.abs(jumps).max(axis=1) > _DOUBTFUL) & factor[:-1] & factor[1:])
+
+
+class TurnCounter:
+    """Follows angles from sample to sample.
+
+    Args:
+        angles: the recorded variable.
+    """
+
+    def __init__(self, system: System, angles: Recorded) -> None:
+        self._exact, self._angles = system, angles
+        self._place: Place | None = None
+        self._built = False
+
+    def begin(self, place: Place) -> None:
+        """Count from a sample on, unless that is where it is counted from already."""
+        if self._place is not None and self._place.time == place.time:
+            return
+        self._place = place
+        self._time, self._state = place.time, place.state
+        self._followed = place.angles.copy()
+        self._lost = False
+        self._rate = self._bound
+
+    def follow(self, time: float, seconds: float = 0.1) -> None:
+        """Go on towards the next sample as far as the run itself has come, for so long at most."""
+        started = clock_time.perf_counter()
+        while (
+            self._place is not None
+            and not self._lost
+            and self._time + _CHUNK * self._part <= time
+            and clock_time.perf_counter() - started < seconds
+        ):
+            self._advance(time)
+
+    def turns(self, place: Place) -> np.ndarray | None:
+        """Full turns (3,) that a later sample's angles have, counted from where it began; None where the
+        motion followed doesn't lead there.
+        """
+        while self._time < place.time and not self._lost:
+            self._advance(place.time)
+        off = np.abs(self._state[self._attitude] - place.state[self._attitude]).max()
+        if self._lost or not off < _FAR:
+            return None
+        return np.rint((self._followed - place.angles) / _TURN).astype(np.int64)
+
+    # --- the motion once more ---------------------------------------------------------------------------
+
+    @property
+    def _bound(self) -> float:
+        """Of the angular velocity, internal units."""
+        if not self._built:
+            self._build()
+        return self._largest
+
+    @property
+    def _part(self) -> float:
+        return _PART / self._rate
+
+    def _build(self) -> None:
+        double = precision_of("double")
+        system = self._exact.rounded(double.number)
+        m, first = system.mechanics, self._angles.first
+        outputs = system.outputs[first : first + 3]
+        squared = hy.sum([w * w for w in m.rates])
+        self._attitude = [system.states.index(name) for name in m.carried(m.attitude).names]
+        self._function: CompiledFunction = hy.cfunc([*outputs, squared], system.variables, compact_mode=True)
+        rate = math.sqrt(3) * float(system.rate_bound)
+        span = system.scene.samples
+        radians = rate * float(span.exact_last - span.begin)
+        self._integrator = hy.taylor_adaptive(
+            system.equations,
+            np.zeros(len(system.states)),
+            tol=_TOLERANCE,
+            compact_mode=system.wide or radians < _WORTH_BUILDING,
+        )
+        self._largest = math.ldexp(rate, system.scaling.time)
+        self._built = True
+
+    def _path(self, time: float, state: np.ndarray, end: float, parts: int) -> tuple[np.ndarray, ...] | None:
+        """Times (n + 1,), states, angles (n + 1, 3) and largest rate from a time to another."""
+        times = np.linspace(time, end, parts + 1)
+        times[0], times[-1] = time, end
+        engine = self._integrator
+        engine.time = time
+        engine.state[:] = state
+        outcome, *_, states = engine.propagate_grid(times, max_steps=_STEPS * parts)
+        if outcome != hy.taylor_outcome.time_limit or not np.isfinite(states).all():
+            return None
+        values = np.asarray(self._function(np.ascontiguousarray(states.T)))
+        return times, states, values[:3].T, np.sqrt(values[3].max())
+
+    def _advance(self, limit: float) -> None:
+        """A chunk of points, or as many as there are up to a time."""
+        parts = min(_CHUNK, max(1, math.ceil((limit - self._time) / self._part)))
+        end = limit if parts < _CHUNK else min(limit, self._time + _CHUNK * self._part)
+        found = self._path(self._time, self._state, end, parts)
+        if found is None or not end > self._time:
+            self._lost = True
+            return
+        times, states, angles, fastest = found
+        if fastest * (end - self._time) / parts > 2 * _PART:  # faster than it was, or than an estimated bound
+            self._rate = 2 * float(fastest)
+            return
+        self._rate = max(_SPARE * float(fastest), self._bound / _SLOWER)
+        jumps = nearest(np.diff(angles, axis=0))
+        doubtful = np.flatnonzero(np.abs(jumps).max(axis=1) > _DOUBTFUL)
+        if len(doubtful) <= max(4, _OFTEN * parts):
+            for i in doubtful:
+                jumps[i] = self._looked_at(times[i], states[i], times[i + 1], jumps[i], _DEPTH)
+        self._followed += jumps.sum(axis=0)
+        self._time, self._state = end, states[-1]
+
+    def _looked_at(
+        self, time: float, state: np.ndarray, end: float, jump: np.ndarray, depth: int
+    ) -> np.ndarray:
+        """The change of the angles within a part whose ends don't tell it."""
+        found = self._path(time, state, end, _FINER) if depth else None
+        if found is None:
+            return jump
+        times, states, angles, _ = found
+        jumps = nearest(np.diff(angles, axis=0))
+        for i in np.flatnonzero(np.abs(jumps).max(axis=1) > _DOUBTFUL):
+            jumps[i] = self._looked_at(times[i], states[i], times[i + 1], jumps[i], depth - 1)
+        return jumps.sum(axis=0)
+
+
+def nearest(jumps: np.ndarray) -> np.ndarray:
+    """Changes of angles within half a turn."""
+    return jumps - _TURN * np.rint(jumps / _TURN)
