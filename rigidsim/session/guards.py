@@ -25,7 +25,7 @@ class Observer:
         """Called between chunks, at most some tens of times per second."""
 
     def phase(self, name: str) -> None:
-        """A new phase begins: "integrate", "lyapunov", "dataset", "timeline", "certify"."""
+        """A new phase begins: "integrate", "lyapunov", "estimate", "dataset", "timeline", "certify"."""
 
     def choosing(self, name: str) -> None:
         """Settings for the run of this name are about to be chosen, by trials; its integration follows."""
