@@ -39,8 +39,15 @@ class RandomScene:
     radians: float
 
 
-class _Draw:
-    """Random numbers of one scene, in its own units."""
+class Draw:
+    """Random numbers of one scene, in its own units.
+
+    Attributes:
+        time, mass, length: units.
+        horizon: of the run at most, rad.
+        time_scale: of the motion, units of time.
+        lines, more, parameters: of the config.
+    """
 
     def __init__(self, generator: np.random.Generator) -> None:
         self.random = generator
@@ -48,17 +55,21 @@ class _Draw:
         self.mass = 10 ** generator.uniform(-6, 6)
         self.length = 10 ** generator.uniform(-3, 3)
         self.horizon = 1e4
+        self.time_scale = 1.0
         self.lines: list[str] = []
         self.more: list[str] = []
         self.parameters: list[str] = []
 
     def between(self, low: float, high: float) -> float:
+        """Uniform."""
         return float(self.random.uniform(low, high))
 
     def decades(self, low: float, high: float) -> float:
+        """Ten to a uniform power."""
         return float(10 ** self.random.uniform(low, high))
 
     def direction(self) -> np.ndarray:
+        """A unit vector (3,)."""
         vector = self.random.standard_normal(3)
         return vector / np.linalg.norm(vector)
 
@@ -92,6 +103,7 @@ class _Draw:
         self.lines += [f"{k} = {[float(x * unit[k]) for x in v]}" for k, v in more.items()]
 
     def load(self, kind: str, *lines: str) -> None:
+        """``[[loads]]``, with its other keys as they stand."""
         self.more += ["[[loads]]", f'kind = "{kind}"', *lines]
 
     def gravity(self, strength: float) -> None:
@@ -100,57 +112,58 @@ class _Draw:
         self.load("uniform_gravity", f"acceleration = {down}")
 
     def sometimes(self, chance: float) -> bool:
+        """True with this chance."""
         return bool(self.random.random() < chance)
 
 
-def _symmetric(draw: _Draw) -> None:
+def _symmetric(draw: Draw) -> None:
     along = draw.between(0.1, 1.9)
     draw.body([1, 1, along], turned=draw.sometimes(0.3))
     draw.start(draw.direction())
 
 
-def _asymmetric(draw: _Draw) -> None:
+def _asymmetric(draw: Draw) -> None:
     draw.body(draw.moments(), turned=draw.sometimes(0.4))
     draw.start(draw.direction())
 
 
-def _near_separatrix(draw: _Draw) -> None:
+def _near_separatrix(draw: Draw) -> None:
     draw.body(np.sort(draw.moments()))
     draw.start([draw.decades(-12, -2), 1.0, draw.decades(-12, -2)])
 
 
-def _needle(draw: _Draw) -> None:
+def _needle(draw: Draw) -> None:
     thin = draw.decades(-5, -2)
     draw.body([1, 1 - thin * draw.between(-0.5, 0.5), thin])
     draw.start(draw.direction() * [1, 1, draw.between(0.5, 10)])
 
 
-def _plate(draw: _Draw) -> None:
+def _plate(draw: Draw) -> None:
     across = draw.between(0.2, 1)
     draw.body([1, across, 1 + across], turned=draw.sometimes(0.3))
     draw.start(draw.direction())
 
 
-def _heavy_symmetric(draw: _Draw) -> None:
+def _heavy_symmetric(draw: Draw) -> None:
     draw.body([1, 1, draw.between(0.2, 1.5)], [0, 0, draw.between(0.3, 1)])
     draw.start(draw.direction() * [1, 1, draw.between(1, 5)])
     draw.gravity(draw.decades(-1, 0.5))
 
 
-def _kovalevskaya(draw: _Draw) -> None:
+def _kovalevskaya(draw: Draw) -> None:
     draw.body([2, 2, 1], [draw.between(0.2, 1), 0, 0])
     draw.start(draw.direction() * 2)
     draw.gravity(draw.decades(-1, 0))
 
 
-def _heavy_asymmetric(draw: _Draw) -> None:
+def _heavy_asymmetric(draw: Draw) -> None:
     draw.horizon = _CHAOTIC_HORIZON
     draw.body(draw.moments(), draw.direction() * draw.between(0.2, 1))
     draw.start(draw.direction() * draw.between(1, 3))
     draw.gravity(draw.decades(-1, 0.3))
 
 
-def _fixed_source(draw: _Draw) -> None:
+def _fixed_source(draw: Draw) -> None:
     draw.body(draw.moments(), turned=draw.sometimes(0.3))
     draw.start(draw.direction())
     where = draw.direction() * 1e3 * draw.length
@@ -162,7 +175,7 @@ def _fixed_source(draw: _Draw) -> None:
     )
 
 
-def _orbit(draw: _Draw, eccentricity: float) -> None:
+def _orbit(draw: Draw, eccentricity: float) -> None:
     draw.horizon = 1e3
     draw.body(draw.moments(), turned=draw.sometimes(0.3))
     draw.start(draw.direction() * draw.between(0.5, 1))
@@ -179,15 +192,15 @@ def _orbit(draw: _Draw, eccentricity: float) -> None:
     )
 
 
-def _circular_orbit(draw: _Draw) -> None:
+def _circular_orbit(draw: Draw) -> None:
     _orbit(draw, 0.0)
 
 
-def _eccentric_orbit(draw: _Draw) -> None:
+def _eccentric_orbit(draw: Draw) -> None:
     _orbit(draw, draw.between(0.01, 0.4))
 
 
-def _central_gravity(draw: _Draw) -> None:
+def _central_gravity(draw: Draw) -> None:
     draw.horizon = 1e3
     draw.body(draw.moments())
     distance, motion = draw.decades(1.5, 3), draw.between(0.05, 0.4)
@@ -202,20 +215,20 @@ def _central_gravity(draw: _Draw) -> None:
     draw.load("central_gravity", f"gravitational_parameter = {strength!r}")
 
 
-def _free_flight(draw: _Draw) -> None:
+def _free_flight(draw: Draw) -> None:
     draw.body(draw.moments(), turned=draw.sometimes(0.3))
     draw.start(draw.direction(), position=draw.direction(), velocity=draw.direction())
     draw.gravity(draw.between(0.1, 1))
 
 
-def _viscous(draw: _Draw) -> None:
+def _viscous(draw: Draw) -> None:
     draw.body(draw.moments())
     draw.start(draw.direction())
     unit = draw.mass * draw.length**2 / draw.time * draw.decades(-5, -2)
     draw.load("viscous_torque", f"coefficients = {[unit * draw.between(0.3, 1) for _ in range(3)]}")
 
 
-def _torque(draw: _Draw, frame: str, components: Sequence[str]) -> None:
+def _torque(draw: Draw, frame: str, components: Sequence[str]) -> None:
     draw.horizon = 1e3
     draw.body(draw.moments(), turned=draw.sometimes(0.3))
     draw.start(draw.direction())
@@ -227,20 +240,20 @@ def _torque(draw: _Draw, frame: str, components: Sequence[str]) -> None:
     draw.load("torque", f"components = {list(components)}", f'frame = "{frame}"')
 
 
-def _body_torque(draw: _Draw) -> None:
+def _body_torque(draw: Draw) -> None:
     _torque(draw, "body", ["k*sin(n*t)", "0.5*k", "-k*wx*wy/n^2"])
 
 
-def _space_torque(draw: _Draw) -> None:
+def _space_torque(draw: Draw) -> None:
     _torque(draw, "space", ["k*cos(n*t)^2", "-k*sin(n*t)", "0.2*k"])
 
 
-def _pulse(draw: _Draw) -> None:
+def _pulse(draw: Draw) -> None:
     """A short push late in the run, of which no beginning of the motion knows."""
     _torque(draw, "body", ["k*exp(-(n*(t - late))^2)", "0", "3*k*exp(-(n*(t - late))^2)"])
 
 
-KINDS: dict[str, Callable[[_Draw], None]] = {
+KINDS: dict[str, Callable[[Draw], None]] = {
     "symmetric": _symmetric,
     "asymmetric": _asymmetric,
     "near separatrix": _near_separatrix,
@@ -264,7 +277,7 @@ KINDS: dict[str, Callable[[_Draw], None]] = {
 def random_scene(number: int, seed: int = 0) -> RandomScene:
     """Scene ``number`` of a seed; kinds take turns."""
     kind = list(KINDS)[number % len(KINDS)]
-    draw = _Draw(np.random.default_rng([seed, number]))
+    draw = Draw(np.random.default_rng([seed, number]))
     KINDS[kind](draw)
     accuracy = draw.decades(-20, -15) if draw.sometimes(0.05) else draw.decades(-15, -3)
     most = min(draw.horizon, _TIGHT_HORIZON if accuracy < _TIGHT else math.inf)

@@ -16,7 +16,7 @@ import numpy as np
 
 import rigidsim
 from experiments.extremes.scenes import Extreme
-from rigidsim.accuracy.error_law import motion_growth, round_off_law
+from rigidsim.accuracy.error_law import round_off_law
 from rigidsim.errors import ConfigError
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.statistics import SampleStatistics
@@ -26,6 +26,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
+from rigidsim.solve.trail import Trail
 from rigidsim.store.summary import WarningCode
 
 FACTOR = 3.0
@@ -76,10 +77,12 @@ class _Samples(SampleReceiver):
     def __init__(self, prepared: InitialValueProblem, evaluator: Any, name: str) -> None:
         self._prepared, self._evaluator, self._name = prepared, evaluator, name
         self.statistics = SampleStatistics()
+        self.trail = Trail(prepared.precision)
         self.times: list[Any] = []
         self.rows: list[list[Any]] = []
 
     def take(self, block: SampleBlock) -> None:
+        self.trail.take(block)
         recorded = self._evaluator.evaluate(block)
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
@@ -107,13 +110,13 @@ def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) ->
         parts = assemble(prepared)
     except ConfigError as refusal:
         return verdict("refused", str(refusal).replace("\n", " "))
-    growth = motion_growth(prepared)
     samples = _Samples(prepared, parts.evaluator, "angular_velocity" if column == "rates" else "quaternion")
     progress = sampler(prepared, parts, samples).run()
     if progress.status is not Status.FINISHED:
         return verdict("refused", f"the run ended: {progress.status.value}")
-    diagnostics = Diagnostics(prepared, progress, samples.statistics, growth)
-    found, estimate = diagnostics.cautions(), diagnostics.estimated_error
+    diagnostics = Diagnostics(prepared, progress, samples.statistics).estimated(samples.trail)
+    assert diagnostics.estimate is not None
+    found, estimate = diagnostics.cautions(), diagnostics.estimate.leading
     error = _largest_error(scene, column, prepared, samples)
     epsilon = float(prepared.precision.epsilon)
     duration = float(samples.times[-1] - samples.times[0])

@@ -166,9 +166,15 @@ def _print_accuracy(accuracy: Accuracy, out: Console) -> None:
         _line(out, "attitude", f"{text}{accuracy.times_compared} times)")
     elif estimate is not None:
         factor = accuracy.amplification or 1.0
-        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
+        unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 else ""
         size = f"uncertain by about {estimate:.1e} rad" if estimate < math.pi else "unknown"
-        _line(out, "attitude", f"{size} at the end (round-off law{unstable})")
+        _line(out, "attitude", f"{size} at the end{unstable}")
+    elif accuracy.amplification is None:
+        _line(out, "errors", accuracy.estimated_how)
+    place, speed = accuracy.estimated_position_error, accuracy.estimated_velocity_error
+    if place is not None and speed is not None:
+        text = f"position uncertain by about {place:.1e} m, velocity by {speed:.1e} m/s, at the end"
+        _line(out, "path", text)
 
 
 def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:

@@ -229,6 +229,7 @@ class Output(ConfigTable):
     record: list[StrictStr] | None = None
     timeline: StrictBool = True
     timeline_rows: StrictInt = Field(default=100_000, ge=2)
+    estimate: StrictBool = True
     lyapunov: StrictBool = False
 
     @field_validator("record")

@@ -4,35 +4,22 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from rigidsim.accuracy.error_law import CLOSED_FORM, DRIFT_FACTOR, round_off_law
+from rigidsim.accuracy.error_law import DRIFT_FACTOR
+from rigidsim.accuracy.estimate import LOST, Estimate, estimate_errors
 from rigidsim.session.statistics import SampleStatistics
-from rigidsim.solve.error_growth import Growth
+from rigidsim.solve.engine import Integrator
 from rigidsim.solve.loop import Progress
-from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.trail import Trail
 from rigidsim.store.summary import Caution, WarningCode
 
 NEAR_SINGULAR = 1e-3
 """Factor from which Euler angles lose digits to their singularity."""
-_LOST_DIGITS = 1e-2  # rad; an attitude this uncertain is no result any more
 _STEPS_TO_SINGULARITY = math.e**2  # a Taylor step is e^-2 of the way to it (Jorba & Zou 2005)
-
-
-def growth_by_spectrum(growth: Growth, spectrum: LyapunovSpectrum | None, rate: float) -> Growth:
-    """What the whole run's exponents say stands above what the beginning alone showed.
-
-    Args:
-        rate: of the motion, rad/s.
-    """
-    if spectrum is None:
-        return growth
-    if spectrum.chaotic(rate):
-        return replace(growth, factor=1.0, window=0.0, rate=spectrum.largest)
-    return replace(growth, rate=0.0)
 
 
 @dataclass(frozen=True)
@@ -40,60 +27,43 @@ class Diagnostics:
     """What a run's steps, its samples and the motion itself say of its errors.
 
     Attributes:
-        growth: of errors by the motion.
+        estimate: of the errors at the end; None where none was asked for, or the run hasn't ended.
     """
 
     prepared: InitialValueProblem
     progress: Progress
     statistics: SampleStatistics
-    growth: Growth
-
-    @property
-    def duration(self) -> float:
-        """That the run got to, seconds."""
-        return abs(self.progress.time - float(self.prepared.scene.start))
+    estimate: Estimate | None = None
 
     @property
     def drift_bound(self) -> float:
         """Relative drift that rounding alone explains."""
         return DRIFT_FACTOR * self.prepared.law_tolerance * math.sqrt(max(self.progress.steps, 1))
 
-    @property
-    def amplification(self) -> float:
-        """Of rounding errors by the motion, up to the end."""
-        return min(self.growth.at(self.duration), sys.float_info.max)
+    def estimated(
+        self,
+        trail: Trail | None = None,
+        integrator: Integrator | None = None,
+        go_on: Callable[[], bool] = lambda: True,
+    ) -> Diagnostics:
+        """With an estimate of the errors.
 
-    @property
-    def estimated_error(self) -> float:
-        """At the end, rad (of rates: relative to their size): the round-off law times the growth by the
-        motion and by the formulation; a few roundings for a closed form.
+        Args:
+            trail: some of the run's samples.
+            integrator: of the run.
+            go_on: asked again and again; False ends it, without a result.
         """
-        if self.prepared.closed is not None:
-            return CLOSED_FORM * float(self.prepared.precision.epsilon)
-        estimate = self._law() * self.growth.at(self.duration) * self._condition()
-        return estimate if math.isfinite(estimate) else sys.float_info.max
-
-    @property
-    def attitude_error(self) -> float | None:
-        """``estimated_error``; None without an attitude."""
-        rates = self.prepared.system.requirements.formulation == "rates"
-        return None if rates else self.estimated_error
-
-    @property
-    def predictable_seconds(self) -> float | None:
-        """Time after the start from which the attitude's digits are gone, by the estimate.
-
-        None for motions whose errors don't grow exponentially.
-        """
-        growth, duration, law = self.growth, self.duration, self._law()
-        if growth.rate == 0.0 or law == 0.0:
-            return None
-        horizon = duration
-        for _ in range(50):  # a contraction: the law grows like t^1.5, the motion's growth exponentially
-            seed = law * (max(horizon, 1e-3 * duration) / duration) ** 1.5 * growth.factor
-            seed = min(seed, sys.float_info.max)  # of a motion that broke down where growth was measured
-            horizon = growth.window + math.log(_LOST_DIGITS / seed) / growth.rate
-        return max(horizon, 0.0)
+        progress = self.progress
+        found = estimate_errors(
+            self.prepared,
+            progress.steps,
+            min(progress.time, float(self.prepared.scene.samples.last)),
+            trail=trail,
+            integrator=integrator,
+            condition=self._condition(),
+            go_on=go_on,
+        )
+        return replace(self, estimate=found)
 
     def cautions(self) -> list[Caution]:
         """Reasons not to trust the result; empty for a sound run."""
@@ -139,18 +109,18 @@ class Diagnostics:
             )
 
     def _digits(self) -> Iterator[Caution]:
-        estimate = self.estimated_error
-        if estimate <= _LOST_DIGITS:
+        found = self.estimate
+        if found is None or found.leading <= LOST:
             return
-        if self.prepared.system.requirements.formulation == "rates":
+        if found.attitude is None:
             code = WarningCode.RATES_UNCERTAIN
-            what = f"the angular velocity is uncertain by about {min(estimate, 2.0):.2g} of its size"
+            what = f"the angular velocity is uncertain by about {found.rates:.2g} of its size"
         else:
             code = WarningCode.ATTITUDE_UNCERTAIN
-            what = f"the attitude is uncertain by about {min(estimate, math.pi):.2g} rad"
+            what = f"the attitude is uncertain by about {found.attitude:.2g} rad"
         yield Caution(
             code,
-            f"{what} at the end, so its digits are gone{self._since()}; choose a higher precision or a "
+            f"{what} at the end, so its digits are gone{self._since(found)}; choose a higher precision or a "
             "nearer end",
         )
 
@@ -174,17 +144,11 @@ class Diagnostics:
                 "that carries them",
             )
 
-    def _law(self) -> float:
-        """Of rounding, up to the end, rad."""
-        rate = float(self.prepared.system.rate_bound)
-        return round_off_law(self.prepared.law_tolerance, self.progress.steps, rate, self.duration)
-
-    def _since(self) -> str:
-        horizon = self.predictable_seconds
-        if horizon is None:
+    def _since(self, found: Estimate) -> str:
+        if found.predictable_seconds is None or found.growth_rate == 0.0:
             return ""
-        since = float(self.prepared.scene.start) + horizon
-        return f" from about {since:.3g} s on (errors grow e-fold every {1 / self.growth.rate:.3g} s)"
+        since = float(self.prepared.scene.start) + found.predictable_seconds
+        return f" from about {since:.3g} s on (errors grow e-fold every {1 / found.growth_rate:.3g} s)"
 
     def _passed(self) -> float:
         """About how near a chart's singularity the motion came between two samples, by the shortest step,

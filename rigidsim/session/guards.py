@@ -25,7 +25,7 @@ class Observer:
         """Called between chunks, at most some tens of times per second."""
 
     def phase(self, name: str) -> None:
-        """A new phase begins: "integrate", "lyapunov", "dataset", "timeline", "certify"."""
+        """A new phase begins: "integrate", "lyapunov", "estimate", "dataset", "timeline", "certify"."""
 
     def nothing_left(self, why: str) -> None:
         """The run to be resumed had ended for good before, with these words; nothing was done."""

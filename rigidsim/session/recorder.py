@@ -17,6 +17,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import put_back_by_invariant
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.solve.trail import Trail
 from rigidsim.store.segments import SegmentWriter
 
 Arrays = dict[str, np.ndarray]
@@ -28,6 +29,7 @@ class Recorder(SampleReceiver):
     Attributes:
         statistics: what the summary says of all samples.
         progress: of the run; set when it begins.
+        trail: some of this session's samples.
     """
 
     progress: Progress
@@ -47,9 +49,11 @@ class Recorder(SampleReceiver):
         self._effort = effort
         self._events_saved = len(log.found)
         self.statistics = SampleStatistics()
+        self.trail = Trail(prepared.precision)
 
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples."""
+        self.trail.take(block)
         recorded = self._evaluator.evaluate(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)
         for invariant in self._prepared.system.invariants:

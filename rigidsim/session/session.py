@@ -5,10 +5,9 @@ from __future__ import annotations
 import secrets
 from dataclasses import dataclass, field
 
-from rigidsim.accuracy.error_law import motion_growth
 from rigidsim.session.attributes import root_attributes
 from rigidsim.session.completion import Completion
-from rigidsim.session.diagnostics import Diagnostics, growth_by_spectrum
+from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.event_variables import event_counts, event_times, event_variables
 from rigidsim.session.guards import Guards, Interruption, Observer
 from rigidsim.session.lyapunov import lyapunov_variables, spectrum_of
@@ -63,7 +62,6 @@ class Session:
         clock = self.phases
         parts = assemble(prepared)
         log, stepper, evaluator, corrected = parts.log, parts.stepper, parts.evaluator, parts.corrected
-        growth = motion_growth(prepared)
         resumed = None if chain is None else restore(chain, prepared, corrected, evaluator, log)
         run_id = secrets.token_hex(8) if chain is None else chain.run
         attributes = root_attributes(prepared, stepper, run_id, self.mixed)
@@ -96,11 +94,20 @@ class Session:
                 if interruption.requested:
                     progress.status = Status.INTERRUPTED
                     recorder.save(loop.position())
+            found = Diagnostics(prepared, progress, recorder.statistics)
+            if prepared.scene.config.output.estimate and progress.status.final:
+                self.observer.phase("estimate")
+                found = found.estimated(
+                    recorder.trail, stepper.integrator, lambda: not interruption.requested
+                )
+                clock.next("estimate")
+                if interruption.requested:
+                    progress.status = Status.INTERRUPTED
+                    recorder.save(loop.position())
         clock.engine(progress.integration_seconds)
-        growth = growth_by_spectrum(growth, spectrum, float(prepared.system.rate_bound))
         last = float(prepared.clock.at(prepared.clock.count - 1))
         summary = summarise(
-            Diagnostics(prepared, progress, recorder.statistics, growth),
+            found,
             spectrum,
             message=closing_words(prepared, progress, evaluator, log),
             remarks=self.remarks,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -31,6 +32,8 @@ from rigidsim.store.summary import (
     as_fields,
 )
 
+_NOT_CERTIFIED = "not certified against an independent solution"
+
 
 def summarise(
     found: Diagnostics,
@@ -49,7 +52,7 @@ def summarise(
     """All but the digests of files that are still to be written.
 
     Args:
-        found: with the growth of errors as the spectrum shows it.
+        found: with the estimate of the errors, where there is one.
         message: the status in words.
         remarks: on how the session began; they stand before the warnings.
         initial: values of the invariants, SI.
@@ -190,18 +193,31 @@ def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[
 
 
 def _accuracy(found: Diagnostics) -> Accuracy:
+    estimate, output = found.estimate, found.prepared.scene.config.output
+    if estimate is None:
+        why = "the run has not ended" if output.estimate else "[output] estimate = false"
+        return Accuracy(
+            requested=None,
+            estimated_attitude_error=None,
+            estimated_how=f"not estimated: {why}",
+            amplification=None,
+            certified=None,
+            how=_NOT_CERTIFIED,
+        )
     return Accuracy(
         requested=None,
-        estimated_attitude_error=found.attitude_error,
-        estimated_how="round-off law (tolerance/2) sqrt(steps) |w| t / sqrt 3, times amplification",
-        amplification=found.amplification,
-        error_growth_rate=found.growth.rate,
-        predictable_seconds=found.predictable_seconds,
-        amplification_seconds=found.growth.seconds,
-        amplification_how="growth of small offsets over the linear growth of a stable motion, "
-        "measured on the beginning of the motion; 1 for a stable one",
+        estimated_attitude_error=estimate.attitude,
+        estimated_position_error=estimate.position,
+        estimated_velocity_error=estimate.velocity,
+        estimated_how=estimate.how,
+        amplification=min(estimate.amplification, sys.float_info.max),
+        error_growth_rate=estimate.growth_rate,
+        predictable_seconds=estimate.predictable_seconds,
+        amplification_seconds=estimate.seconds,
+        amplification_how="of the estimated error over the round-off law "
+        "(tolerance/2) sqrt(steps) |w| t / sqrt 3; 1 for a stable motion",
         certified=None,
-        how="not certified against an independent solution",
+        how=_NOT_CERTIFIED,
     )
 
 
@@ -214,7 +230,7 @@ def _lyapunov(found: Diagnostics, spectrum: LyapunovSpectrum | None) -> Lyapunov
         largest_exponent=spectrum.largest,
         moved_over_second_half=spectrum.spread,
         e_folding_seconds=1 / spectrum.largest if chaotic else None,
-        predictable_seconds=found.predictable_seconds,
+        predictable_seconds=None if found.estimate is None else found.estimate.predictable_seconds,
         exponents=tuple(float(x) for x in spectrum.exponents[-1]),
         states=spectrum.states,
         units="s-1",

@@ -145,7 +145,8 @@ class Accuracy(_Part):
     """How right the attitude is at the end, rad: asked for, estimated, and certified by a reference.
 
     Attributes:
-        amplification: of rounding errors by the motion.
+        estimated_position_error, estimated_velocity_error: at the end, m and m/s.
+        amplification: of rounding errors by the motion; None where nothing was estimated.
         error_growth_rate: 1/s; 0 where errors don't grow exponentially.
         predictable_seconds: from the start, after which no digit is left; None where that is never.
         how: the certificate came about.
@@ -154,6 +155,8 @@ class Accuracy(_Part):
 
     requested: FiniteNumber | None
     estimated_attitude_error: FiniteNumber | None
+    estimated_position_error: FiniteNumber | None = None
+    estimated_velocity_error: FiniteNumber | None = None
     estimated_how: Text
     amplification: FiniteNumber | None = 1.0
     error_growth_rate: FiniteNumber | None = None

@@ -1,0 +1,238 @@
+"""Random scenes by family: those in which an error estimate is most likely to be wrong, in all formulations.
+
+The same seed and number always give the same scene; families take turns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.random_scenes import KINDS, Draw
+
+SAMPLES = 9
+_FORMULATIONS = ("quaternion", "quaternion", "rotation_matrix", "euler_angles", "canonical")
+
+
+@dataclass(frozen=True)
+class Family:
+    """What a scene is made of.
+
+    Attributes:
+        draw: writes body, start and loads.
+        radians: powers of ten between which the horizon is drawn.
+    """
+
+    draw: Callable[[Draw], None]
+    radians: tuple[float, float] = (1.0, 3.3)
+
+
+@dataclass(frozen=True)
+class CoverageScene:
+    """One scene; ``radians`` is about how far the body turns, or the slowest motion's units of time."""
+
+    number: int
+    family: str
+    text: str
+    radians: float
+
+
+def _slow_body(draw: Draw) -> None:
+    """The orbit is quick, the body hardly turns."""
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction() * draw.decades(-5, -1))
+    motion = 1 / draw.time
+    draw.load(
+        "gravity_gradient",
+        f"gravitational_parameter = {motion**2 * (1e3 * draw.length) ** 3 * draw.decades(-4, 0)!r}",
+        f"orbit = {{semi_major_axis = {1e3 * draw.length!r}, eccentricity = {draw.between(0, 0.6)!r}, "
+        f"inclination = {draw.between(0, 3)!r}, period = {2 * math.pi / motion!r}}}",
+    )
+
+
+def _eccentric(draw: Draw) -> None:
+    """As in the issue: chaotic, weakly so or regular, nothing says at first which."""
+    draw.body(np.array([1, 1 + draw.decades(-2, -0.5), 1 + draw.decades(-2, -0.4)]))
+    draw.start(draw.direction() * draw.between(0.5, 3))
+    axis, motion = 1e3 * draw.length, 1 / draw.time
+    draw.load(
+        "gravity_gradient",
+        f"gravitational_parameter = {motion**2 * axis**3!r}",
+        f"orbit = {{semi_major_axis = {axis!r}, eccentricity = {draw.between(0.01, 0.7)!r}, "
+        f"inclination = {draw.between(0, 3)!r}, mean_anomaly = {draw.between(0, 6)!r}}}",
+    )
+
+
+def _late_instability(draw: Draw) -> None:
+    """Spin about the middle axis, left slowly, beside a weak load that leaves no closed form."""
+    middle, spread = 1.0, draw.decades(-3, -0.5)
+    draw.body([middle - spread * draw.between(0.1, 1), middle, middle + spread * draw.between(0.1, 1)])
+    draw.start([draw.decades(-10, -3), draw.between(0.5, 2), draw.decades(-10, -3)])
+    if draw.sometimes(0.5):
+        size = draw.mass * draw.length**2 / draw.time * draw.decades(-8, -5)
+        draw.load("viscous_torque", f"coefficients = {[size, size, size]}")
+
+
+def _several(draw: Draw) -> None:
+    """Two or three loads at once on a body about a fixed point."""
+    draw.body(draw.moments(), draw.direction() * draw.between(0.2, 1))
+    draw.start(draw.direction() * draw.between(0.5, 3))
+    size = draw.mass * draw.length**2 / draw.time**2
+    draw.gravity(draw.decades(-2, 0))
+    if draw.sometimes(0.7):
+        unit = size * draw.time * draw.decades(-4, -1)
+        draw.load("viscous_torque", f"coefficients = {[unit * draw.between(0.3, 1) for _ in range(3)]}")
+    if draw.sometimes(0.7):
+        draw.parameters += [
+            f"k = {size * draw.decades(-3, -0.5)!r}",
+            f"n = {draw.between(0.1, 2) / draw.time!r}",
+        ]
+        frame = "body" if draw.sometimes(0.5) else "space"
+        draw.load("torque", 'components = ["k*sin(n*t)", "0.5*k", "-k*cos(n*t)^2"]', f'frame = "{frame}"')
+
+
+def _close_pass(draw: Draw) -> None:
+    """Six degrees of freedom past a close pericentre."""
+    draw.body(draw.moments(), turned=draw.sometimes(0.5))
+    eccentricity = 1 - draw.decades(-2, -0.5)
+    far = draw.between(3, 30) * 2 / (1 - eccentricity)  # from 3 lengths on at the pericentre
+    speed = math.sqrt((1 - eccentricity) / far)
+    tilt = draw.between(0, 3)
+    draw.start(
+        draw.direction() * draw.between(0.02, 1) * far**-1.5,
+        position=[far, 0, 0],
+        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
+    )
+    draw.time_scale = far**1.5
+    draw.load("central_gravity", f"gravitational_parameter = {draw.length**3 / draw.time**2!r}")
+
+
+def _attractors(draw: Draw) -> None:
+    """Six degrees of freedom between two or three attractors."""
+    draw.body(draw.moments())
+    count = 2 + draw.sometimes(0.5)
+    far = 30.0
+    angle = draw.between(0, 6)
+    speed = math.sqrt(count / far) * draw.between(0.8, 1.1)
+    draw.start(
+        draw.direction() * 0.05,
+        position=[far * math.cos(angle), far * math.sin(angle), draw.between(-3, 3)],
+        velocity=[-speed * math.sin(angle), speed * math.cos(angle), 0.0],
+    )
+    draw.time_scale = far**1.5
+    for n in range(count):
+        place = [4 * math.cos(2 * math.pi * n / count), 4 * math.sin(2 * math.pi * n / count), 0.0]
+        draw.load(
+            "central_gravity",
+            f"gravitational_parameter = {draw.length**3 / draw.time**2!r}",
+            f"position = {[float(x * draw.length) for x in place]}",
+        )
+
+
+def _pushed_flight(draw: Draw) -> None:
+    """Six degrees of freedom under gravity and a force that depends on the motion."""
+    draw.body(draw.moments())
+    draw.start(draw.direction(), position=draw.direction(), velocity=draw.direction())
+    draw.gravity(draw.decades(-2, 0))
+    drag = draw.mass / draw.time * draw.decades(-3, -1)
+    draw.parameters += [f"c = {drag!r}"]
+    draw.load("force", 'components = ["-c*vx", "-c*vy", "-c*vz"]', 'frame = "space"')
+
+
+def _long_regular(draw: Draw) -> None:
+    """Spin near an outer axis, damped or driven a little or not at all: nothing amplifies but time."""
+    moments = np.sort(draw.moments())
+    draw.body(moments)
+    draw.start([draw.decades(-4, -1), draw.decades(-4, -1), 1.0])
+    if draw.sometimes(0.5):
+        size = draw.mass * draw.length**2 / draw.time * draw.decades(-9, -7)
+        draw.load("viscous_torque", f"coefficients = {[size * m for m in (1.0, 2.0, 1.5)]}")
+
+
+def _kink(draw: Draw) -> None:
+    """One axis, a torque with a kink in time or in the rate, written as a root; exact solutions exist."""
+    moment = 1.0
+    draw.body([moment, moment, moment])
+    size = draw.mass * draw.length**2
+    rate = draw.between(0.5, 2)
+    if draw.sometimes(0.5):
+        late = draw.between(1, 8) * draw.time
+        draw.start([0, 0, rate])
+        draw.parameters += [f"k = {size / draw.time**3 * draw.decades(-2, 0)!r}", f"late = {late!r}"]
+        draw.load("torque", 'components = ["0", "0", "k*sqrt((t-late)^2)"]')
+    else:
+        draw.start([rate, 0, 0])
+        draw.parameters += [f"k = {size / draw.time**2 * draw.decades(-2, -0.5)!r}", f"n = {1 / draw.time!r}"]
+        draw.load("torque", 'components = ["-k*sqrt((wx-0.3*n)^2)/n", "0", "0"]')
+
+
+def _odd(draw: Draw) -> None:
+    """Loads odd in the quaternion."""
+    draw.body(draw.moments())
+    draw.start(draw.direction())
+    draw.parameters += [f"k = {draw.mass * draw.length**2 / draw.time**2 * draw.decades(-2, -0.3)!r}"]
+    draw.load("torque", 'components = ["k*qx", "0", "0.4*k*qw"]')
+
+
+FAMILIES: dict[str, Family] = {
+    "central gravity": Family(KINDS["central gravity"], (1.0, 3.0)),
+    "eccentric orbit": Family(_eccentric, (1.3, 3.5)),
+    "slow body, quick orbit": Family(_slow_body, (1.5, 4.0)),
+    "late instability": Family(_late_instability, (1.5, 3.7)),
+    "several loads": Family(_several, (1.0, 2.7)),
+    "close pass": Family(_close_pass, (0.3, 1.7)),
+    "several attractors": Family(_attractors, (0.3, 1.7)),
+    "pushed flight": Family(_pushed_flight, (1.0, 3.0)),
+    "long, regular": Family(_long_regular, (3.0, 5.0)),
+    "free body": Family(KINDS["asymmetric"], (1.0, 4.3)),
+    "free, near separatrix": Family(KINDS["near separatrix"], (1.0, 3.5)),
+    "heavy symmetric top": Family(KINDS["heavy symmetric top"], (1.0, 3.7)),
+    "heavy asymmetric top": Family(KINDS["heavy asymmetric top"], (1.0, 2.7)),
+    "circular orbit": Family(KINDS["circular orbit"], (1.0, 3.3)),
+    "torque in time": Family(KINDS["torque, space axes"], (1.0, 3.3)),
+    "late pulse": Family(KINDS["late pulse"], (1.0, 3.3)),
+    "kink": Family(_kink, (1.0, 1.5)),
+    "odd load": Family(_odd, (1.0, 2.3)),
+}
+"""By the name under which the table shows them."""
+
+
+def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
+    """Scene ``number`` of a seed."""
+    name = list(FAMILIES)[number % len(FAMILIES)]
+    family = FAMILIES[name]
+    draw = Draw(np.random.default_rng([7, seed, number]))
+    family.draw(draw)
+    radians = draw.decades(*family.radians)
+    end = radians * draw.time * draw.time_scale
+    if name == "late pulse":
+        draw.parameters.append(f"late = {end * draw.between(0.5, 0.95)!r}")
+    formulation = str(draw.random.choice(_FORMULATIONS))
+    if name == "long, regular" and formulation == "canonical":
+        formulation = "quaternion"
+    integrator = [f'formulation = "{formulation}"']
+    kind = draw.random.random()
+    if kind < 0.1:
+        integrator.append('precision = "single"')
+    elif kind < 0.18 and radians < 300:
+        integrator.append('precision = "extended"')
+    elif kind < 0.35:
+        integrator.append(f"tolerance = {draw.decades(-13, -7):.3g}")
+    elif kind < 0.43:
+        integrator.append("hold_invariants = true")
+    parameters = ["[parameters]", *draw.parameters] if draw.parameters else []
+    lines = [
+        f'name = "coverage{number}"',
+        *parameters,
+        "[body]",
+        *draw.lines,
+        *draw.more,
+        f"[time]\nend = {end!r}\nsamples = {SAMPLES}",
+        "[integrator]",
+        *integrator,
+        "[output]\ntimeline = false",
+    ]
+    return CoverageScene(number, name, "\n".join(lines) + "\n", radians)

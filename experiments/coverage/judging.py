@@ -1,0 +1,256 @@
+"""What a scene's run announces of its errors at the end, held against what is true there."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mpmath
+import numpy as np
+
+import rigidsim
+from experiments.coverage.families import SAMPLES, CoverageScene
+from rigidsim.errors import ConfigError
+from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.session.statistics import SampleStatistics
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.solve.status import Status
+from rigidsim.solve.trail import Trail
+from rigidsim.store.summary import WarningCode
+
+MOST_STEPS = 100_000
+"""Of a scene; what would take longer is cut off, and counted as that."""
+GONE = (WarningCode.ATTITUDE_UNCERTAIN, WarningCode.RATES_UNCERTAIN)
+Vectors = list[list[mpmath.mpf]]
+"""(samples, components)."""
+_TRUTH = {"single": "double", "double": "extended", "extended": "quadruple"}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One scene.
+
+    Attributes:
+        ended: "finished", "refused", or how the run ended otherwise.
+        true, announced: largest attitude error at the samples, the end among them, rad.
+        true_place, announced_place: of the position, m; nan where there is none.
+        warned: codes of the warnings but "digits are gone"; ``gone``: that one.
+        estimate_seconds, run_seconds: CPU, of the estimate and the integration.
+    """
+
+    number: int
+    family: str
+    setting: str
+    ended: str
+    radians: float = math.nan
+    steps: int = 0
+    true: float = math.nan
+    announced: float = math.nan
+    true_place: float = math.nan
+    announced_place: float = math.nan
+    gone: bool = False
+    warned: str = ""
+    estimate_seconds: float = 0.0
+    run_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+
+    @property
+    def line(self) -> str:
+        """As the campaign goes."""
+        place, more = "", [self.warned] if self.warned else []
+        if not math.isnan(self.true_place):
+            place = f", place {self.true_place:.1e}/{self.announced_place:.1e}"
+        ratio = self.true / max(self.announced, 1e-300)
+        return (
+            f"{self.number:5d} {self.family:24s} {self.setting:36s} {self.ended:10s} {self.steps:7d} steps, "
+            f"true/announced {self.true:.1e}/{self.announced:.1e} = {ratio:.2g}{place}"
+            + "".join(f", {what}" for what in ["gone"] * self.gone + more)
+        )
+
+
+class _Kept(SampleReceiver):
+    """Keeps all samples, and watches them as a run does."""
+
+    def __init__(self, prepared: InitialValueProblem, evaluator: object) -> None:
+        self._prepared, self._evaluator = prepared, evaluator
+        self.statistics = SampleStatistics()
+        self.trail = Trail(prepared.precision)
+        self.parts: dict[str, list[list[np.ndarray]]] = {}
+
+    def take(self, block: SampleBlock) -> None:
+        self.trail.take(block)
+        recorded = self._evaluator.evaluate(block)  # type: ignore[attr-defined]
+        for invariant in self._prepared.system.invariants:
+            self.statistics.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
+        factors = self._evaluator.singular_factors(block.states, block.chart)  # type: ignore[attr-defined]
+        if factors is not None:
+            self.statistics.see_singular(factors, np.array([float(t) for t in block.times]))
+        for name, parts in recorded.items():
+            self.parts.setdefault(name, []).extend([list(row) for row in zip(*parts, strict=True)])
+
+    def exact(self, name: str) -> Vectors:
+        """A variable at all samples."""
+        with mpmath.workdps(80):
+            return [
+                [mpmath.fsum(float(x) for x in parts) for parts in zip(*row, strict=True)]
+                for row in self.parts[name]
+            ]
+
+
+def judge(scene: CoverageScene) -> Judged:
+    """Run a scene in memory, with its estimate, and then better."""
+    started = time.process_time()
+    recorded = ["quaternion"] + (["position"] if "position = " in scene.text.split("[[loads]]")[0] else [])
+    asked = [f"output.record={recorded}".replace("'", '"')]
+    begin = Judged(scene.number, scene.family, _setting(scene), "refused", scene.radians)
+    try:
+        prepared = prepare(rigidsim.parse(scene.text, overrides=asked))
+        prepared = replace(prepared, precision=replace(prepared.precision, compact=True))
+        seen, progress, spent, engine = _gone_through(prepared)
+    except ConfigError:
+        return replace(begin, cpu_seconds=time.process_time() - started)
+    begin = replace(begin, ended=progress.status.value, steps=progress.steps, run_seconds=spent)
+    if progress.status is not Status.FINISHED:
+        return replace(begin, cpu_seconds=time.process_time() - started)
+    before = time.process_time()
+    found = Diagnostics(prepared, progress, seen.statistics).estimated(seen.trail, engine)
+    estimated = time.process_time() - before
+    assert found.estimate is not None
+    codes = [c.code for c in found.cautions()]
+    truth = _truth(scene, asked, prepared)
+    if truth is None:
+        return replace(begin, ended="no truth", cpu_seconds=time.process_time() - started)
+    announced = found.estimate.attitude
+    places = (math.nan, math.nan)
+    if "position" in recorded:
+        places = (_apart(seen.exact("position"), truth["position"]), found.estimate.position or 0.0)
+    return replace(
+        begin,
+        true=_angle(seen.exact("quaternion"), truth["quaternion"]),
+        announced=math.nan if announced is None else announced,
+        true_place=places[0],
+        announced_place=places[1],
+        gone=any(code in GONE for code in codes),
+        warned=" ".join(
+            sorted({c.value for c in codes if c not in GONE and c is not WarningCode.NOT_JOINED})
+        ),
+        estimate_seconds=estimated,
+        cpu_seconds=time.process_time() - started,
+    )
+
+
+def _setting(scene: CoverageScene) -> str:
+    lines = scene.text.split("[integrator]\n")[1].split("[output]")[0].splitlines()
+    return ", ".join(
+        line.split(" = ")[1].strip('"') if "formul" in line or "prec" in line else line for line in lines
+    )
+
+
+def _gone_through(
+    prepared: InitialValueProblem, most: int = MOST_STEPS
+) -> tuple[_Kept, Progress, float, Any]:
+    parts = assemble(prepared)
+    seen = _Kept(prepared, parts.evaluator)
+    check: Callable[[Progress], Status | None] = lambda p: Status.MAX_STEPS if p.steps > most else None  # noqa: E731
+    loop = sampler(prepared, parts, seen, check)
+    before = time.process_time()
+    progress = loop.run()
+    return seen, progress, time.process_time() - before, parts.stepper.integrator
+
+
+def _truth(
+    scene: CoverageScene, asked: list[str], prepared: InitialValueProblem
+) -> dict[str, Vectors] | None:
+    """The samples by a better solution: exact where a kink leaves no other, else with more digits."""
+    if scene.family == "kink":
+        last = prepared.scene.samples.last
+        times = [last * n / (SAMPLES - 1) for n in range(SAMPLES)]
+        return {"quaternion": [kinked_attitude(prepared, mpmath.mpf(time)) for time in times]}
+    precision = _TRUTH[prepared.precision.name]
+    if precision == "extended" and "tolerance" in scene.text:
+        precision = "double" if prepared.effective_tolerance > 1e-10 else "extended"
+    better = [
+        f'integrator.precision="{precision}"',
+        'integrator.tolerance="auto"',
+        'integrator.formulation="quaternion"',
+        "integrator.hold_invariants=false",
+    ]
+    try:
+        found = prepare(rigidsim.parse(scene.text, overrides=[*asked, *better]))
+        found = replace(found, precision=replace(found.precision, compact=True))
+        seen, progress, *_ = _gone_through(found, 2 * MOST_STEPS)
+    except ConfigError:
+        return None
+    if progress.status is not Status.FINISHED:
+        return None
+    return {
+        name: seen.exact(name) for name in asked[0].split("=")[1].strip("[]").replace('"', "").split(", ")
+    }
+
+
+def kinked_attitude(prepared: InitialValueProblem, end: mpmath.mpf) -> list[mpmath.mpf]:
+    """The attitude at a time under a torque about one axis that is a root of a square, exactly.
+
+    I w' = k |t - c|: w = w0 + (k / I) F(t), F the integral of |t - c|, and the angle its integral.
+    I w' = -(k / n) |w - a| with a = 0.3 n: from w0 > a the rate falls to a exponentially and never gets
+    there, from w0 < a it falls away from it.
+    """
+    scene = prepared.scene
+    with mpmath.workdps(50):
+        moment = mpmath.mpf(scene.body.principal_moments[0])
+        given = {k: mpmath.mpf(v.at(scene.context)) for k, v in scene.config.parameters.items()}
+        rates = [mpmath.mpf(w) for w in scene.angular_velocity]
+        if "late" in given:
+            c, k = given["late"], given["k"] / moment
+            turned = rates[2] * end + k * _integral_of_kink(end, c)
+            axis = 2
+        else:
+            low, k = mpmath.mpf("0.3") * given["n"], given["k"] / given["n"] / moment
+            gap = rates[0] - low
+            sign = -1 if gap > 0 else 1
+            turned = low * end + gap * (mpmath.exp(sign * k * end) - 1) / (sign * k)
+            axis = 0
+        half = [mpmath.cos(turned / 2), mpmath.mpf(0), mpmath.mpf(0), mpmath.mpf(0)]
+        half[axis + 1] = mpmath.sin(turned / 2)
+        w, x, y, z = (mpmath.mpf(q) for q in scene.quaternion)
+        a, b, c_, d = half
+        return [
+            w * a - x * b - y * c_ - z * d,
+            w * b + x * a + y * d - z * c_,
+            w * c_ - x * d + y * a + z * b,
+            w * d + x * c_ - y * b + z * a,
+        ]
+
+
+def _integral_of_kink(end: mpmath.mpf, c: mpmath.mpf) -> mpmath.mpf:
+    """The double integral of |t - c| from 0 to the end, with c > 0."""
+    if end <= c:
+        return c * end**2 / 2 - end**3 / 6
+    return c**3 / 3 + c**2 / 2 * (end - c) + (end - c) ** 3 / 6
+
+
+def _angle(one: Vectors, other: Vectors) -> float:
+    """Largest between attitudes, rad."""
+    largest = mpmath.mpf(0)
+    with mpmath.workdps(60):
+        for p, q in zip(one, other, strict=True):
+            chord = min(mpmath.norm([a - s * b for a, b in zip(p, q, strict=True)]) for s in (1, -1))
+            largest = max(largest, 4 * mpmath.asin(min(chord / 2, mpmath.mpf(1))))
+    return float(largest)
+
+
+def _apart(one: Vectors, other: Vectors) -> float:
+    """Largest distance."""
+    with mpmath.workdps(60):
+        return float(
+            max(
+                mpmath.norm([a - b for a, b in zip(p, q, strict=True)])
+                for p, q in zip(one, other, strict=True)
+            )
+        )

@@ -1,0 +1,286 @@
+"""How a run's rounding errors end, simulated: neighbours of the motion that are pushed at random all along.
+
+A neighbour follows the motion at a small distance and gets, again and again, a push as a step's rounding
+gives one, but many times as large. Its distance over that factor is an error as the run's own is: made
+anywhere, in any state, and carried by the motion from there to the end, whatever it passes on the way. No law
+of growth is assumed.
+
+Distances stay small (or are drawn in), so that they grow as infinitely small ones do. The neighbours are
+lanes of one batch, beside the motion itself in the first; a loose tolerance is good enough, since what is cut
+off from the series is a smooth function of the state and nearly the same in all lanes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import cast
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.system import System
+from rigidsim.solve.lanes import NEIGHBOURS, Lanes, SeriesErrors
+
+_LARGEST = 2.0**-24
+"""Distance from which neighbours are drawn in. A chord that is drawn in leaves the surfaces on which the
+motion's invariants are constant by half its square, which must stay below what the pushes did."""
+_DRAWN_IN = 2.0**-2
+_SATURATED = 2.0**-14
+"""Distance that isn't small: the stretch is gone through once more, in two or from nearer."""
+_FIRST_PUSHES = 2.0**-40
+"""Distance that stands for one epsilon, at first."""
+_STEPS_AT_ONCE = 64.0
+_FEWEST_STRETCHES, _MOST_STRETCHES = 32, 512
+"""Between pushes where growth is slow: so many steps, or so many stretches of the whole."""
+_MOST_STEPS_AT_ONCE = 4096
+_CALM, _WILD = 4.0, 16.0
+"""Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
+_MOST_CLOSER = 40
+_APART = ("pace", "work")
+"""States that nothing feels."""
+_GROUPS: dict[str, tuple[str, ...]] = {
+    "rates": ("wx", "wy", "wz"),
+    "position": ("x", "y", "z"),
+    "velocity": ("vx", "vy", "vz"),
+}
+
+
+@dataclass
+class Spread:
+    """How far errors of one epsilon at each step have come, at times along the motion.
+
+    Attributes:
+        times: internal units, ascending.
+        steps: that the motion took until then, of the loose tolerance.
+        rates, attitude, position, velocity: root mean square over the neighbours, in epsilons of internal
+            units; attitude as an angle, rates relative to their size; zeros where the motion has none.
+        extent, fastest: largest distance from the origin and speed so far, internal units.
+        whole: False where the motion could not be followed to the end asked for.
+    """
+
+    times: list[float] = field(default_factory=list)
+    steps: list[int] = field(default_factory=list)
+    rates: list[float] = field(default_factory=list)
+    attitude: list[float] = field(default_factory=list)
+    position: list[float] = field(default_factory=list)
+    velocity: list[float] = field(default_factory=list)
+    extent: float = 0.0
+    fastest: float = 0.0
+    whole: bool = True
+
+
+@dataclass(frozen=True)
+class Pushes:
+    """What a step does to each state, in epsilons.
+
+    Attributes:
+        own: of the state's own size, at random.
+        shared: of the largest state's, at random.
+        series: what the series is cut off by, over what it is in these states.
+        first: of the state's own size, at the start.
+        clock: of the time, for loads that depend on it.
+    """
+
+    own: float = 0.4
+    shared: float = 0.0
+    series: float = 1.0
+    first: float = 0.5
+    clock: float = 0.3
+
+
+def _function(expressions: list[Symbolic], variables: list[Symbolic]) -> Callable[[np.ndarray], np.ndarray]:
+    """Of states (states, lanes); states themselves need not be compiled."""
+    if all(x in variables for x in expressions):
+        places = [variables.index(x) for x in expressions]
+        return lambda states: states[places]
+    return cast("Callable[[np.ndarray], np.ndarray]", hy.cfunc(expressions, variables, compact_mode=True))
+
+
+class Neighbours:
+    """A motion with neighbours.
+
+    Args:
+        system: built for double precision, without a partner chart.
+        lanes: of it.
+        start: internal units.
+        steps: that the motion is expected to take; decides how far apart pushes are.
+        epsilon: what pushes are counted in.
+        rounded: (states,) bool, which of the initial values were.
+        series: of a tolerance far above epsilon.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        lanes: Lanes,
+        start: float,
+        end: float,
+        steps: int,
+        pushes: Pushes,
+        epsilon: float,
+        rounded: np.ndarray,
+        series: SeriesErrors | None = None,
+    ) -> None:
+        self._system, self._lanes, self._pushes = system, lanes, pushes
+        self._epsilon, self._series = epsilon, series
+        names, attitude = system.states, system.mechanics.attitude
+        groups: dict[str, tuple[str, ...]] = dict(_GROUPS)
+        self._quaternion: Callable[[np.ndarray], np.ndarray] | None = None
+        if attitude is not None:
+            groups["attitude"] = tuple(attitude.names)
+            self._quaternion = _function(attitude.quaternion, system.variables)
+        self._places = {
+            group: [names.index(n) for n in members if n in names] for group, members in groups.items()
+        }
+        grouped = {i for places in self._places.values() for i in places}
+        alone = [[i] for i, n in enumerate(names) if i not in grouped and n not in _APART]
+        self._groups = [*filter(None, self._places.values()), *alone]
+        self._felt = np.array([n not in _APART for n in names])
+        initial = np.array([float(x) for x in system.initial])
+        self._states = np.repeat(initial[:, None], NEIGHBOURS + 1, axis=1)
+        self._random = np.random.default_rng(0)  # the same pushes each time
+        self._factor = _FIRST_PUSHES  # distance for one epsilon
+        self._largest = np.abs(initial)
+        self._start, self._end, self._time, self.steps = start, end, start, 0
+        stretches = min(max(_FEWEST_STRETCHES, steps / _STEPS_AT_ONCE), _MOST_STRETCHES)
+        stretches = max(stretches, steps / _MOST_STEPS_AT_ONCE)
+        self._longest = (end - start) / stretches
+        self._stretch = self._longest
+        self._push(pushes.first, np.abs(initial), rounded)
+        self.spread = Spread()
+
+    def follow(self, until: float, go_on: Callable[[], bool], lost: float = math.inf) -> Spread:
+        """Go on to a time.
+
+        Args:
+            until: internal units.
+            go_on: asked between stretches; False ends it.
+            lost: spread of the attitude (or the rates) past which nothing more is to be learnt.
+        """
+        spread = self.spread
+        while spread.whole and self._time < until and go_on():
+            spread.whole = self._go(until)
+            if spread.times and self._all_lost(lost):
+                break
+        return spread
+
+    def _all_lost(self, lost: float) -> bool:
+        """Whether neither the attitude (or the rates) nor the place can be told any more."""
+        spread = self.spread
+        if (spread.rates if self._quaternion is None else spread.attitude)[-1] < lost:
+            return False
+        return not self._places["position"] or spread.position[-1] * self._epsilon > spread.extent
+
+    def _go(self, until: float) -> bool:
+        """One stretch, as long as growth allows; False where the motion can't be followed."""
+        before, distances = self._states.copy(), self._distances(self._states)
+        for _ in range(_MOST_CLOSER):
+            time = min(self._time + self._stretch, until)
+            if until - time < 0.01 * self._stretch:
+                time = until
+            taken = self._advance(before, time)
+            if taken is None:
+                return False
+            grown = self._distances(self._states)
+            if grown.max() < _SATURATED:
+                break
+            if taken > 4:
+                self._stretch = (time - self._time) / 2
+            else:
+                before = self._drawn_in(before, 2.0**-8)
+                distances = self._distances(before)
+        else:
+            return False
+        growth = float((grown / np.maximum(distances, 1e-300)).max())
+        if growth > _WILD:
+            self._stretch = max(self._stretch / 2, (time - self._time) / max(taken, 1))
+        elif growth < _CALM:
+            self._stretch = min(2 * self._stretch, self._longest)
+        elapsed = time - self._time
+        self.steps += taken
+        self._time = time
+        largest = np.maximum(np.abs(before[:, 0]), np.abs(self._states[:, 0]))
+        self._largest = np.maximum(self._largest, largest)
+        moved = before[:, 0] != self._states[:, 0]  # what stands still isn't rounded
+        self._push(self._pushes.own * math.sqrt(taken), largest, moved, elapsed)
+        angles = list(self._system.angle_states)  # which grow, and step control with them
+        self._states[angles] -= 2 * np.pi * np.rint(self._states[angles, :1] / (2 * np.pi))
+        far = float(self._distances(self._states).max())
+        if far > _LARGEST:
+            self._states = self._drawn_in(self._states, _DRAWN_IN * _LARGEST / far)
+        self._note()
+        return True
+
+    def _advance(self, states: np.ndarray, time: float) -> int | None:
+        """Steps taken by the motion; None where a state isn't finite."""
+        # a rounded time is another time, for loads that depend on it
+        wrong = self._pushes.clock * abs(self._time) * self._factor
+        shifts = np.concatenate([[0.0], wrong * self._random.standard_normal(NEIGHBOURS)])
+        found = self._lanes.advance(states, self._time + shifts, time + shifts)
+        if found is None or not np.isfinite(found[0]).all():
+            return None
+        self._states = found[0]
+        return max(found[1], 1)
+
+    def _push(self, own: float, sizes: np.ndarray, moved: np.ndarray, elapsed: float = 0.0) -> None:
+        """Add errors to the neighbours: ``own`` of each size, and of the series over a time."""
+        normal = self._random.standard_normal((len(sizes), NEIGHBOURS))
+        pushed = own * sizes[:, None] * normal
+        pushed[~moved] = 0.0
+        if elapsed and self._pushes.shared:
+            alike = self._random.standard_normal((len(sizes), NEIGHBOURS)) * (self._largest > 0)[:, None]
+            pushed += own / self._pushes.own * self._pushes.shared * float(sizes[self._felt].max()) * alike
+        if elapsed and self._series is not None:
+            wrong = self._series.rate(self._states[:, 0], self._time) * elapsed / self._epsilon
+            pushed += self._pushes.series * wrong[:, None]
+        pushed[~self._felt] = 0.0
+        self._states[:, 1:] += self._factor * pushed
+
+    def _drawn_in(self, states: np.ndarray, factor: float) -> np.ndarray:
+        """Neighbours nearer by a factor, in the same directions."""
+        self._factor *= factor
+        nearer = states.copy()
+        nearer[:, 1:] = states[:, :1] + factor * (states[:, 1:] - states[:, :1])
+        return nearer
+
+    def _distances(self, states: np.ndarray) -> np.ndarray:
+        """Of each neighbour (neighbours,), relative to the size of what is apart."""
+        apart = states[:, 1:] - states[:, :1]
+        found = np.zeros(NEIGHBOURS)
+        for places in self._groups:
+            size = max(float(np.linalg.norm(states[places, 0])), float(self._largest[places].max()))
+            if size > 0:
+                found = np.maximum(found, np.linalg.norm(apart[places], axis=0) / size)
+        return found
+
+    def _note(self) -> None:
+        spread, apart = self.spread, (self._states[:, 1:] - self._states[:, :1]) / self._factor
+
+        def mean(group: str) -> float:
+            places = self._places[group]
+            return float(np.linalg.norm(apart[places])) / math.sqrt(NEIGHBOURS) if places else 0.0
+
+        spread.times.append(self._time)
+        spread.steps.append(self.steps)
+        rates = self._places["rates"][:3]
+        units = np.ldexp(1.0, np.array([self._system.state_exponents[i] for i in rates], dtype=np.int32))
+        size = float(np.linalg.norm(units * self._states[rates, 0]))
+        wrong = float(np.linalg.norm(units[:, None] * apart[rates])) / math.sqrt(NEIGHBOURS)
+        spread.rates.append(wrong / size if size > 0 else 0.0)
+        spread.attitude.append(self._turned())
+        spread.position.append(mean("position"))
+        spread.velocity.append(mean("velocity"))
+        here, speed = (self._states[self._places[group], 0] for group in ("position", "velocity"))
+        spread.extent = max(spread.extent, float(np.linalg.norm(here)))
+        spread.fastest = max(spread.fastest, float(np.linalg.norm(speed)))
+
+    def _turned(self) -> float:
+        """Root mean square angle between the neighbours' attitudes and the motion's, in epsilons."""
+        if self._quaternion is None:
+            return 0.0
+        found = self._quaternion(self._states)
+        apart = found[:, 1:] - found[:, :1]
+        return 2 * float(np.linalg.norm(apart)) / self._factor / math.sqrt(NEIGHBOURS)
