@@ -38,13 +38,13 @@ from experiments.random_scenes import RandomScene, random_scene
 
 NAME = "accuracy_certificates"
 SEED = 0
-_REDUCED, _FULL = 30, 200
+_REDUCED, _FULL = 42, 300
 _DEAR = 2.0  # times the cheapest
 _SHARE = 0.9  # of the runs, at least, cost less than that
 
 
 def campaign(full: bool, out: Path, numbers: Iterable[int] | None = None) -> list[Check]:
-    """Violations, refusals and cost ratios over random scenes; 200 of them with ``full``.
+    """Violations, refusals and cost ratios over random scenes; 300 of them with ``full``.
 
     Args:
         numbers: of the scenes to examine; those known from earlier are judged too.

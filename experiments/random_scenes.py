@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _CHAOTIC_HORIZON = 300.0  # rad: past it no number of digits in reach is left
+_KINKED_HORIZON = 100.0  # each surface crossed is found to thirty digits for the truth
 _TIGHT_HORIZON = 300.0  # where the accuracy asked for needs quadruple precision: seconds instead of minutes
 _TIGHT = 1e-15
 _LOOSE = 3e-5
@@ -253,6 +254,38 @@ def _pulse(draw: Draw) -> None:
     _torque(draw, "body", ["k*exp(-(n*(t - late))^2)", "0", "3*k*exp(-(n*(t - late))^2)"])
 
 
+def _kinked(draw: Draw) -> None:
+    """A torque with kinks in time and in the rates."""
+    _torque(draw, "body", ["k*abs(sin(n*t))", "-k*max(wy, 0)/n", "k*sqrt((wx - wz)^2)/n"])
+    draw.horizon = _KINKED_HORIZON
+
+
+def _dry_friction(draw: Draw) -> None:
+    """It jumps wherever a rate changes its sign."""
+    _torque(draw, "body", ["-k*sign(wx)", "-0.6*k*sign(wy)", "0.4*k*cos(n*t)"])
+    draw.horizon = _KINKED_HORIZON
+
+
+def _signed_quaternion(draw: Draw) -> None:
+    """A torque that jumps where the quaternion changes its sign, and is the same at q and -q."""
+    _torque(draw, "body", ["k*sign(qw)*qx", "0", "0.4*k*qw*qz"])
+    draw.horizon = _KINKED_HORIZON
+
+
+def _plunge(draw: Draw) -> None:
+    """Six degrees of freedom, falling nearly straight towards an attractor and past it."""
+    draw.horizon = 30.0
+    draw.body(draw.moments())
+    distance = draw.decades(1.5, 2.5)
+    strength = distance**3 * draw.between(0.05, 0.2) ** 2
+    across = math.sqrt(strength / distance) * draw.between(0.1, 0.4)
+    draw.start(
+        draw.direction() * draw.between(0.2, 1), position=[distance, 0, 0], velocity=[0, across, 0.3 * across]
+    )
+    scaled = strength * draw.length**3 / draw.time**2
+    draw.load("central_gravity", f"gravitational_parameter = {scaled!r}")
+
+
 KINDS: dict[str, Callable[[Draw], None]] = {
     "symmetric": _symmetric,
     "asymmetric": _asymmetric,
@@ -271,6 +304,10 @@ KINDS: dict[str, Callable[[Draw], None]] = {
     "torque, body axes": _body_torque,
     "torque, space axes": _space_torque,
     "late pulse": _pulse,
+    "kinked torque": _kinked,
+    "dry friction": _dry_friction,
+    "sign of the quaternion": _signed_quaternion,
+    "plunge": _plunge,
 }
 
 
