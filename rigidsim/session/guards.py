@@ -62,7 +62,9 @@ class Interruption:
 
 
 class Guards:
-    """The checks between chunks; ``wall_time`` and ``max_steps`` count anew in each session of a run."""
+    """The checks between chunks; ``wall_time`` counts anew in each session of a run. The loop itself keeps
+    ``max_steps``, and the recorder looks at each sample's drift: an earlier session's are looked at here.
+    """
 
     def __init__(
         self,
@@ -70,13 +72,10 @@ class Guards:
         statistics: SampleStatistics,
         interruption: Interruption,
         observer: Observer,
-        *,
-        steps_before: int = 0,
     ) -> None:
         limits = prepared.scene.config.limits
         self._wall = None if limits.wall_time is None else float(limits.wall_time)
         self._drift = None if limits.max_drift is None else float(limits.max_drift)
-        self._steps = None if limits.max_steps is None else limits.max_steps + steps_before
         self._statistics = statistics
         self._interruption = interruption
         self._observer = observer
@@ -93,8 +92,6 @@ class Guards:
             return Status.INTERRUPTED
         if self._wall is not None and now - self._started > self._wall:
             return Status.WALL_TIME
-        if self._steps is not None and progress.steps >= self._steps:
-            return Status.MAX_STEPS
         if self._drift is not None and max(self._statistics.largest.values(), default=0.0) > self._drift:
             return Status.MAX_DRIFT
         return None

@@ -76,9 +76,11 @@ class Session:
         self.observer.started(prepared, folder.path)
         self.observer.phase("integrate")
         start = None if resumed is None else resumed.position
-        before = 0 if start is None else start.boundary.mark.steps
-        guards = Guards(prepared, recorder.statistics, interruption, self.observer, steps_before=before)
-        loop = sampler(prepared, parts, recorder, guards, start, self.tuning.pacing)
+        guards = Guards(prepared, recorder.statistics, interruption, self.observer)
+        most_steps = prepared.scene.config.limits.max_steps
+        if most_steps is not None and start is not None:  # it counts anew in each session
+            most_steps += start.boundary.mark.steps
+        loop = sampler(prepared, parts, recorder, guards, start, self.tuning.pacing, most_steps)
         recorder.progress = loop.progress
         if resumed is not None:
             recorder.restore(resumed.statistics)

@@ -63,6 +63,7 @@ def sampler(
     check: Check = lambda _: None,
     start: Position | None = None,
     pacing: Pacing = MEASURED,
+    most_steps: int | None = None,
 ) -> Sampler:
     """What takes a prepared scene through its samples: its closed form where it has one, or the integration.
 
@@ -71,10 +72,12 @@ def sampler(
         receiver: receives the samples in order.
         check: asked again and again, with the progress; a status ends the run.
         start: where to go on; None begins.
+        most_steps: natural steps, counted from the run's beginning, that are never exceeded; a closed form
+            takes none.
     """
     clock, precision = prepared.clock, prepared.precision
     if prepared.closed is None:
-        return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing)
+        return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing, most_steps)
     begin = parts.corrected.boundary()
     return ClosedFormSampler(
         prepared.closed, prepared.system, begin, clock, precision, receiver, check, start, pacing

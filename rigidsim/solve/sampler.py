@@ -51,7 +51,13 @@ Check = Callable[[Progress], Status | None]
 
 
 class SampleReceiver(Protocol):
-    """Takes samples in order, and is told when what it took can be saved; by itself it is never due."""
+    """Takes samples in order, and is told when what it took can be saved; by itself it is never due.
+
+    Attributes:
+        last_wanted: index of a sample that ends the run by the guard ``max_drift``; those after it were left.
+    """
+
+    last_wanted: int | None = None
 
     def take(self, block: SampleBlock) -> None:
         """The samples that follow those taken before."""
