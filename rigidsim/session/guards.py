@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rigidsim.session.statistics import SampleStatistics
+from rigidsim.solve.building import building
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
@@ -38,7 +39,9 @@ class Observer:
 
 
 class Interruption:
-    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks."""
+    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks; where
+    something is being compiled, nobody waits for it any more.
+    """
 
     def __init__(self) -> None:
         self.requested = False
@@ -52,6 +55,8 @@ class Interruption:
 
         def note(*_: object) -> None:
             self.requested = True
+            if building():
+                raise KeyboardInterrupt
 
         before = {s: signal.signal(s, note) for s in (signal.SIGINT, signal.SIGTERM)}
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from rigidsim.accuracy.error_law import motion_growth
@@ -19,6 +20,7 @@ from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.tuning import Tuning
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.status import Status
 from rigidsim.store.folder import RunFolder
@@ -63,7 +65,7 @@ class Session:
         clock = self.phases
         parts = assemble(prepared)
         log, stepper, evaluator, corrected = parts.log, parts.stepper, parts.evaluator, parts.corrected
-        growth = motion_growth(prepared)
+        growth = interruptible(lambda: motion_growth(prepared))
         resumed = None if chain is None else restore(chain, prepared, corrected, evaluator, log)
         run_id = secrets.token_hex(8) if chain is None else chain.run
         attributes = root_attributes(prepared, stepper, run_id, self.mixed)
@@ -93,7 +95,8 @@ class Session:
             spectrum = None
             if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
                 self.observer.phase("lyapunov")
-                spectrum = spectrum_of(prepared, folder, run_id, interruption, limits.seconds)
+                with suppress(KeyboardInterrupt):  # while its equations were compiled
+                    spectrum = spectrum_of(prepared, folder, run_id, interruption, limits.seconds)
                 clock.next("lyapunov")
                 if interruption.requested:
                     progress.status = Status.INTERRUPTED

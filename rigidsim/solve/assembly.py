@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigidsim.solve.angle_wrapping import AngleWrapping
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.closed_form.sampler import ClosedFormSampler
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
@@ -36,7 +37,7 @@ class Assembly:
 
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
-    """Compile everything that a prepared scene needs to go from its start.
+    """Compile everything that a prepared scene needs to go from its start. Ctrl-C is heeded meanwhile.
 
     Args:
         stride: natural steps between corrections at most (``CorrectedStepper``).
@@ -44,6 +45,10 @@ def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly
     Raises:
         ConfigError: invariants are to be projected where there are none.
     """
+    return interruptible(lambda: _assembled(prepared, stride))
+
+
+def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context)
     log = EventLog([c.stop for c in system.crossings], wrapping)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -14,28 +13,11 @@ from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.pacing import MEASURED, Pacing, Way, WayFinder
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Check, Progress, SampleReceiver
+from rigidsim.solve.sampler import Check, Progress, Reach, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
-States = Callable[[np.ndarray], np.ndarray]
-"""From sample times (n,) to states (n, states), both in internal units."""
-
-
 _CAREFUL = 2**20  # steps at once
-
-
-@dataclass(frozen=True)
-class Reach:
-    """Steps just taken, whose samples are still to be taken: in one step there can be any number of them.
-
-    Attributes:
-        boundary: before the steps.
-        states: their dense output.
-    """
-
-    boundary: StepBoundary
-    states: States
 
 
 class IntegrationLoop:
@@ -109,21 +91,32 @@ class IntegrationLoop:
                 self.receiver.save(self.position())
             stop = self.check(self.progress) or self._out_of_steps()
             if stop is None:
-                stop = self._round()
+                stop = self._interruptible_round()
             if stop is not None:
                 return self._ended(stop)
             if not self._hand_over(patiently=True):
                 return self.progress
 
-    def _round(self) -> Status | None:
+    def _interruptible_round(self) -> Status | None:
+        """A round is taken back where Ctrl-C ends it, as it may while another chart is compiled."""
+        boundary, found = self.position().boundary, self.buffer.count
+        try:
+            return self._round(boundary)
+        except KeyboardInterrupt:
+            self._reach = self._before = None
+            self.buffer.back_to(found)
+            self.corrected.back_to(boundary)
+            self._account()
+            return Status.INTERRUPTED
+
+    def _round(self, boundary: StepBoundary) -> Status | None:
         """A chunk of steps, or a block of samples within those taken; the status that ends the run here."""
         log, finite = self.stepper.log, True
         if self._reach is not None:
-            boundary, started = self._reach.boundary, time.perf_counter()
+            started = time.perf_counter()
             self._take_reached()
             self.progress.integration_seconds += time.perf_counter() - started
         else:
-            boundary = self.corrected.boundary()
             finite = self._advance()
         if self.buffer.complete:
             return Status.FINISHED

@@ -83,6 +83,13 @@ class SampleBuffer:
             self._boundaries.append(boundary)
             self.count += len(block)
 
+    def back_to(self, count: int) -> None:
+        """Forget what was found since so many samples were known."""
+        while self._blocks and self._blocks[-1].first >= count:
+            self._blocks.pop()
+            self._boundaries.pop()
+        self.count = max(count, self.handed)
+
     def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
         """Give what is collected to the receiver; ``patiently``: only where it is much, or old.
 

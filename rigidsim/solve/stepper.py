@@ -16,6 +16,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
@@ -130,7 +131,8 @@ class Stepper:
         """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
         if chart not in self._charts:
             assert self.system.partner is not None
-            self._charts[chart] = self._compiled(self.system.partner)
+            partner = self.system.partner
+            self._charts[chart] = interruptible(lambda: self._compiled(partner))
         time = self._integrator.dtime
         self._integrator = self._charts[chart]
         self._integrator.dtime = time
