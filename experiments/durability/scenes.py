@@ -52,7 +52,8 @@ def text_of(name: str, longer: int = 1) -> str:
     end *= longer
     return (
         f'name = "{name}"\n{BODY}{rest}[time]\nend = {end}\nsamples = {samples}\n'
-        f"[integrator]\n{integrator}\n[output]\ntimeline = false\n{output}\n"
+        # a run that may be stopped isn't refused where the disk is too small for all of it
+        f"[integrator]\n{integrator}\n[limits]\nwall_time = 3600\n[output]\ntimeline = false\n{output}\n"
     )
 
 

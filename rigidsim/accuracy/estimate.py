@@ -17,6 +17,7 @@ import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
 from rigidsim.accuracy.exact_error import ExactError, exact_error
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.lanes import BatchLanes, Lanes, OwnLanes, SeriesErrors
 from rigidsim.solve.neighbours import Neighbours, Pushes, Spread
@@ -141,7 +142,9 @@ def estimate_errors(
             law = round_off_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
             return _by_comparison(prepared, exact_error(prepared, form, trail), law, duration, margins)
     level = float(prepared.precision.epsilon)
-    neighbours = _neighbours(prepared, start, end, steps, integrator, condition, margins)
+    neighbours = interruptible(
+        lambda: _neighbours(prepared, start, end, steps, integrator, condition, margins)
+    )
     dear = dict(margins.dearer).get(prepared.precision.name, math.inf)
     whole = steps <= max(margins.all_steps, margins.part * dear * steps)
     asked = end if whole else start + (end - start) * max(margins.all_steps / steps, margins.part * dear)

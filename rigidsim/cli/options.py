@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -23,6 +24,7 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Replace a value, such as time.end=10; repeatable."),
 ]
+OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
@@ -38,6 +40,17 @@ def print_run(result: Run, as_json: bool) -> int:
     if code:
         print(f"rigidsim: {result.outcome.message}", file=sys.stderr)
     return code
+
+
+def _leave_builds(code: int) -> None:
+    """End the process at once where something is still being compiled: that can neither be waited for, which
+    may take seconds, nor be going on while libraries are unloaded.
+    """
+    threads = sys.modules.get("rigidsim.solve.building")  # not loaded, nothing was compiled
+    if threads is not None and threads.building():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
 
 
 def user_errors(command: Callable[..., None]) -> Callable[..., None]:
@@ -56,6 +69,7 @@ def user_errors(command: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             print("rigidsim: interrupted", file=sys.stderr)
+            _leave_builds(130)
             raise typer.Exit(130) from None
         except BrokenPipeError:
             sys.stderr.close()

@@ -220,6 +220,8 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
         f"timeline {size(predicted['timeline_bytes'])}"
     )
+    for warning in plan["warnings"]:
+        out.print(Text(f"warning    {warning}", style="bold red"), soft_wrap=True)
     error = predicted["attitude_error_rad"]
     if error is not None and math.isfinite(error):
         factor = predicted["amplification"]

@@ -70,8 +70,9 @@ class Completion:
         self.observer.phase("dataset")
         checkpoint = None
         if self.loop.progress.status is Status.FINISHED:
-            arrays = self.recorder.packed(self.loop.position())
-            checkpoint = self.folder.checkpoint, arrays, self.recorder.all_events()
+            position = self.loop.position()
+            arrays, events = self.recorder.packed(position), self.recorder.all_events(position)
+            checkpoint = self.folder.checkpoint, arrays, events
         self.writer.complete(
             self.folder.dataset,
             self._attributes().as_dict(),

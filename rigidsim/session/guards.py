@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rigidsim.session.statistics import SampleStatistics
+from rigidsim.solve.building import building
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
@@ -38,7 +39,9 @@ class Observer:
 
 
 class Interruption:
-    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks."""
+    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks; where
+    something is being compiled, nobody waits for it any more.
+    """
 
     def __init__(self) -> None:
         self.requested = False
@@ -52,6 +55,8 @@ class Interruption:
 
         def note(*_: object) -> None:
             self.requested = True
+            if building():
+                raise KeyboardInterrupt
 
         before = {s: signal.signal(s, note) for s in (signal.SIGINT, signal.SIGTERM)}
         try:
@@ -62,7 +67,9 @@ class Interruption:
 
 
 class Guards:
-    """The checks between chunks; ``wall_time`` and ``max_steps`` count anew in each session of a run."""
+    """The checks between chunks; ``wall_time`` counts anew in each session of a run. The loop itself keeps
+    ``max_steps``, and the recorder looks at each sample's drift: an earlier session's are looked at here.
+    """
 
     def __init__(
         self,
@@ -70,13 +77,10 @@ class Guards:
         statistics: SampleStatistics,
         interruption: Interruption,
         observer: Observer,
-        *,
-        steps_before: int = 0,
     ) -> None:
         limits = prepared.scene.config.limits
         self._wall = None if limits.wall_time is None else float(limits.wall_time)
         self._drift = None if limits.max_drift is None else float(limits.max_drift)
-        self._steps = None if limits.max_steps is None else limits.max_steps + steps_before
         self._statistics = statistics
         self._interruption = interruption
         self._observer = observer
@@ -93,8 +97,6 @@ class Guards:
             return Status.INTERRUPTED
         if self._wall is not None and now - self._started > self._wall:
             return Status.WALL_TIME
-        if self._steps is not None and progress.steps >= self._steps:
-            return Status.MAX_STEPS
         if self._drift is not None and max(self._statistics.largest.values(), default=0.0) > self._drift:
             return Status.MAX_DRIFT
         return None

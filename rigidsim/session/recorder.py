@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import sys
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from rigidsim.session.timings import Effort
 from rigidsim.session.variables import drift_name, put_back_name
 from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
 from rigidsim.solve.checkpoint_arrays import pack_checkpoint, pack_events
-from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import put_back_by_invariant
@@ -48,13 +50,27 @@ class Recorder(SampleReceiver):
         self._log = log
         self._effort = effort
         self._events_saved = len(log.found)
+        guard = prepared.scene.config.limits.max_drift
+        self._max_drift = None if guard is None else float(guard)
         self.statistics = SampleStatistics()
         self.trail = Trail(prepared.precision)
 
     def take(self, block: SampleBlock) -> None:
-        """Evaluate and collect samples."""
-        self.trail.take(block)
+        """Evaluate and collect samples, up to the first past the guard ``max_drift``."""
+        before = (
+            self._evaluator.continuity
+            if self._max_drift is None
+            else copy.deepcopy(self._evaluator.continuity)
+        )
         recorded = self._evaluator.evaluate(block)
+        wanted = self._wanted(recorded)
+        if wanted <= len(block):
+            self.last_wanted = block.first + wanted - 1
+        if wanted < len(block):
+            self._evaluator.continuity = before
+            block = block.rows(0, wanted)
+            recorded = self._evaluator.evaluate(block)
+        self.trail.take(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[drift_name(invariant.name)][0][:, 0])
@@ -71,15 +87,26 @@ class Recorder(SampleReceiver):
         lost = self._evaluator.continuity.wrapped_from
         self.statistics.angles_wrapped_from = math.ldexp(lost, self._prepared.clock.exponent)
 
+    def _wanted(self, recorded: RecordedParts) -> int:
+        """How many samples there are up to the first past the guard, and with it; more than all where none
+        is.
+        """
+        if self._max_drift is None:
+            return sys.maxsize
+        drifts = (recorded[drift_name(i.name)][0][:, 0] for i in self._prepared.system.invariants)
+        past = [np.flatnonzero(np.abs(drift) > self._max_drift) for drift in drifts]
+        return min((int(found[0]) + 1 for found in past if len(found)), default=sys.maxsize)
+
     def due(self) -> bool:
         """Whether what is collected is much, or the last segment old."""
         return self._writer.due
 
     def save(self, position: Position) -> None:
         """Write a segment; on return all samples taken, and the way on from there, are saved."""
-        events = pack_events(self._log.found[self._events_saved :], self._prepared.precision)
+        known = position.boundary.mark.events  # those past it are found once more
+        events = pack_events(self._log.found[self._events_saved : known], self._prepared.precision)
         self._writer.flush(self.packed(position), events)
-        self._events_saved = len(self._log.found)
+        self._events_saved = known
 
     def packed(self, position: Position) -> Arrays:
         """The checkpoint at a position as arrays, with what the summary will say of the samples so far."""
@@ -102,9 +129,9 @@ class Recorder(SampleReceiver):
         names = [invariant.name for invariant in self._prepared.system.invariants]
         return pack_checkpoint(checkpoint, self._prepared.precision, names)
 
-    def all_events(self) -> Arrays:
-        """Every crossing so far."""
-        return pack_events(self._log.found, self._prepared.precision)
+    def all_events(self, position: Position) -> Arrays:
+        """Every crossing up to a position."""
+        return pack_events(self._log.found[: position.boundary.mark.events], self._prepared.precision)
 
     def restore(self, statistics: Statistics) -> None:
         """Go on counting from an earlier session's checkpoint; ``progress`` is set by then."""

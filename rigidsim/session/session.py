@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from rigidsim.session.attributes import root_attributes
@@ -74,9 +75,11 @@ class Session:
         self.observer.started(prepared, folder.path)
         self.observer.phase("integrate")
         start = None if resumed is None else resumed.position
-        before = 0 if start is None else start.boundary.mark.steps
-        guards = Guards(prepared, recorder.statistics, interruption, self.observer, steps_before=before)
-        loop = sampler(prepared, parts, recorder, guards, start, self.tuning.pacing)
+        guards = Guards(prepared, recorder.statistics, interruption, self.observer)
+        most_steps = prepared.scene.config.limits.max_steps
+        if most_steps is not None and start is not None:  # it counts anew in each session
+            most_steps += start.boundary.mark.steps
+        loop = sampler(prepared, parts, recorder, guards, start, self.tuning.pacing, most_steps)
         recorder.progress = loop.progress
         if resumed is not None:
             recorder.restore(resumed.statistics)
@@ -89,7 +92,8 @@ class Session:
             spectrum = None
             if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
                 self.observer.phase("lyapunov")
-                spectrum = spectrum_of(prepared, folder, run_id, interruption, limits.seconds)
+                with suppress(KeyboardInterrupt):  # while its equations were compiled
+                    spectrum = spectrum_of(prepared, folder, run_id, interruption, limits.seconds)
                 clock.next("lyapunov")
                 if interruption.requested:
                     progress.status = Status.INTERRUPTED
@@ -97,9 +101,10 @@ class Session:
             found = Diagnostics(prepared, progress, recorder.statistics)
             if prepared.scene.config.output.estimate and progress.status.final:
                 self.observer.phase("estimate")
-                found = found.estimated(
-                    recorder.trail, stepper.integrator, lambda: not interruption.requested
-                )
+                with suppress(KeyboardInterrupt):  # while neighbours were compiled
+                    found = found.estimated(
+                        recorder.trail, stepper.integrator, lambda: not interruption.requested
+                    )
                 clock.next("estimate")
                 if interruption.requested:
                     progress.status = Status.INTERRUPTED

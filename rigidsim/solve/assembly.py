@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from rigidsim.solve.angle_wrapping import AngleWrapping
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.closed_form.sampler import ClosedFormSampler
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
@@ -43,7 +44,7 @@ class Assembly:
 
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
-    """Compile everything that a prepared scene needs to go from its start.
+    """Compile everything that a prepared scene needs to go from its start. Ctrl-C is heeded meanwhile.
 
     Args:
         stride: natural steps between corrections at most (``CorrectedStepper``).
@@ -51,6 +52,10 @@ def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly
     Raises:
         ConfigError: invariants are to be projected where there are none.
     """
+    return interruptible(lambda: _assembled(prepared, stride))
+
+
+def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context)
     log = EventLog([c.stop for c in system.crossings], wrapping)
@@ -80,6 +85,7 @@ def sampler(
     check: Check = lambda _: None,
     start: Position | None = None,
     pacing: Pacing = MEASURED,
+    most_steps: int | None = None,
 ) -> Sampler:
     """What takes a prepared scene through its samples: its closed form where it has one, or the integration.
 
@@ -88,13 +94,15 @@ def sampler(
         receiver: receives the samples in order.
         check: asked again and again, with the progress; a status ends the run.
         start: where to go on; None begins.
+        most_steps: natural steps, counted from the run's beginning, that are never exceeded; a closed form
+            takes none.
     """
     clock, precision = prepared.clock, prepared.precision
     if parts.evaluator.sparse:
         check = _following(check, parts.evaluator, clock)
         pacing = _in_small_blocks(pacing, radians_between_samples(prepared))
     if prepared.closed is None:
-        return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing)
+        return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing, most_steps)
     begin = parts.corrected.boundary()
     return ClosedFormSampler(
         prepared.closed, prepared.system, begin, clock, precision, receiver, check, start, pacing

@@ -94,6 +94,7 @@ def pack_checkpoint(checkpoint: Checkpoint, precision: Precision, invariants: Se
         arrays["rhythm_chart_changes"] = np.array([boundary.chart_changes], dtype=np.int64)
     arrays["rhythm_held"] = boundary.projection
     arrays["rhythm_switching"] = np.array(mark.switching)
+    arrays["rhythm_tiny"] = np.array([mark.tiny], dtype=np.int64)
     arrays["joined_turns"] = continuity.turns
     if continuity.last_angles is not None:
         arrays["joined_angles"] = continuity.last_angles
@@ -139,7 +140,8 @@ def unpack_checkpoint(
     switching = np.asarray(arrays.get("rhythm_switching", np.zeros(0)), dtype=np.float64)
     if switching.shape != (len(start.mark.switching),):
         raise ValueError(f"the checkpoint remembers {switching.shape} numbers of switching surfaces")
-    mark = Mark((time[0], time[1]), state, int(events), int(steps), tuple(switching.tolist()))
+    tiny = int(arrays.get("rhythm_tiny", np.zeros(1))[0])
+    mark = Mark((time[0], time[1]), state, int(events), int(steps), tuple(switching.tolist()), tiny)
     boundary = StepBoundary(mark, angles, chart_changes, projection)
     continuity = Continuity(
         np.asarray(arrays.get("joined_turns", np.zeros(3)), dtype=np.int64),

@@ -55,6 +55,7 @@ class CorrectedStepper:
         whole_times: whether time is a single number at each stride's start. Not where events or switching
             surfaces are looked for: a step back could cross one twice.
         charts: of a run in Euler angles; None without.
+        collapsed: whether steps have become too small to ever arrive.
 
     Args:
         stride: natural steps between corrections at most; results depend on it, within rounding.
@@ -77,6 +78,7 @@ class CorrectedStepper:
         if projection is not None:
             self.stride = min(self.stride, projection_interval)
         self.whole_times = not (stepper.has_events or stepper.single_steps)
+        self._stuck = False
         self.charts: Charts | None = None
         system = stepper.system
         if system.partner is not None:
@@ -90,6 +92,11 @@ class CorrectedStepper:
         """Steps until the next corrections, at least 1."""
         return self.stride - self.stepper.steps % self.stride
 
+    @property
+    def collapsed(self) -> bool:
+        """Whether steps have become too small to ever arrive, be it at the next whole time."""
+        return self._stuck or self.stepper.collapsed
+
     def boundary(self) -> StepBoundary:
         """Remember this boundary."""
         return StepBoundary(
@@ -101,6 +108,7 @@ class CorrectedStepper:
 
     def back_to(self, boundary: StepBoundary) -> None:
         """Return to a boundary."""
+        self._stuck = False
         self.wrapping.angles = boundary.angles
         if self.projection is not None:
             self.projection.memory[...] = boundary.projection
@@ -112,8 +120,10 @@ class CorrectedStepper:
         self.stepper.back_to(boundary.mark)
 
     def skip(self, count: int) -> bool:
-        """``count`` steps without dense output; False when the state is no longer finite."""
-        while count > 0:
+        """``count`` steps without dense output, fewer where they collapse; False when the state is no longer
+        finite.
+        """
+        while count > 0 and not self.collapsed:
             before = self.stepper.steps
             if not self.stepper.skip(min(count, self.left)):
                 return False
@@ -139,8 +149,9 @@ class CorrectedStepper:
         due = self.stepper.steps % self.stride == 0
         if not (due or change):
             return
-        if self.whole_times:
-            self.stepper.to_whole_time()
+        if self.whole_times and not self.stepper.to_whole_time():
+            self._stuck = True
+            return
         if due and self.wrapping.positions:
             self.wrapping.wrap(self.stepper.state)
         if due and self.projection is not None:

@@ -39,8 +39,9 @@ def evaluate_rows(
 ) -> np.ndarray:
     """Evaluate a compiled function at each row of states.
 
-    heyoka takes rows several at a time and the rest one by one, which differs in the last bit. Rows are
-    padded to whole groups, so that a row's bits don't depend on the block that it came in.
+    In single and double precision heyoka takes rows several at a time and the rest one by one, which differs
+    in the last bit. Rows are padded to whole groups there, so that a row's bits don't depend on the block
+    that it came in.
 
     Args:
         states: (n, states).
@@ -50,7 +51,8 @@ def evaluate_rows(
         (outputs, n).
     """
     count = len(states)
-    padded = -(-count // _GROUP) * _GROUP
+    group = _GROUP if states.dtype in (np.float32, np.float64) else 1
+    padded = -(-count // group) * group
     if padded > count:
         states = np.concatenate([states, np.repeat(states[-1:], padded - count, axis=0)])
     # compiled code for expressions without parameters refuses an array of them

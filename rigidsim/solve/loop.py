@@ -3,28 +3,35 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.pacing import MEASURED, Pacing, Way, WayFinder
-from rigidsim.solve.precision import Precision
+from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Check, Progress, SampleReceiver
+from rigidsim.solve.sampler import Check, Progress, Reach, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
-_HOPELESS_STEPS = 1e15  # to the end; at the fastest pace they would take years
+_CAREFUL = 2**20  # steps at once
 
 
 class IntegrationLoop:
     """Drives an integration through the samples (a ``Sampler``).
 
+    Each round takes either a chunk of steps or a block of samples within the steps taken last, so that guards
+    and Ctrl-C are heeded however many samples lie in a step. Where a run ends, its steps are told from the
+    samples and the motion alone, never from the chunk that happened to hold them.
+
     Args:
-        receiver: receives finished samples in order.
-        check: asked between chunks, at least every tenth of a second or after each single step.
+        receiver: receives finished samples in order, and may name the last that it wants.
+        check: asked in each round, at least every tenth of a second or after each single step.
         start: where to go on; None begins.
+        most_steps: natural steps, counted from the run's beginning, that are never exceeded.
     """
 
     def __init__(
@@ -36,6 +43,7 @@ class IntegrationLoop:
         check: Check,
         start: Position | None = None,
         pacing: Pacing = MEASURED,
+        most_steps: int | None = None,
     ) -> None:
         first = 0
         if start is not None:
@@ -50,8 +58,13 @@ class IntegrationLoop:
         self.progress = Progress(clock.count, first)
         self.buffer = SampleBuffer(clock, receiver, pacing, first)
         self.ways = WayFinder(corrected, clock, precision, pacing)
-        self._skip_from = pacing.skip_from
-        self._before_last: StepBoundary | None = None
+        self.last = clock.at(clock.count - 1)
+        self.stepper.destination = float(self.last)
+        self._most_steps = most_steps
+        self._pacing = pacing
+        self._reach: Reach | None = None
+        self._before: StepBoundary | None = None  # the start of the step in which the run ended
+        self._careful: int | None = None  # steps at once, on the way to where the state is lost
         self._account()
 
     def position(self) -> Position:
@@ -59,33 +72,71 @@ class IntegrationLoop:
 
         After the last sample this is the start of the step that holds it: a later end has samples in there.
         """
-        return Position(self._before_last or self.corrected.boundary(), self.buffer.handed)
+        boundary = self._before or (self._reach.boundary if self._reach else self.corrected.boundary())
+        return Position(boundary, self.buffer.handed)
 
     def run(self) -> Progress:
         """Go on until the last sample is recorded or something ends the run."""
         self.progress.last_good = self.corrected.boundary()
         if self.buffer.complete:
-            self._finish(self.progress.last_good)
-        else:
-            self._look_ahead()
-        while not self.buffer.complete:
+            if self.check(self.progress) is Status.MAX_DRIFT:  # which a sample of an earlier session passed
+                return self._ended(Status.MAX_DRIFT)
+            self._settle(self.progress.last_good, self.last)
+            return self._ended(Status.FINISHED)
+        self._look_ahead()
+        while True:
             if self.receiver.due():
-                self._hand_over()
+                if not self._hand_over():
+                    return self.progress
                 self.receiver.save(self.position())
-            stop = self.check(self.progress)
+            stop = self.check(self.progress) or self._out_of_steps()
+            if stop is None:
+                stop = self._interruptible_round()
             if stop is not None:
                 return self._ended(stop)
+            if not self._hand_over(patiently=True):
+                return self.progress
+
+    def _interruptible_round(self) -> Status | None:
+        """A round is taken back where Ctrl-C ends it, as it may while another chart is compiled."""
+        boundary, found = self.position().boundary, self.buffer.count
+        try:
+            return self._round(boundary)
+        except KeyboardInterrupt:
+            self._reach = self._before = None
+            self.buffer.back_to(found)
+            self.corrected.back_to(boundary)
+            self._account()
+            return Status.INTERRUPTED
+
+    def _round(self, boundary: StepBoundary) -> Status | None:
+        """A chunk of steps, or a block of samples within those taken; the status that ends the run here."""
+        log, finite = self.stepper.log, True
+        if self._reach is not None:
+            started = time.perf_counter()
+            self._take_reached()
+            self.progress.integration_seconds += time.perf_counter() - started
+        else:
             finite = self._advance()
-            if self.stepper.log.stop is not None:
-                self.buffer.drop_after(self.stepper.log.stop)
-                return self._ended(Status.EVENT)
-            if not finite:
-                return self._ended(Status.UNRESOLVED if self.progress.detail else Status.NON_FINITE)
-            self._hand_over(patiently=True)
-            if self.ways.steps_left > _HOPELESS_STEPS:
-                self.progress.last_good = self.corrected.boundary()
-                return self._ended(Status.COLLAPSED)
-        return self._ended(Status.FINISHED)
+        if self.buffer.complete:
+            return Status.FINISHED
+        if log.stop is not None and self._reach is None:
+            self._settle(boundary, log.stop)
+            return Status.EVENT
+        if self.corrected.collapsed:
+            self.progress.last_good, self._before = self.corrected.boundary(), boundary
+            return Status.COLLAPSED
+        if not finite:
+            return Status.UNRESOLVED if self.progress.detail else Status.NON_FINITE
+        return None
+
+    def _out_of_steps(self) -> Status | None:
+        """Samples within the last step that is allowed are still taken."""
+        return Status.MAX_STEPS if self._reach is None and self._allowed(1) == 0 else None
+
+    def _allowed(self, count: int) -> int:
+        """So many steps, or as many as the guard leaves of them."""
+        return count if self._most_steps is None else min(count, self._most_steps - self.stepper.steps)
 
     def _look_ahead(self) -> None:
         """Learn how long a step is and how long it takes, by one that is taken back."""
@@ -96,13 +147,25 @@ class IntegrationLoop:
         self.corrected.back_to(boundary)
 
     def _ended(self, status: Status) -> Progress:
-        self._hand_over()
-        self.progress.status = status
+        if self._reach is not None and not self.buffer.complete:
+            self.corrected.back_to(self._reach.boundary)  # some of its samples are still to be taken
+            self._reach = None
+            self._account()
+        if self._hand_over():
+            self.progress.status = status
         return self.progress
 
-    def _hand_over(self, *, patiently: bool = False) -> None:
-        self.buffer.hand_over(patiently=patiently)
+    def _hand_over(self, *, patiently: bool = False) -> bool:
+        """Hand over what is collected; False where the receiver ended the run with one of the samples."""
+        refused = self.buffer.hand_over(patiently=patiently)
         self.progress.next_sample = self.buffer.handed
+        if refused is None:
+            return True
+        index, boundary = refused
+        self._reach = None
+        self._settle(boundary, self.clock.at(index))
+        self.progress.status = Status.MAX_DRIFT
+        return False
 
     def _account(self) -> None:
         self.progress.steps = self.stepper.steps
@@ -112,14 +175,11 @@ class IntegrationLoop:
         """One chunk of steps; False where the state stopped being finite."""
         started, before = time.perf_counter(), self.stepper.steps
         way, count = self.ways.choose(self.buffer.count, self.buffer.upcoming)
-        if way is Way.SKIP:
-            finite = self._skip(count)
-        elif way is Way.GRID:
-            finite = self._grid(count)
-        elif way is Way.BLOCK:
-            finite = self._block(count)
-        else:
-            finite = self._step_by_step(count)
+        count = self._allowed(count)
+        if self._careful is not None:
+            count = min(count, self._careful)
+            self._careful = 2 * self._careful if self._careful < _CAREFUL else None
+        finite = self._WAYS[way](self, count)
         elapsed = time.perf_counter() - started
         self.ways.measured(way, self.stepper.steps - before, elapsed)
         self.progress.integration_seconds += elapsed
@@ -131,8 +191,8 @@ class IntegrationLoop:
     def _skip(self, count: int) -> bool:
         """Many steps towards a sample; if they went past it, back and again, nearer."""
         boundary = self.corrected.boundary()
-        if not self.corrected.skip(count):
-            return self._find_last_good(boundary)
+        if not self.corrected.skip(count) or self.stepper.unresolved:
+            return self._lost(boundary, count)
         if self.stepper.time > self.buffer.upcoming:
             self.progress.redone_steps += self.stepper.steps - boundary.mark.steps
             self.ways.went_past()
@@ -143,28 +203,30 @@ class IntegrationLoop:
 
     def _grid(self, count: int) -> bool:
         """Whole strides from a whole time on, and the samples within them."""
-        while count > 0 and not self.buffer.complete:
+        most = 2 * self._pacing.grid_rows
+        while count > 0:
             boundary = self.corrected.boundary()
             part = min(count, self.corrected.left)
             longest = self.ways.longest
             while True:  # until the samples asked for reach as far as the steps
                 horizon = float(self.stepper.time) + 2 * part * longest
-                times = self.buffer.until(self.precision.scalar(horizon))
+                times = self.buffer.until(self.precision.scalar(horizon), most)
+                if len(times) == most:  # they lie closer than those by which this way was chosen
+                    return self._step_by_step(part)
                 finite, states = self.stepper.grid(times, part)
-                if not finite:
-                    return self._find_last_good(boundary)
+                if not finite or self.stepper.unresolved:
+                    return self._lost(boundary, part)
                 following = self.buffer.count + len(times)
                 if following >= self.clock.count or self.clock.at(following) > self.stepper.time:
                     break
                 longest *= 2
                 self.corrected.back_to(boundary)
             self._note_steps()
-            self._take(times[: len(states)], states)
-            if self.buffer.complete:
-                self._finish(boundary)
+            self._take(times[: len(states)], states, boundary)
+            self._none_left(boundary)
+            if self.buffer.full or self.buffer.complete or self.corrected.collapsed:
                 break
-            self.corrected.correct()
-            if self.buffer.full or not self.stepper.at_whole_time:
+            if not self.stepper.at_whole_time:
                 break
             count -= part
         return True
@@ -173,39 +235,42 @@ class IntegrationLoop:
         """Steps with continuous output, not past the next corrections."""
         boundary = self.corrected.boundary()
         finite, output = self.stepper.block(count)
-        if not finite:
-            return self._find_last_good(boundary)
+        if not finite or self.stepper.unresolved:
+            return self._lost(boundary, count)
         self._note_steps()
-        times = self.buffer.until(self.stepper.time)
-        if len(times):
-            self._take(times, output(times))
-        if self.buffer.complete:
-            self._finish(boundary)
-        else:
-            self.corrected.correct()
+        self._reached(Reach(boundary, output))
         return True
 
     def _step_by_step(self, count: int) -> bool:
         """Single steps up to the first that reaches a sample, and on while each reaches one."""
-        upcoming, boundary = self.buffer.upcoming, self.corrected.boundary()
+        upcoming, boundary, tried = self.buffer.upcoming, self.corrected.boundary(), 0
         for _ in range(count):
+            tried += 1
             if not self.stepper.step():
-                return self._find_last_good(boundary)
+                return self._lost(boundary, tried)
             self._note_steps()
             reached = upcoming <= self.stepper.time
-            if reached:
-                self._take_step()
-                if self.buffer.complete:
-                    self._finish(boundary)
-                    break
-            self.corrected.correct()
-            if self.buffer.full:
+            if not reached:
+                self.corrected.correct()
+            else:
+                self._reached(Reach(boundary, self._dense))
+            if self._reach is not None or self.buffer.complete or self.buffer.full:
+                break
+            if self.stepper.log.stop is not None or self.corrected.collapsed:
                 break
             if reached:
-                upcoming, boundary = self.buffer.upcoming, self.corrected.boundary()
-                if float(upcoming) - float(self.stepper.time) > self._skip_from * self.stepper.largest:
+                upcoming, boundary, tried = self.buffer.upcoming, self.corrected.boundary(), 0
+                if float(upcoming) - float(self.stepper.time) > self._pacing.skip_from * self.stepper.largest:
                     break
         return True
+
+    _Take: TypeAlias = "Callable[[IntegrationLoop, int], bool]"
+    _WAYS: ClassVar[dict[Way, _Take]] = {
+        Way.SKIP: _skip,
+        Way.GRID: _grid,
+        Way.BLOCK: _block,
+        Way.STEP: _step_by_step,
+    }
 
     # --- samples, and the run's end ---------------------------------------------------------------------
 
@@ -213,46 +278,66 @@ class IntegrationLoop:
         self.progress.smallest_step = min(self.progress.smallest_step, self.stepper.smallest)
         self.progress.largest_step = max(self.progress.largest_step, self.stepper.largest)
 
-    def _take(self, times: np.ndarray, states: np.ndarray) -> None:
-        self.buffer.take(self.corrected.samples(self.buffer.count, times, states))
+    def _dense(self, times: np.ndarray) -> np.ndarray:
+        return np.array([self.stepper.dense(t) for t in times])
 
-    def _take_step(self) -> None:
-        """The samples within the step just taken."""
-        times = self.buffer.until(self.stepper.time)
-        self._take(times, np.array([self.stepper.dense(t) for t in times]))
+    def _take(self, times: np.ndarray, states: np.ndarray, boundary: StepBoundary) -> None:
+        self.buffer.take(self.corrected.samples(self.buffer.count, times, states), boundary)
 
-    def _finish(self, boundary: StepBoundary) -> None:
-        """Back from where the last sample is passed to the first boundary past it, which is where every way
-        through the samples ends; ``boundary`` is a boundary before it.
+    def _reached(self, reach: Reach) -> None:
+        """Take samples within steps just taken, as many as may wait; those beyond are for later rounds."""
+        self._reach = reach
+        self._take_reached()
+
+    def _take_reached(self) -> None:
+        """The next of them."""
+        assert self._reach is not None
+        stop, room = self.stepper.log.stop, self.buffer.room
+        limit = self.stepper.time if stop is None else min(self.stepper.time, stop)
+        times = self.buffer.until(limit, room)
+        if len(times):
+            started = time.perf_counter()
+            self._take(times, self._reach.states(times), self._reach.boundary)
+            self.buffer.took("dense output", len(times), time.perf_counter() - started)
+        if self.buffer.complete or self.buffer.upcoming > limit:
+            self._none_left(self._reach.boundary)
+
+    def _none_left(self, boundary: StepBoundary) -> None:
+        """All samples within steps just taken, from a boundary on, are taken: corrections, or the end."""
+        self._reach = None
+        if self.buffer.complete:
+            self._settle(boundary, self.last)
+        else:
+            self.corrected.correct()
+
+    def _settle(self, boundary: StepBoundary, moment: Scalar) -> None:
+        """Back to a boundary before a moment and on to the first one at or past it, which is where every way
+        ends.
         """
-        last = self.clock.at(self.clock.count - 1)
-        most = self.stepper.steps - boundary.mark.steps  # the sample lies within so many steps
+        most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
         self.corrected.back_to(boundary)
         while most > 1:
             here, half = self.corrected.boundary(), most // 2
             self.corrected.skip(half)
-            if self.stepper.time >= last:
+            if self.stepper.time >= moment:
                 self.corrected.back_to(here)
                 most = half
             else:
                 most -= half
         while True:
-            self._before_last = self.corrected.boundary()
+            self._before = self.corrected.boundary()
             self.stepper.step()
-            if self.stepper.time >= last:
-                return
+            if self.stepper.time >= moment:
+                break
             self.corrected.correct()
+        self._account()
 
-    def _find_last_good(self, boundary: StepBoundary) -> bool:
-        """After a failure somewhere in many steps: walk to the last state that is finite; returns False."""
+    def _lost(self, boundary: StepBoundary, tried: int) -> bool:
+        """After a failure somewhere in many steps, or steps too small to be taken at once: back, and on in
+        fewer at a time up to the last state that is finite; False where a single step fails.
+        """
+        self.progress.detail = self.stepper.failure if tried == 1 else ""
         self.corrected.back_to(boundary)
-        while True:
-            boundary = self.corrected.boundary()
-            if not self.stepper.step():
-                self.progress.detail = self.stepper.failure
-                self.corrected.back_to(boundary)
-                self.progress.last_good = boundary
-                return False
-            if not self.buffer.complete and self.buffer.upcoming <= self.stepper.time:
-                self._take_step()
-            self.corrected.correct()
+        self.progress.last_good = boundary
+        self._careful = max(1, tried // 2)
+        return tried > 1

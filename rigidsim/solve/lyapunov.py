@@ -20,8 +20,10 @@ import numpy as np
 
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
+from rigidsim.solve.building import interruptible
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth
+_CHUNK, _MOST_CHUNKS = 4096, 256  # steps between two looks at Ctrl-C, and such chunks in an interval
 _MOST_ROWS = 1000  # of the convergence that is kept
 
 
@@ -116,13 +118,14 @@ def lyapunov_spectrum(
         done: to go on from; the same bits as in one go.
 
     Returns:
-        The spectrum; None where it was ended early or the tangent vectors stopped being finite.
+        The spectrum; None where it was ended early, the tangent vectors stopped being finite, or steps became
+        so small that an interval takes millions.
     """
     moving = motion_states(system)
     states, count = len(system.states), len(moving)
     initial = [float(x) for x in system.initial] + list(np.eye(count).ravel())
     equations = tangent_equations(system, moving)
-    integrator = hy.taylor_adaptive(equations, initial, time=start, compact_mode=True)
+    integrator = interruptible(lambda: hy.taylor_adaptive(equations, initial, time=start, compact_mode=True))
     intervals = max(1, math.ceil((end - start) / _INTERVAL))
     stride = max(1, math.ceil(intervals / _MOST_ROWS))
     if done is None or done.state.shape != (len(initial),):  # none, or one of another version
@@ -132,7 +135,10 @@ def lyapunov_spectrum(
         integrator.state[:] = done.state
     for number in range(done.number + 1, intervals + 1):
         time = start + (end - start) * number / intervals
-        outcome = integrator.propagate_until(time)[0]
+        for _ in range(_MOST_CHUNKS):
+            outcome = integrator.propagate_until(time, max_steps=_CHUNK)[0]
+            if outcome != hy.taylor_outcome.step_limit or not go_on(done):
+                break
         tangents = np.array(integrator.state[states:]).reshape(count, count)
         if outcome != hy.taylor_outcome.time_limit or not np.isfinite(tangents).all():
             return None

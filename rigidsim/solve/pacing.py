@@ -46,7 +46,8 @@ class Pacing:
         patience: seconds until samples of a slow run are handed over.
         rows_at_once: samples in a block that is evaluated; more are no faster, and take memory.
         wide_rows_at_once: likewise of a closed form beyond double, where a row takes about a millisecond.
-        rows_waiting: samples in memory before they are evaluated, however fast they come.
+        rows_waiting: samples in memory before they are evaluated, however fast they come; no more than are
+            evaluated in the time of a chunk.
         grid_rows: most samples in a stride, which can't be shortened, for it to be taken as a grid; bounds
             the memory, about 8 MB in double precision.
         grid_strides: per sample, up to which grids (20 us each) cost less than skipping to each (85 us).
@@ -61,7 +62,7 @@ class Pacing:
         fading: of the longest step of late, per chunk.
     """
 
-    chunk_seconds: float = 0.1
+    chunk_seconds: float = 0.05
     patience: float = 2.0
     rows_at_once: int = 8192
     wide_rows_at_once: int = 64
@@ -99,12 +100,6 @@ class WayFinder:
         self._last = float(clock.at(clock.count - 1))
         self._paces: dict[Way, float] = {}  # steps per second, as measured last
         self.longest = 0.0
-
-    @property
-    def steps_left(self) -> float:
-        """To the last sample, in steps like the longest of the latest call; infinity where it had no size."""
-        size = self._corrected.stepper.largest
-        return (self._last - float(self._corrected.stepper.time)) / size if size > 0 else float("inf")
 
     def measured(self, way: Way, steps: int, seconds: float) -> None:
         """So many steps took so long; single ones are to be measured before anything is chosen."""
@@ -163,5 +158,8 @@ class WayFinder:
     def _grid_steps(self, left: int) -> int:
         """Whole strides, or all that is left and more: what a grid leaves over would go step by step."""
         stride = self._corrected.stride
-        count = min(self._most(Way.GRID), left + left // 2 + self._pacing.least_grid_steps)
+        most = self._most(Way.GRID)
+        if 2 * most >= stride:  # what a part of a stride leaves over goes step by step
+            most = max(most, stride)
+        count = min(most, left + left // 2 + self._pacing.least_grid_steps)
         return count - count % stride if count > stride else count

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import time
+from bisect import bisect_right
 
 import numpy as np
 
+from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 
+_FEWEST_ROWS = 8  # that may wait: some tens of milliseconds at 250 digits
+_GROWTH = 4  # of the rows that may wait, from one hand-over to the next
+_FIRST_ROWS = 16  # looked at for those before a limit
+
 
 class SampleBuffer:
-    """Collects samples and hands them over in blocks of bounded size.
+    """Collects samples and hands them over in blocks of bounded size and, as far as was seen, duration.
 
     Attributes:
         handed: samples handed over so far.
@@ -27,6 +33,9 @@ class SampleBuffer:
         self._pacing = pacing
         self.handed = self.count = first
         self._blocks: list[SampleBlock] = []
+        self._boundaries: list[StepBoundary] = []
+        self._most = _FEWEST_ROWS
+        self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
         self._upcoming: tuple[int, Scalar] | None = None
 
@@ -36,9 +45,14 @@ class SampleBuffer:
         return self.count >= self._clock.count
 
     @property
+    def room(self) -> int:
+        """How many more may be found before those that wait are handed over."""
+        return self._most - (self.count - self.handed)
+
+    @property
     def full(self) -> bool:
         """Whether so many wait that they are to be handed over before more are found."""
-        return self.count - self.handed >= self._pacing.rows_waiting
+        return self.room <= 0
 
     @property
     def upcoming(self) -> Scalar:
@@ -47,43 +61,67 @@ class SampleBuffer:
             self._upcoming = self.count, self._clock.at(self.count)
         return self._upcoming[1]
 
-    def until(self, limit: Scalar) -> np.ndarray:
-        """Times of the next samples that lie at or before ``limit``."""
+    def until(self, limit: Scalar, most: int) -> np.ndarray:
+        """Times of the next samples that lie at or before ``limit``, at most so many."""
         pieces = []
-        position, rows = self.count, self._pacing.rows_at_once
-        while position < self._clock.count:
-            times = self._clock.internal(position, min(position + rows, self._clock.count))
+        position, rows = self.count, min(_FIRST_ROWS, self._pacing.rows_at_once)
+        stop = min(self._clock.count, position + max(most, 0))
+        while position < stop:
+            times = self._clock.internal(position, min(position + rows, stop))
             inside = int(np.count_nonzero(times <= limit))
             pieces.append(times[:inside])
             position += inside
             if inside < len(times):
                 break
+            rows = min(_GROWTH * rows, self._pacing.rows_at_once)
         return np.concatenate(pieces) if pieces else self._clock.internal(0, 0)
 
-    def take(self, block: SampleBlock) -> None:
-        """The next samples."""
+    def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
+        """The next samples, and a step boundary before them."""
         if len(block):
             self._blocks.append(block)
+            self._boundaries.append(boundary)
             self.count += len(block)
 
-    def drop_after(self, limit: Scalar) -> None:
-        """Forget samples past a time that are not handed over yet (an event that ends the run)."""
-        kept = [block.rows(0, int(np.count_nonzero(block.times <= limit))) for block in self._blocks]
-        self._blocks = [block for block in kept if len(block)]
-        self.count = self.handed + sum(map(len, self._blocks))
+    def back_to(self, count: int) -> None:
+        """Forget what was found since so many samples were known."""
+        while self._blocks and self._blocks[-1].first >= count:
+            self._blocks.pop()
+            self._boundaries.pop()
+        self.count = max(count, self.handed)
 
-    def hand_over(self, *, patiently: bool = False) -> None:
-        """Give what is collected to the receiver; ``patiently``: only where it is much, or old."""
-        rows = self._pacing.rows_at_once
+    def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
+        """Give what is collected to the receiver; ``patiently``: only where it is much, or old.
+
+        Returns:
+            Where the receiver wants no sample past one of them: its index and a boundary before it; the
+            others are dropped.
+        """
+        waiting, rows = self.count - self.handed, self._pacing.rows_at_once
         waited = time.perf_counter() - self._handed_at
-        if patiently and self.count - self.handed < rows and waited < self._pacing.patience:
-            return
-        self._handed_at = time.perf_counter()
+        if patiently and waiting < min(rows, self._most) and waited < self._pacing.patience:
+            return None
+        started = self._handed_at = time.perf_counter()
         if not self._blocks:
-            return
-        whole = SampleBlock.joined(self._blocks)
-        self._blocks = []
+            return None
+        whole, firsts = SampleBlock.joined(self._blocks), [block.first for block in self._blocks]
+        boundaries, self._blocks, self._boundaries = self._boundaries, [], []
         for start in range(0, len(whole), rows):
             block = whole.rows(start, start + rows)
             self._receiver.take(block)
             self.handed += len(block)
+            last = self._receiver.last_wanted
+            if last is not None:
+                self.count = self.handed = last + 1
+                return last, boundaries[bisect_right(firsts, last) - 1]
+        self.took("hand over", waiting, time.perf_counter() - started)
+        return None
+
+    def took(self, work: str, rows: int, seconds: float) -> None:
+        """Learn how many samples may wait: as many as each work on them gets done in the time of a chunk."""
+        if rows < _FEWEST_ROWS:  # they tell little of the cost of a row
+            return
+        pacing = self._pacing
+        self._affordable[work] = int(rows * pacing.chunk_seconds / max(seconds, 1e-9))
+        affordable = max(min(self._affordable.values()), _FEWEST_ROWS)
+        self._most = min(affordable, _GROWTH * self._most, pacing.rows_waiting)

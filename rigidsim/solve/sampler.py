@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.sample_block import SampleBlock
@@ -50,8 +52,31 @@ Check = Callable[[Progress], Status | None]
 """Looks at guards and interruptions between chunks; a status ends the run."""
 
 
+States = Callable[[np.ndarray], np.ndarray]
+"""From sample times (n,) to states (n, states), both in internal units."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Steps just taken, whose samples are still to be taken: in one step there can be any number of them.
+
+    Attributes:
+        boundary: before the steps.
+        states: their dense output.
+    """
+
+    boundary: StepBoundary
+    states: States
+
+
 class SampleReceiver(Protocol):
-    """Takes samples in order, and is told when what it took can be saved; by itself it is never due."""
+    """Takes samples in order, and is told when what it took can be saved; by itself it is never due.
+
+    Attributes:
+        last_wanted: index of a sample that ends the run by the guard ``max_drift``; those after it were left.
+    """
+
+    last_wanted: int | None = None
 
     def take(self, block: SampleBlock) -> None:
         """The samples that follow those taken before."""

@@ -16,6 +16,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
@@ -24,6 +25,9 @@ _FAR = 1e300  # a target that no run reaches: propagation ends by the count of s
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
 _LONGEST_STEP = 2.0**30
+_MOST_TO_WHOLE_TIME = 1000  # steps
+_HOPELESS_STEPS = 1e15  # to the last sample; at the fastest pace they would take years
+_TINY_STEPS = 32  # one after the other, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
 
 
@@ -36,6 +40,7 @@ class Mark:
         state: (states,), internal units.
         events, steps: how many were found and taken so far.
         switching: what a motion with switching surfaces remembers (``rigidsim.solve.switching``).
+        tiny: steps, the latest ones, that were too small (``Stepper.collapsed``).
     """
 
     time: tuple[Scalar, Scalar]
@@ -43,6 +48,7 @@ class Mark:
     events: int = 0
     steps: int = 0
     switching: tuple[float, ...] = ()
+    tiny: int = 0
 
 
 class Watcher(Protocol):
@@ -68,6 +74,10 @@ class Stepper:
         smallest, largest: step sizes of the latest call, internal units.
         single_steps: whether all ways go step by step.
         failure: why the latest step couldn't be taken, where its state is finite; empty otherwise.
+        destination: time of the last sample, internal units; None where steps may become as small as they
+            like.
+        unresolved: whether several steps were taken at once of which some are tiny, so that they have to be
+            taken back and taken one by one, for ``collapsed`` to be told from the motion alone.
     """
 
     single_steps = False
@@ -95,6 +105,10 @@ class Stepper:
         self.steps = 0
         self.smallest = self.largest = 0.0
         self.failure = ""
+        self.destination: float | None = None
+        self.unresolved = False
+        self._tiny = 0
+        self._epsilon = float(precision.epsilon)
 
     def settle(self) -> None:
         """Take note that the state was set from outside."""
@@ -117,7 +131,8 @@ class Stepper:
         """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
         if chart not in self._charts:
             assert self.system.partner is not None
-            self._charts[chart] = self._compiled(self.system.partner)
+            partner = self.system.partner
+            self._charts[chart] = interruptible(lambda: self._compiled(partner))
         time = self._integrator.dtime
         self._integrator = self._charts[chart]
         self._integrator.dtime = time
@@ -145,23 +160,31 @@ class Stepper:
 
     def mark(self) -> Mark:
         """Remember this boundary."""
-        return Mark(self._integrator.dtime, np.array(self._integrator.state), len(self.log.found), self.steps)
+        engine, found = self._integrator, len(self.log.found)
+        return Mark(engine.dtime, np.array(engine.state), found, self.steps, tiny=self._tiny)
 
     def back_to(self, mark: Mark) -> None:
         """Return to a boundary."""
         self._integrator.dtime = mark.time
         self._integrator.state[:] = mark.state
         self.log.back_to(mark.events)
-        self.steps = mark.steps
+        self.steps, self._tiny, self.unresolved = mark.steps, mark.tiny, False
 
     @property
     def at_whole_time(self) -> bool:
         """Whether time is a single number, as ``grid`` needs it."""
         return bool(self._integrator.dtime[1] == 0)
 
-    def to_whole_time(self) -> None:
-        """Go to the high part of time: a step of at most half its last bit, in either direction."""
-        self._integrator.propagate_until(self._integrator.time)
+    def to_whole_time(self) -> bool:
+        """Go to the high part of time: a step of at most half its last bit, in either direction. Where that
+        takes too many natural steps, being so small, it stays where it is, and returns False.
+        """
+        mark, integrator = self.mark(), self._integrator
+        outcome = integrator.propagate_until(integrator.time, max_steps=_MOST_TO_WHOLE_TIME)[0]
+        if outcome == hy.taylor_outcome.time_limit:
+            return True
+        self.back_to(mark)
+        return False
 
     def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
         """``count`` steps from a whole time: whether all went well, and the states (n, states) at those
@@ -169,22 +192,25 @@ class Stepper:
         """
         ends = np.array([self._integrator.time, self._far], dtype=times.dtype)
         first = int(len(times) > 0 and times[0] == ends[0])
+        before = self._integrator.dtime
         outcome, smallest, largest, taken, _, states = self._integrator.propagate_grid(
             np.concatenate([ends[:1], times[first:], ends[1:]]),
             max_steps=count,
             max_delta_t=self._longest,
             callback=self._watched(),
         )
-        return self._account(outcome, smallest, largest, taken), states[1 - first :]
+        return self._account(before, outcome, smallest, largest, taken), states[1 - first :]
 
     def step(self) -> bool:
         """One step with dense output; False when the state is no longer finite."""
         self._watched()
+        before = self._integrator.time
         outcome, size = self._integrator.step(self._longest, write_tc=True)
         self.smallest = self.largest = abs(float(size))
         if outcome == hy.taylor_outcome.err_nf_state:
             return False
         self.steps += 1
+        self._judge(before, 1)
         if self.watcher is not None:
             self.watcher(self._integrator)
         return True
@@ -197,6 +223,7 @@ class Stepper:
         """At most ``count`` steps without dense output, fewer where the watcher ends the call; False when the
         state is no longer finite.
         """
+        before = self._integrator.dtime
         outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
             self._far,
             max_steps=count,
@@ -204,7 +231,7 @@ class Stepper:
             callback=self._watched(),
             write_tc=self.watcher is not None,
         )
-        return self._account(outcome, smallest, largest, taken)
+        return self._account(before, outcome, smallest, largest, taken)
 
     def to(self, time: float) -> bool:
         """Go exactly to a time, with a shortened last step: for comparisons, never for a run's samples."""
@@ -215,6 +242,7 @@ class Stepper:
         """``count`` steps with dense output: whether all went well, and a function of times (n,) that
         returns states (n, states).
         """
+        before = self._integrator.dtime
         outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
             self._far,
             max_steps=count,
@@ -223,11 +251,41 @@ class Stepper:
             callback=self._watched(),
             write_tc=self.watcher is not None,
         )
-        return self._account(outcome, smallest, largest, taken), output
+        return self._account(before, outcome, smallest, largest, taken), output
 
-    def _account(self, outcome: hy.taylor_outcome, smallest: Scalar, largest: Scalar, taken: int) -> bool:
+    def _account(
+        self,
+        before: tuple[Scalar, Scalar],
+        outcome: hy.taylor_outcome,
+        smallest: Scalar,
+        largest: Scalar,
+        taken: int,
+    ) -> bool:
         self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
-        if taken and self.largest == 0.0:  # heyoka leaves out steps of the greatest size allowed
+        if taken and self.largest == 0.0 and self._integrator.dtime != before:
+            # heyoka leaves out steps of the greatest size allowed
             self.smallest = self.largest = float(self._longest)
         self.steps += int(taken)
+        self._judge(before[0], int(taken))
         return bool(outcome != hy.taylor_outcome.err_nf_state)
+
+    @property
+    def collapsed(self) -> bool:
+        """Whether the latest steps were all so small that time, as a single number, doesn't resolve them, and
+        that more than can ever be taken are left to the last sample.
+        """
+        return self._tiny >= _TINY_STEPS
+
+    def _judge(self, before: Scalar, taken: int) -> None:
+        """Count tiny steps, as far as they come one by one."""
+        if self.destination is None or not taken:
+            return
+        begin, end = float(before), float(self._integrator.time)
+        size = self.largest if taken == 1 else self.smallest  # a step that ends on a surface may be any size
+        resolved = self._epsilon * (abs(end) if taken == 1 else max(abs(begin), abs(end)))
+        if not (size < resolved and size * _HOPELESS_STEPS < self.destination - begin):
+            self._tiny = 0
+        elif taken == 1:
+            self._tiny += 1
+        else:
+            self.unresolved = True

@@ -65,7 +65,7 @@ class SwitchingStepper(SwitchedEngines):
             if not fine:
                 return False
             smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            if not on:
+            if not on or self.collapsed:
                 break
         self.smallest, self.largest = smallest, largest
         return True
@@ -131,6 +131,7 @@ class SwitchingStepper(SwitchedEngines):
         self._dense = begun
         self.smallest, self.largest = abs(float(size)), natural
         self.steps += 1
+        self._judge(time[0], 1)
         on = True if self.watcher is None else self.watcher(begun)
         self._follow()
         self._fresh = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, moti
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.session.storage import storage
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
@@ -23,8 +25,6 @@ from rigidsim.solve.sample_block import SampleBlock
 
 _PILOT_SECONDS = 0.5
 _LARGEST_CHUNK = 1024  # of steps: calls cost next to nothing
-_SHRINK = 0.9  # gzip on doubles whose low bits are noise; measured 0.85 to 0.95
-_TIMELINE_ROW_BYTES = 260.0  # measured; falls with repeated values
 _BASE_MEMORY = 250e6  # interpreter, libraries and compiled code
 _COMPRESSION = 2.5e-8  # seconds a byte: gzip 4 with shuffle writes about 40 MB/s
 _BUFFERING = 2e-7  # seconds a sample
@@ -35,16 +35,18 @@ def plan(
     experiment: Experiment,
     *,
     loads: Sequence[Load] = (),
+    out: str | Path = "runs",
     pilot_seconds: float = _PILOT_SECONDS,
 ) -> dict[str, Any]:
     """Explain and predict a run; integrates for about half a second and writes nothing.
 
     Args:
         loads: loads of one's own, as of ``rigidsim.run``.
+        out: folder of the run folders, on whose disk there is room or not.
         pilot_seconds: CPU seconds to integrate, at most; some thousands of steps tell the mean.
 
     Returns:
-        A JSON-like dictionary: states, reasons, invariants, steps, seconds, bytes.
+        A JSON-like dictionary: states, reasons, invariants, steps, seconds, bytes, warnings.
 
     Raises:
         ConfigError: the config can't be run.
@@ -68,9 +70,8 @@ def plan(
     duration = float(prepared.scene.samples.last - prepared.scene.start)
     steps = max(1.0, duration / step)
     samples = prepared.clock.count
-    row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
-    rows_shown = min(samples, prepared.scene.config.output.timeline_rows)
-    seconds_per_sample = _seconds_per_sample(prepared, parts.corrected, parts.evaluator, row)
+    room = storage(prepared, Path(out) / prepared.scene.name)
+    seconds_per_sample = _seconds_per_sample(prepared, parts.corrected, parts.evaluator, room.row)
     integrate = steps * pilot.seconds_per_step
     record = samples * seconds_per_sample
     system = prepared.system
@@ -116,16 +117,17 @@ def plan(
             "integration_seconds": integrate,
             "recording_seconds": record,
             "total_seconds": compile_seconds + integrate + record,
-            "memory_bytes": _BASE_MEMORY + min(samples * row, 64e6) * 3,
-            "dataset_bytes": samples * row * _SHRINK,
-            "timeline_bytes": rows_shown * _TIMELINE_ROW_BYTES
-            if prepared.scene.config.output.timeline
-            else 0.0,
+            "memory_bytes": _BASE_MEMORY + min(room.segments, 64e6) * 3,
+            "segment_bytes": room.segments,
+            "dataset_bytes": room.dataset,
+            "timeline_bytes": room.timeline,
+            "free_bytes": room.free,
             "attitude_error_rad": None
             if system.requirements.formulation == "rates"
             else attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth),
             "amplification": growth.at(duration),
         },
+        "warnings": [] if room.problem is None else [f"the run {room.problem}"],
         "body": {
             "source": prepared.scene.body.source,
             "principal_moments": [float(m) for m in prepared.scene.body.principal_moments],

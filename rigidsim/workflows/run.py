@@ -11,6 +11,7 @@ from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import ConfigError
 from rigidsim.session.guards import Observer
 from rigidsim.session.session import Session
+from rigidsim.session.storage import refuse_too_large
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.problem import prepare
 from rigidsim.store.folder import RunFolder
@@ -46,7 +47,7 @@ def run(
 
     Raises:
         ConfigError: the config can't be run; nothing was written.
-        RunFolderError: the run folder is in use or can't be written.
+        RunFolderError: the run folder is in use or can't be written, or the run doesn't fit on its disk.
     """
     if not isinstance(experiment, Experiment):
         experiment = load(experiment)
@@ -67,6 +68,7 @@ def run(
             session.phases.next("choose")
         prepared = prepare(setting, loads=loads)
         folder = RunFolder(Path(out) / prepared.scene.name)
+        refuse_too_large(prepared, folder.path)
         with folder.locked():
             folder.begin(setting.text, force=force or beyond is not None)
             result = session.execute(prepared, folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import time
@@ -21,6 +22,7 @@ Config = Callable[..., str]
 Start = Callable[..., subprocess.Popen[str]]
 
 FOREVER = 1e9
+GUARDED = "[limits]\nwall_time = 3600"  # a run that may be stopped isn't refused for want of room
 PATIENCE = 2.0  # seconds; half a second is promised, measured are 0.2 to 0.4, and machines are noisy
 
 # precision, spacing of the samples in seconds, signal
@@ -53,7 +55,8 @@ def assert_first_samples(partial: xarray.Dataset, full: xarray.Dataset) -> int:
 @pytest.mark.parametrize("case", cases(LONG, ("double, dense", "double, sparse", "quadruple, dense")))
 def test_an_interrupted_run_keeps_what_it_has(case: str, config: Config, start: Start) -> None:
     precision, spacing, number = LONG[case]
-    name = config(time=f"end = {FOREVER}\nevery = {spacing}", integrator=f"precision = {precision}")
+    long = f"end = {FOREVER}\nevery = {spacing}"
+    name = config(time=long, integrator=f"precision = {precision}", rest=GUARDED)
     process = start("run", name)
     integrating(process)
     time.sleep(0.6)
@@ -84,8 +87,77 @@ def test_an_interrupted_run_keeps_what_it_has(case: str, config: Config, start: 
         assert assert_first_samples(partial, whole) > 1
 
 
+# samples, precision, method
+CROWDED = {
+    "double": (10**10, '"double"', "taylor"),
+    "80 bits": (10**9, '"extended"', "taylor"),
+    "50 digits": (10**10, "50", "taylor"),
+    "closed form": (10**10, '"double"', "closed_form"),
+}
+MEMORY = 400e6  # bytes; measured are 170 to 270 MB, most of them libraries and compiled code
+
+
+@pytest.mark.parametrize("case", CROWDED)
+def test_any_number_of_samples_in_a_step(case: str, config: Config, start: Start) -> None:
+    """Billions of them: a run keeps to its memory, answers Ctrl-C at once, and keeps what it has."""
+    samples, precision, method = CROWDED[case]
+    name = config(
+        time=f"end = 10\nsamples = {samples + 1}",
+        integrator=f'precision = {precision}\nmethod = "{method}"',
+        rest=GUARDED,
+    )
+    process = start("run", name)
+    integrating(process)
+    time.sleep(0.8)
+    before = cpu_seconds(process.pid)
+    peak = memory(process.pid)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert peak < MEMORY
+    run = rigidsim.open_run("runs/free")
+    assert run.status == "interrupted"
+    assert run.summary["cost"]["steps"] < 10
+    assert run.summary["samples"] > 100
+    # all work after the signal; of the whole process, less what it had worked before
+    assert run.summary["cost"]["cpu_seconds"] < before + PATIENCE
+    with run.dataset as dataset:
+        np.testing.assert_array_equal(dataset.time[:3], np.arange(3) * 10 / samples)
+
+
+def cpu_seconds(pid: int) -> float:
+    """User and system time of a process so far."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory(pid: int) -> float:
+    """The most that a process has had so far, bytes."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    return 1024.0 * int(status.split("VmHWM:")[1].split()[0])
+
+
+def test_ctrl_c_while_the_engine_is_compiled(config: Config, start: Start) -> None:
+    """Which takes seconds, and here a minute: nobody waits for it."""
+    prelude = (
+        "import sys, time, heyoka\n"
+        "def slow(*_, **__):\n"
+        "    print('compiling: integrating into', file=sys.stderr, flush=True)\n"
+        "    time.sleep(60)\n"
+        "heyoka.taylor_adaptive = slow"
+    )
+    process = start("run", config(), prelude=prelude)
+    integrating(process)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130, err
+    assert "rigidsim: interrupted" in err
+    assert "Traceback" not in err
+    assert rigidsim.resume("runs/free").status == "finished"
+
+
 def test_an_interruption_ends_the_whole_command(config: Config, start: Start) -> None:
-    long = config("a", time=f"end = {FOREVER}\nevery = 1")
+    long = config("a", time=f"end = {FOREVER}\nevery = 1", rest=GUARDED)
     process = start("run", long, config("b"))
     integrating(process)
     process.send_signal(signal.SIGINT)
@@ -96,7 +168,7 @@ def test_an_interruption_ends_the_whole_command(config: Config, start: Start) ->
 
 def test_a_killed_run_opens_as_running(config: Config, start: Start) -> None:
     """Before its first segment, when nothing is saved yet."""
-    process = start("run", config(time=f"end = {FOREVER}\nevery = 1"))
+    process = start("run", config(time=f"end = {FOREVER}\nevery = 1", rest=GUARDED))
     integrating(process)
     time.sleep(0.2)
     process.send_signal(signal.SIGKILL)
@@ -112,7 +184,7 @@ def test_a_killed_run_opens_as_running(config: Config, start: Start) -> None:
 def test_a_killed_run_keeps_its_segments(config: Config, start: Start) -> None:
     process = start(
         "run",
-        config(time=f"end = {FOREVER}\nevery = 0.125", integrator='precision = "quadruple"'),
+        config(time=f"end = {FOREVER}\nevery = 0.125", integrator='precision = "quadruple"', rest=GUARDED),
         prelude=OFTEN,
     )
     integrating(process)

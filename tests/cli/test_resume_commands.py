@@ -96,7 +96,7 @@ def test_sigterm_while_the_equations_are_compiled(config: Config, start: Start) 
 
 
 def test_two_processes_on_one_folder(config: Config, start: Start, rigidsim_command: Command) -> None:
-    process = start("run", config(time="end = 1e9\nevery = 1"))
+    process = start("run", config(time="end = 1e9\nevery = 1", rest="[limits]\nwall_time = 3600"))
     deadline = time.monotonic() + 60
     while not Path("runs/free/segments").exists():
         assert time.monotonic() < deadline

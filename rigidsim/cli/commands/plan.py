@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
-from rigidsim.cli.options import ConfigPath, JsonOption, SetOption
+from rigidsim.cli.options import ConfigPath, JsonOption, OutOption, SetOption
 
 
-def plan(config: ConfigPath, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+def plan(
+    config: ConfigPath,
+    overrides: SetOption = None,
+    out: OutOption = Path("runs"),
+    as_json: JsonOption = False,
+) -> None:
     """Explain what would be integrated and why; predict steps, time, memory and file sizes.
 
     Example: rigidsim plan configs/heavy_top_nutating.toml
@@ -16,7 +22,7 @@ def plan(config: ConfigPath, overrides: SetOption = None, as_json: JsonOption = 
     from rigidsim.workflows.plan import plan as make_plan
     from rigidsim.workflows.read import load
 
-    made = make_plan(load(config, overrides=overrides or []))
+    made = make_plan(load(config, overrides=overrides or []), out=out)
     if as_json:
         print(json.dumps(made))
     else:

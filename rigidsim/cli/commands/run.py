@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rigidsim.cli.options import JsonOption, SetOption, print_run
+from rigidsim.cli.options import JsonOption, OutOption, SetOption, print_run
 from rigidsim.errors import RigidsimError
 
 
@@ -20,9 +20,7 @@ def run(
         Path | None,
         typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds."),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")] = Path(
-        "runs"
-    ),
+    out: OutOption = Path("runs"),
     overrides: SetOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
     as_json: JsonOption = False,

@@ -56,6 +56,7 @@ class ClosedFormSampler:
     def run(self) -> Progress:
         """Go on until the last sample is recorded or something ends the run."""
         progress, clock = self.progress, self._clock
+        started: float | None = None
         while progress.next_sample < clock.count:
             if self._receiver.due():
                 self._receiver.save(self.position())
@@ -69,7 +70,13 @@ class ClosedFormSampler:
             states = self._form.states(self._system, self._precision, times, clock.start)
             progress.integration_seconds += time.perf_counter() - started
             self._receiver.take(SampleBlock.of(first, times, states, self._begin.angles))
-            progress.next_sample += len(times)
-            progress.time = float(times[-1]) * 2.0**clock.exponent
-        progress.status = Status.FINISHED
+            last = self._receiver.last_wanted
+            progress.next_sample = first + len(times) if last is None else last + 1
+            progress.time = float(times[progress.next_sample - first - 1]) * 2.0**clock.exponent
+            if last is not None:
+                progress.status = Status.MAX_DRIFT
+                return progress
+        # a sample of an earlier session, the last one, may have passed the guard
+        past = started is None and self._check(progress) is Status.MAX_DRIFT
+        progress.status = Status.MAX_DRIFT if past else Status.FINISHED
         return progress

@@ -1,0 +1,89 @@
+"""What a run takes on its disk until it is complete, and whether there is room for it."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigidsim.errors import RunFolderError
+from rigidsim.session.variables import dataset_variables
+from rigidsim.solve.problem import InitialValueProblem
+
+_SHRINK = 0.9  # gzip on doubles whose low bits are noise; measured 0.85 to 0.95
+_TIMELINE_ROW_BYTES = 260.0  # measured; falls with repeated values
+
+
+@dataclass(frozen=True)
+class Storage:
+    """Predicted bytes.
+
+    Attributes:
+        row: of a sample in memory and in a segment.
+        segments: of all samples; they go when the dataset is complete.
+        free: on the disk of the run folder, as far as it can be told.
+    """
+
+    row: float
+    segments: float
+    dataset: float
+    timeline: float
+    free: float
+
+    @property
+    def needed(self) -> float:
+        """At the end all of them are there at once."""
+        return self.segments + self.dataset + self.timeline
+
+    @property
+    def problem(self) -> str | None:
+        """What is said where there is too little room; None where there is enough."""
+        if self.needed <= self.free:
+            return None
+        return (
+            f"takes about {_size(self.needed)} of space until it is complete ({_size(self.segments)} of "
+            f"segments, {_size(self.dataset)} of dataset.h5), and {_size(self.free)} are free there; take "
+            "fewer [time] samples, record less ([output] record), choose another --out, or, where a part of "
+            'it will do, say in [limits] when it may stop, such as wall_time = "1 h"'
+        )
+
+
+def storage(prepared: InitialValueProblem, place: Path) -> Storage:
+    """What a run in a folder, which need not exist, would take; a part of it where a guard or an event ends
+    it.
+    """
+    samples, output = prepared.clock.count, prepared.scene.config.output
+    row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
+    shown = min(samples, output.timeline_rows) if output.timeline else 0
+    there = next(folder for folder in [place.absolute(), *place.absolute().parents] if folder.exists())
+    replaced = sum(file.stat().st_size for file in place.glob("**/*") if file.is_file())
+    return Storage(
+        row=row,
+        segments=samples * row,
+        dataset=samples * row * _SHRINK,
+        timeline=shown * _TIMELINE_ROW_BYTES,
+        free=shutil.disk_usage(there).free + float(replaced),
+    )
+
+
+def refuse_too_large(prepared: InitialValueProblem, place: Path) -> None:
+    """Before a run that can only end at its last sample fills a disk.
+
+    Raises:
+        RunFolderError: what it is predicted to take doesn't fit.
+    """
+    limits = prepared.scene.config.limits
+    guarded = (limits.wall_time, limits.max_steps, limits.max_drift) != (None, None, None)
+    if guarded or any(crossing.stop for crossing in prepared.system.crossings):
+        return
+    problem = storage(prepared, place).problem
+    if problem is not None:
+        raise RunFolderError(f"{place}: the run {problem}")
+
+
+def _size(count: float) -> str:
+    for unit, factor in (("EB", 1e18), ("PB", 1e15), ("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
+        if count >= factor:
+            return f"{count / factor:.3g} {unit}"
+    return f"{count / 1e3:.3g} kB"

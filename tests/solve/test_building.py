@@ -1,0 +1,72 @@
+"""Compiling doesn't keep Ctrl-C waiting."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support import config, run_text, same_bits
+
+import rigidsim
+from rigidsim.model.system import System
+from rigidsim.solve.building import building, interruptible
+from rigidsim.solve.stepper import Stepper
+
+AWAKE = 60.0  # seconds that nobody waits for
+
+
+def test_a_signal_ends_the_wait() -> None:
+    never, before = threading.Event(), signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.05, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            interruptible(lambda: never.wait(AWAKE))
+        assert building()
+    finally:
+        signal.signal(signal.SIGINT, before)
+        never.set()
+
+
+def test_what_is_made_or_raised_comes_back() -> None:
+    assert interruptible(threading.current_thread) is not threading.main_thread()
+    with pytest.raises(ZeroDivisionError):
+        interruptible(lambda: 1 // 0)
+    inside: list[bool] = []
+
+    def work() -> None:  # signals reach the main thread alone
+        inside.append(interruptible(threading.current_thread) is threading.current_thread())
+
+    other = threading.Thread(target=work)
+    other.start()
+    other.join()
+    assert inside == [True]
+
+
+def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the middle of a chunk of steps: what was integrated before it is kept, and resumed with the bits of
+    a run in one go.
+    """
+    text = config(time="end = 60\nsamples = 241", integrator='formulation = "euler_angles"')
+    whole = run_text(text, tmp_path / "whole")
+    assert whole.summary["chart_changes"]["count"] > 0
+    compiled: Callable[[Stepper, System], Any] = Stepper._compiled
+    never = threading.Event()
+
+    def interrupted(self: Stepper, system: System) -> Any:
+        if system is self.system.partner:
+            os.kill(os.getpid(), signal.SIGINT)
+            never.wait(AWAKE)
+        return compiled(self, system)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Stepper, "_compiled", interrupted)
+        run = run_text(text, tmp_path / "cut")
+    never.set()
+    assert run.status == "interrupted"
+    assert run.summary["samples"] < 241
+    same_bits(rigidsim.resume(run.folder.path), whole)
