@@ -123,8 +123,26 @@ def test_turns_that_nobody_knows_are_not_shown(runs: Path) -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["φ", "θ", "ψ"]
 
 
-def test_samples_beside_switching_surfaces_too(runs: Path) -> None:
-    torque = 'kind = "torque"\ncomponents = ["0.01*sign(wx)", 0, 0]'
+def test_turns_of_a_motion_with_switching_surfaces(runs: Path) -> None:
+    """Coulomb friction brings the body to rest after 40 turns; a switched torque turns it back and forth."""
+    body, start = SYMMETRIC, "angular_velocity = [0, 0, 10]\neuler_angles = [0.2, 1, 0]"
+    friction = 'kind = "torque"\ncomponents = [0, 0, "-0.3*sign(wz)"]'
+    run = run_text(config(body, start, friction, "times = [0, 20, 70, 90]", "", ANGLES), runs, 'name="a"')
+    # w = 10 - 0.2 t until 50 s
+    assert run.dataset["euler_angles"].values[:, 2] == pytest.approx([0, 160, 250, 250], abs=1e-6)
+    switched = 'kind = "torque"\ncomponents = ["0.1*sign(sin(t))", 0, "0.05*abs(wy)"]'
+    sparse, dense = (
+        run_text(config(loads=switched, time=f"end = 40\nsamples = {n}", output=ANGLES), runs, f'name="{n}"')
+        for n in (3, 401)
+    )
+    np.testing.assert_array_equal(
+        sparse.dataset["euler_angles"].values, dense.dataset["euler_angles"].values[::200]
+    )
+    assert not sparse.summary["warnings"]
+
+
+def test_turns_that_a_load_reads_are_not_counted_from_samples(runs: Path) -> None:
+    torque = 'kind = "torque"\ncomponents = ["-0.001*psi", 0, 0]'
     within_one_turn(run_text(config(loads=torque, time="end = 30\nsamples = 4", output=ANGLES), runs), 0.0)
     dense = run_text(config(loads=torque, time="end = 30\nsamples = 301", output=ANGLES), runs, 'name="d"')
     assert "angles_wrapped_from" not in dense.dataset.attrs
