@@ -116,12 +116,9 @@ def _rates(axes: Axes, dataset: xarray.Dataset) -> None:
 def _attitude(axes: Axes, dataset: xarray.Dataset) -> None:
     if "euler_angles" in dataset:
         values = np.rad2deg(_values(dataset, "euler_angles"))
-        lost = "angles_wrapped_from" in dataset.attrs
-        labels = ["φ", "θ", "ψ"]
-        if lost:  # within one turn, and sampled too sparsely for lines from one to the next
+        if lost := "angles_wrapped_from" in dataset.attrs:  # too sparse for lines from one to the next
             axes.set_prop_cycle(linestyle=["none"], marker=["."])
-        else:
-            values, labels = _without_growth(dataset, values)
+        values, labels = (values, ["φ", "θ", "ψ"]) if lost else _without_growth(dataset, values)
         _curves(axes, dataset, values, labels, PALETTE)
         axes.set_title("Euler angles" + (", within one turn" if lost else ""))
         axes.set_ylabel("angle [deg]")

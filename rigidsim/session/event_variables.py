@@ -36,18 +36,22 @@ def event_variables(
             values["time"].append(np.zeros(len(times)))
         for variable in variables:
             empty = [np.zeros((0, int(np.prod(variable.shape))))] * variable.parts
-            extras += _extras(crossing.name, variable, values.get(variable.name, empty), count)
+            wrapped = evaluator.sparse and variable.name == "euler_angles"
+            more = {"turns": "within one turn"} if wrapped else {}
+            extras += _extras(crossing.name, variable, values.get(variable.name, empty), count, more)
     return extras
 
 
-def _extras(event: str, variable: Variable, parts: list[np.ndarray], count: int) -> list[Extra]:
+def _extras(
+    event: str, variable: Variable, parts: list[np.ndarray], count: int, more: dict[str, str]
+) -> list[Extra]:
     dims = (event, *variable.dims)
     return [
         Extra(
             f"{event}_{name}",
             dims,
             values.reshape(count, *variable.shape),
-            {**variable.part_attributes(part), "event": event},
+            {**variable.part_attributes(part), **more, "event": event},
         )
         for part, (name, values) in enumerate(zip(variable.part_names(), parts, strict=True))
     ]

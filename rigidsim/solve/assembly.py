@@ -65,8 +65,7 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
         projection = Projection(system, precision, start)
     interval = steps_between(precision)
     corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
-    # on which side of its surfaces a motion is, and whether it slides there, a sample doesn't tell
-    countable = not system.switches
+    countable = not system.turning  # from samples alone nobody can tell what such a load does
     if prepared.closed is not None:
         countable = radians_between_samples(prepared) <= MOST_OF_A_CLOSED_FORM
     evaluator = Evaluator(system, precision, wrapping, countable=countable)

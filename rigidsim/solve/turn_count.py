@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import time as clock_time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
@@ -25,12 +25,14 @@ from rigidsim.model.system import System
 from rigidsim.scene.scene import SampleTimes
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
+from rigidsim.solve.switching_stepper import SwitchingStepper
 
 DENSE = 1.0
 """Angle (rad) by which a body turns at most between samples whose angles are joined to the nearest."""
 
 _PART = 0.5  # rad, that the body turns from one point to the next
 _CHUNK = 4096  # points, always as many, so that turns don't depend on timing
+_SWITCHING_CHUNK = 256  # where each step is taken by itself
 _STEPS = 50  # for each point, at most; a motion that takes more isn't followed
 _DOUBTFUL = 2.0  # rad: a jump by more is looked at in parts; one that is missed by a turn is larger than 4
 _FINER = 16  # parts of a part
@@ -97,6 +99,42 @@ def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.nd
     return np.flatnonzero((np.abs(jumps).max(axis=1) > _DOUBTFUL) & factor[:-1] & factor[1:])
 
 
+class _Plain:
+    """Follows a motion by the engine's own grids."""
+
+    def __init__(self, system: System, *, compact: bool) -> None:
+        start = np.zeros(len(system.states))
+        self._engine = hy.taylor_adaptive(system.equations, start, tol=_TOLERANCE, compact_mode=compact)
+
+    def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
+        """The states at ascending times (n,), from the first on; None where it comes to no end."""
+        self._engine.time = times[0]
+        self._engine.state[:] = state
+        outcome, *_, states = self._engine.propagate_grid(times, max_steps=_STEPS * len(times))
+        return np.asarray(states) if outcome == hy.taylor_outcome.time_limit else None
+
+
+class _Switching:
+    """Follows a motion with switching surfaces, step by step."""
+
+    def __init__(self, stepper: SwitchingStepper) -> None:
+        self._stepper = stepper
+
+    def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
+        """As ``_Plain.states``."""
+        stepper, found = self._stepper, [state]
+        stepper.back_to(replace(stepper.mark(), time=(float(times[0]), 0.0), state=state))
+        stepper.settle()
+        for _ in range(_STEPS * len(times)):
+            if not stepper.step():
+                return None
+            while len(found) < len(times) and times[len(found)] <= stepper.time:
+                found.append(stepper.dense(times[len(found)]))
+            if len(found) == len(times):
+                return np.array(found)
+        return None
+
+
 class TurnCounter:
     """Follows angles from sample to sample.
 
@@ -119,13 +157,13 @@ class TurnCounter:
         self._lost = False
         self._rate = self._bound
 
-    def follow(self, time: float, seconds: float = 0.1) -> None:
+    def follow(self, time: float, seconds: float = 0.3) -> None:
         """Go on towards the next sample as far as the run itself has come, for so long at most."""
         started = clock_time.perf_counter()
         while (
             self._place is not None
             and not self._lost
-            and self._time + _CHUNK * self._part <= time
+            and self._time + self._chunk * self._part <= time
             and clock_time.perf_counter() - started < seconds
         ):
             self._advance(time)
@@ -158,6 +196,7 @@ class TurnCounter:
         double = precision_of("double")
         system = self._exact.rounded(double.number)
         m, first = system.mechanics, self._angles.first
+        self._chunk = _CHUNK if not system.switches else _SWITCHING_CHUNK
         outputs = system.outputs[first : first + 3]
         squared = hy.sum([w * w for w in m.rates])
         self._attitude = [system.states.index(name) for name in m.carried(m.attitude).names]
@@ -165,12 +204,13 @@ class TurnCounter:
         rate = math.sqrt(3) * float(system.rate_bound)
         span = system.scene.samples
         radians = rate * float(span.exact_last - span.begin)
-        self._integrator = hy.taylor_adaptive(
-            system.equations,
-            np.zeros(len(system.states)),
-            tol=_TOLERANCE,
-            compact_mode=system.wide or radians < _WORTH_BUILDING,
-        )
+        compact = system.wide or radians < _WORTH_BUILDING
+        start = math.ldexp(float(span.begin), -system.scaling.time)
+        self._follower: _Plain | _Switching
+        if system.switches:
+            self._follower = _Switching(SwitchingStepper(system, double, _TOLERANCE, start))
+        else:
+            self._follower = _Plain(system, compact=compact)
         self._largest = math.ldexp(rate, system.scaling.time)
         self._built = True
 
@@ -178,19 +218,16 @@ class TurnCounter:
         """Times (n + 1,), states, angles (n + 1, 3) and largest rate from a time to another."""
         times = np.linspace(time, end, parts + 1)
         times[0], times[-1] = time, end
-        engine = self._integrator
-        engine.time = time
-        engine.state[:] = state
-        outcome, *_, states = engine.propagate_grid(times, max_steps=_STEPS * parts)
-        if outcome != hy.taylor_outcome.time_limit or not np.isfinite(states).all():
+        states = self._follower.states(times, state)
+        if states is None or not np.isfinite(states).all():
             return None
         values = np.asarray(self._function(np.ascontiguousarray(states.T)))
         return times, states, values[:3].T, np.sqrt(values[3].max())
 
     def _advance(self, limit: float) -> None:
         """A chunk of points, or as many as there are up to a time."""
-        parts = min(_CHUNK, max(1, math.ceil((limit - self._time) / self._part)))
-        end = limit if parts < _CHUNK else min(limit, self._time + _CHUNK * self._part)
+        parts = min(self._chunk, max(1, math.ceil((limit - self._time) / self._part)))
+        end = limit if parts < self._chunk else min(limit, self._time + self._chunk * self._part)
         found = self._path(self._time, self._state, end, parts)
         if found is None or not end > self._time:
             self._lost = True

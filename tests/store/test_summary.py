@@ -16,10 +16,11 @@ from rigidsim.errors import RunFolderError
 from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.summary import Brief, Caution, Summary, WarningCode, read_summary
 
-# hundreds of turns between samples, of angles that a run in quaternions doesn't carry: a warning is certain
+# hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
 BLURRED = (
     "[body]\nprincipal_moments = [1, 2, 2.5]\n[initial]\nangular_velocity = [0.3, 1.0, 0.5]\n"
-    '[time]\nend = 3000\nsamples = 3\n[output]\ntimeline = false\nrecord = ["euler_angles"]\n'
+    '[time]\nend = 3000\nsamples = 3\n[output]\ntimeline = false\nrecord = ["quaternion"]\n'
+    '[integrator]\nformulation = "rotation_matrix"\n'
 )
 
 

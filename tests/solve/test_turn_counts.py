@@ -1,0 +1,171 @@
+"""Turns of Euler angles are those of the motion, however far apart the samples lie."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from support import bits, config, loaded, run_text
+
+import rigidsim
+from rigidsim.look.panels import CURVES
+from rigidsim.solve.assembly import assemble
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.turn_count import Place, TurnCounter, angles_to_join
+
+pytestmark = pytest.mark.compact
+
+ANGLES = 'record = ["quaternion", "euler_angles"]'
+SYMMETRIC = "principal_moments = [1, 1, 1.5]"
+# L along Z: the axis keeps its tilt, and both other angles grow uniformly
+PRECESSING = "angular_momentum = [0, 0, 2]\neuler_angles = [0.3, 1.1, 0.2]"
+TUMBLING = {
+    "body": "principal_moments = [1, 2, 3]",
+    "initial": "angular_velocity = [0.5, 0.25, 1]\nquaternion = [0.5, 0.1, -0.3, 0.7]",
+    "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 0.1\n'
+    "orbit = {semi_major_axis = 1, eccentricity = 0.2, inclination = 0.5}",
+}
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        'formulation = "quaternion"',
+        'formulation = "rotation_matrix"',
+        'formulation = "euler_angles"',
+        'method = "closed_form"',
+        'precision = "single"',
+        'precision = "extended"',
+    ],
+)
+def test_a_body_turns_ten_thousand_radians_between_two_samples(integrator: str, runs: Path) -> None:
+    text = config(SYMMETRIC, PRECESSING, (), "end = 10000\nsamples = 3", integrator, ANGLES)
+    run = run_text(text, runs)
+    momentum, tilt, time = 2.0, 1.1, run.dataset["time"].values
+    expected = np.array([0.3, tilt, 0.2]) + np.outer(
+        time, [momentum / 1, 0, (1 / 1.5 - 1 / 1) * momentum * math.cos(tilt)]
+    )
+    assert expected[1, 0] == pytest.approx(10000, abs=1)
+    # single precision loses a radian's digits long before (eps abs(w) t); whole turns are what is counted
+    allowed = 1.0 if "single" in integrator else 1e-6
+    assert np.abs(run.dataset["euler_angles"].values - expected).max() < allowed
+    assert "angles_wrapped_from" not in run.dataset.attrs
+
+
+def test_an_earth_sampled_every_five_sidereal_days_turns_five_times(runs: Path) -> None:
+    day = "86164.0905"
+    start = f'angular_velocity = [0, 0, "1/{day} rev/s"]\neuler_angles = [0.4, "23.44 deg", 0.1]'
+    time = f"start = 0\nend = {5 * 100 * 86164.0905!r}\nsamples = 101"
+    body = "principal_moments = [8.008e37, 8.008e37, 8.034e37]"
+    run = run_text(config(body, start, (), time, "", ANGLES), runs)
+    turns = (run.dataset["euler_angles"].values - [0.4, math.radians(23.44), 0.1]) / (2 * math.pi)
+    np.testing.assert_allclose(turns[:, 2], 5.0 * np.arange(101), rtol=0, atol=1e-8)
+    assert np.abs(turns[:, :2]).max() < 1e-8
+    assert not run.summary["warnings"]
+
+
+@pytest.mark.parametrize("spacing", ["samples = 2", "samples = 41", "every = 0.05"])
+def test_a_tumbling_body_that_passes_poles_has_the_angles_that_states_have(spacing: str, runs: Path) -> None:
+    """Within 0.02 rad of the pole at 400.4 s the nearest angles of dense samples are a turn off, too."""
+    time = f"end = 402\n{spacing}"
+    ours = run_text(config(**TUMBLING, time=time, output=ANGLES), runs, 'name="a"')
+    states = run_text(
+        config(**TUMBLING, time="end = 402\nsamples = 2", integrator='formulation = "euler_angles"'),
+        runs, 'name="b"',
+    )  # fmt: skip
+    difference = ours.dataset["euler_angles"].values[-1] - states.dataset["euler_angles"].values[-1]
+    assert np.abs(difference).max() < 1e-6  # two integrations, far below a turn
+    assert not ours.summary["warnings"]
+
+
+def test_a_faster_spin_than_expected_is_counted(runs: Path) -> None:
+    """A torque about the axis speeds the body up to sixty times: psi = a t^2 / 2 + w t."""
+    body, start = SYMMETRIC, "angular_velocity = [0, 0, 1]\neuler_angles = [0, 1, 0]"
+    torque = 'kind = "torque"\ncomponents = [0, 0, "1.5*0.6"]'
+    run = run_text(config(body, start, torque, "end = 100\nsamples = 3", "", ANGLES), runs)
+    assert run.dataset["euler_angles"].values[:, 2] == pytest.approx([0, 800, 3100], abs=1e-6)
+
+
+def test_recording_angles_changes_no_bit_of_the_run(runs: Path) -> None:
+    with_angles = run_text(config(**TUMBLING, time="end = 300\nsamples = 4", output=ANGLES), runs, 'name="a"')
+    without = run_text(
+        config(**TUMBLING, time="end = 300\nsamples = 4", output='record = ["quaternion"]'), runs, 'name="b"'
+    )
+    np.testing.assert_array_equal(
+        bits(with_angles.dataset["quaternion"]), bits(without.dataset["quaternion"])
+    )
+
+
+def within_one_turn(run: rigidsim.Run, since: float) -> None:
+    dataset = loaded(run)
+    assert dataset.attrs["angles_wrapped_from"] == since
+    late = dataset["euler_angles"].values[dataset["time"].values >= since]
+    assert np.abs(late).max() <= math.pi
+    assert run.summary["warning_codes"] == ["not_joined"]
+    assert f"from {since:.6g} s on" in run.summary["warnings"][0]
+
+
+def test_turns_that_nobody_knows_are_not_shown(runs: Path) -> None:
+    """A closed form over millions of turns between samples, and in the figure neither lines nor growth."""
+    text = config(SYMMETRIC, PRECESSING, (), "end = 1e9\nsamples = 11", 'method = "closed_form"', ANGLES)
+    run = run_text(text, runs)
+    within_one_turn(run, 0.0)
+    [panel] = [p for p in CURVES if p.draw.__name__ == "_attitude"]
+    axes = Figure().add_subplot()
+    panel.draw(axes, run.dataset)
+    assert axes.get_title() == "Euler angles, within one turn"
+    assert {line.get_linestyle() for line in axes.get_lines()} == {"None"}
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["φ", "θ", "ψ"]
+
+
+def test_turns_of_a_motion_with_switching_surfaces(runs: Path) -> None:
+    """Coulomb friction brings the body to rest after 40 turns; a switched torque turns it back and forth."""
+    body, start = SYMMETRIC, "angular_velocity = [0, 0, 10]\neuler_angles = [0.2, 1, 0]"
+    friction = 'kind = "torque"\ncomponents = [0, 0, "-0.3*sign(wz)"]'
+    run = run_text(config(body, start, friction, "times = [0, 20, 70, 90]", "", ANGLES), runs, 'name="a"')
+    # w = 10 - 0.2 t until 50 s
+    assert run.dataset["euler_angles"].values[:, 2] == pytest.approx([0, 160, 250, 250], abs=1e-6)
+    switched = 'kind = "torque"\ncomponents = ["0.1*sign(sin(t))", 0, "0.05*abs(wy)"]'
+    sparse, dense = (
+        run_text(config(loads=switched, time=f"end = 40\nsamples = {n}", output=ANGLES), runs, f'name="{n}"')
+        for n in (3, 401)
+    )
+    np.testing.assert_array_equal(
+        sparse.dataset["euler_angles"].values, dense.dataset["euler_angles"].values[::200]
+    )
+    assert not sparse.summary["warnings"]
+
+
+def test_turns_that_a_load_reads_are_not_counted_from_samples(runs: Path) -> None:
+    torque = 'kind = "torque"\ncomponents = ["-0.001*psi", 0, 0]'
+    within_one_turn(run_text(config(loads=torque, time="end = 30\nsamples = 4", output=ANGLES), runs), 0.0)
+    dense = run_text(config(loads=torque, time="end = 30\nsamples = 301", output=ANGLES), runs, 'name="d"')
+    assert "angles_wrapped_from" not in dense.dataset.attrs
+
+
+def test_a_motion_that_does_not_arrive_tells_no_turns() -> None:
+    """From a sample to another motion's: nothing is counted; from it to its own later state everything."""
+    prepared = prepare(
+        rigidsim.parse(config(SYMMETRIC, PRECESSING, (), "end = 100\nsamples = 2", "", ANGLES))
+    )
+    parts = assemble(prepared)
+    angles = angles_to_join(prepared.system)
+    assert angles is not None
+    unit = prepared.clock.exponent
+    start = Place(0.0, np.array(parts.stepper.state), np.array([0.3, 1.1, 0.2]))
+    assert parts.stepper.to(math.ldexp(100.0, -unit))
+    psi = 0.2 - 200 * math.cos(1.1) / 3
+    late = np.array([200.3, 1.1, psi]) % (2 * math.pi)
+    there = Place(math.ldexp(100.0, -unit), np.array(parts.stepper.state), late)
+    counter = TurnCounter(prepared.system, angles)
+    counter.begin(start)
+    turns = counter.turns(there)
+    assert turns is not None
+    np.testing.assert_allclose(late + 2 * math.pi * turns, [200.3, 1.1, psi], atol=1e-9)
+    counter.begin(Place(1.0, start.state, start.angles))
+    assert counter.turns(there) is None
