@@ -16,6 +16,7 @@ import mpmath
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
@@ -113,7 +114,8 @@ class SwitchedEngines(Stepper):
             system = self.system if self._chart == 0 else self.system.partner
             assert system is not None
             first = key == (0, ()) and hasattr(self, "_integrator")
-            self._slid[key] = self._integrator if first else self._compiled(system, key[1])
+            compiled = self._integrator if first else interruptible(lambda: self._compiled(system, key[1]))
+            self._slid[key] = compiled
         entered = self._slid[key]
         if entered is not self._integrator:
             entered.dtime = self._integrator.dtime
