@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, ClassVar
 import mpmath
 import numpy as np
 
-from rigidsim.accuracy.comparison import angles_between, exact_times, parts_of, rows_to_compare
+from rigidsim.accuracy.comparison import (
+    angles_between,
+    distances_between,
+    exact_times,
+    parts_of,
+    rows_to_compare,
+)
 from rigidsim.accuracy.motion import Motion, motion_of
 from rigidsim.accuracy.reference import LOST, STANDARD, Kind, Policy, Reference, own_error, references
 from rigidsim.accuracy.setting import Setting, setting_of
@@ -35,16 +41,26 @@ class Certificate:
         end: the difference found at the end itself, rad.
         how: against what.
         times: how many.
+        place: bound of the position's error at the same times, m; None where no accuracy of it was asked for.
     """
 
     error: float
     end: float
     how: str
     times: int
+    place: float | None = None
+
+    def keeps(self, accuracy: float, accuracy_position: float | None) -> bool:
+        """Whether both errors are within what was asked for."""
+        within = accuracy_position is None or (self.place is not None and self.place <= accuracy_position)
+        return self.error <= accuracy and within
 
     def as_dict(self) -> dict[str, float | str | int]:
         """For the summary."""
-        return {
+        place: dict[str, float | str | int] = {}
+        if self.place is not None:
+            place["certified_position"] = self.place
+        return place | {
             "certified": self.error,
             "difference_at_end": self.end,
             "how": self.how,
@@ -80,6 +96,7 @@ def certify(
     experiment: Experiment,
     *,
     accuracy: float,
+    accuracy_position: float | None = None,
     loads: Sequence[Load] = (),
     known: Motion | None = None,
     told: Told | None = None,
@@ -91,6 +108,7 @@ def certify(
         dataset: of the run.
         experiment: that was run.
         accuracy: asked for, rad; decides how good the reference must be.
+        accuracy_position: asked for, m; None where the path need not be compared.
         known: of the motion, where it was looked at already.
         told: of the comparisons, as in ``try_setting``.
         policy: of references.
@@ -110,7 +128,7 @@ def certify(
         if best is None or found.error < best.error:
             best = found
         settled = compared.largest - compared.own > accuracy and compared.largest < LOST
-        if best.error <= accuracy or settled:
+        if best.keeps(accuracy, accuracy_position) or settled:
             break
     return best
 
@@ -137,6 +155,13 @@ class _Compared:
         else:
             again = try_setting(trials.experiment, self.setting, self._times, loads=trials.loads)
             self._parts = again.attitudes
+        self._places: list[np.ndarray] | None = None
+        if trials.experiment.config.integrator.accuracy_position is not None:
+            if "position" in dataset:
+                self._places = parts_of(dataset, "position", everything)
+            else:
+                again = try_setting(trials.experiment, self.setting, self._times, loads=trials.loads)
+                self._places = again.places
         self.largest = self.own = math.inf
 
     def against(self, reference: Reference) -> Certificate | None:
@@ -148,9 +173,10 @@ class _Compared:
             safety = policy.peer_safety
         places = [self._place[row] for row in rows]
         times = [self._times[place] for place in places]
-        attitudes = self._attitudes(reference.setting, times)
-        if attitudes is None:
+        better = self._trials.whole(reference.setting, times)
+        if better is None:
             return None
+        attitudes = better.attitudes
         difference = angles_between([part[places] for part in self._parts], attitudes)
 
         def distance(other: Setting) -> float:
@@ -164,7 +190,24 @@ class _Compared:
         error = safety * self.largest + self.own + floor
         if not self.largest < LOST:
             error = math.pi
-        return Certificate(min(error, math.pi), float(difference[-1]), reference.how, len(rows))
+        place = None
+        if self._places is not None:
+            apart = distances_between([part[places] for part in self._places], better.places)
+            place = self._place_error(reference, float(apart.max()), safety)
+            place += floor * max(float(np.abs(part).max()) for part in better.places)
+        return Certificate(min(error, math.pi), float(difference[-1]), reference.how, len(rows), place)
+
+    def _place_error(self, reference: Reference, apart: float, safety: float) -> float:
+        """What a path may be wrong by, by its distance from the reference's: errors of the two are as those
+        of a step are, but for scatter.
+        """
+        if reference.kind is Kind.CLOSED_FORM:
+            return safety * apart
+        policy, own = self._policy, reference.setting
+        share = own.level * policy.scatter_of(own, self._motion.steps) / self.setting.level
+        if own.bits <= self.setting.bits:
+            share = policy.as_bad
+        return (safety + min(policy.as_bad, share)) * apart
 
     def _attitudes(self, setting: Setting, times: Sequence[mpmath.mpf]) -> list[np.ndarray] | None:
         trial = self._trials.whole(setting, times)
@@ -178,7 +221,20 @@ def shortfall(certificate: Certificate, accuracy: float) -> Shortfall | None:
     return Shortfall(accuracy, min(certificate.error, math.pi), certificate.how)
 
 
-def verdict(certificate: Certificate, accuracy: float) -> str | None:
-    """The warning for a summary where the accuracy asked for (rad) wasn't certified; None where it was."""
-    short = shortfall(certificate, accuracy)
-    return None if short is None else short.message
+def verdict(
+    certificate: Certificate, accuracy: float | None, accuracy_position: float | None = None
+) -> str | None:
+    """The warning for a summary where what was asked for (rad, and m of the path) wasn't certified; None
+    where it was.
+    """
+    short = None if accuracy is None else shortfall(certificate, accuracy)
+    if short is not None:
+        return short.message
+    place = certificate.place
+    if accuracy_position is None or (place is not None and place <= accuracy_position):
+        return None
+    found = "nothing" if place is None else f"only {place:.2g} m"
+    return (
+        f"accuracy_position = {accuracy_position:.3g} m was asked for, but {found} could be certified "
+        f"({certificate.how}); choose a higher precision or a nearer end"
+    )

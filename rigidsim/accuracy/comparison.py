@@ -36,6 +36,13 @@ def angles_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np
     return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
 
 
+def distances_between(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+    """Distances (n,) between positions given as float64 parts (n, 3), subtracted before rounding."""
+    rows = np.stack([*one, *(-part for part in other)], axis=-1)
+    apart = [[math.fsum(parts) for parts in row] for row in rows]
+    return np.asarray(np.linalg.norm(np.array(apart).reshape(-1, 3), axis=1))
+
+
 def spread_times(experiment: Experiment, count: int, until: float = 1.0) -> list[mpmath.mpf]:
     """Up to ``count`` times over the first part ``until`` of a run, its end included, as mpf.
 

@@ -36,6 +36,7 @@ class Trial:
     Attributes:
         setting: that it was made with.
         attitudes: float64 parts of the quaternions, each (samples, 4).
+        places: of the positions, m, each (samples, 3); empty where the body has none.
         drifts: largest relative drift of each invariant at the samples.
         cpu_seconds: of the integration alone; compile_seconds: before it.
         work: steps times Taylor order squared times states: a count that doesn't jitter.
@@ -54,6 +55,7 @@ class Trial:
     work: float
     rows: int = field(default=0)
     histories: dict[str, np.ndarray] = field(default_factory=dict)
+    places: list[np.ndarray] = field(default_factory=list)
 
 
 class _Collected(SampleReceiver):
@@ -62,12 +64,15 @@ class _Collected(SampleReceiver):
     def __init__(self, prepared: InitialValueProblem, evaluator: Evaluator) -> None:
         self._prepared, self._evaluator = prepared, evaluator
         self.pieces: list[list[np.ndarray]] = []
+        self.places: list[list[np.ndarray]] = []
         self.drifts: dict[str, float] = {}
         self.histories: dict[str, list[np.ndarray]] = {}
 
     def take(self, block: SampleBlock) -> None:
         recorded = self._evaluator.evaluate(block)
         self.pieces.append(recorded["quaternion"])
+        if "position" in recorded:
+            self.places.append(recorded["position"])
         for invariant in self._prepared.system.invariants:
             drift = recorded[f"{invariant.name}_drift"][0]
             self.histories.setdefault(invariant.name, []).append(np.asarray(drift, dtype=np.float64).ravel())
@@ -76,7 +81,8 @@ class _Collected(SampleReceiver):
 
 
 def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath.mpf] | None = None) -> Scene:
-    """The scene of an experiment under another setting, recording its attitude alone.
+    """The scene of an experiment under another setting, recording its attitude, and its path where an
+    accuracy of that is asked for.
 
     Args:
         times: where to sample, mpf seconds in ascending order; None keeps the experiment's.
@@ -93,9 +99,11 @@ def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath
             "hold_invariants": setting.hold_invariants,
             "method": setting.method,
             "accuracy": None,
+            "accuracy_position": None,
         }
     )
-    output = config.output.model_copy(update={"record": ["quaternion"], "lyapunov": False, "timeline": False})
+    record = ["quaternion"] + (["position"] if config.integrator.accuracy_position is not None else [])
+    output = config.output.model_copy(update={"record": record, "lyapunov": False, "timeline": False})
     changed = config.model_copy(update={"integrator": integrator, "output": output, "events": []})
     scene = build_scene(replace(experiment, config=changed))
     if times is None:
@@ -162,6 +170,7 @@ def try_setting(
         work=float(progress.steps) * order**2 * len(prepared.system.states),
         rows=max(progress.next_sample - early, 0),
         histories={name: np.concatenate(pieces) for name, pieces in receiver.histories.items()},
+        places=[np.concatenate(part)[early:] for part in zip(*receiver.places, strict=True)],
     )
 
 

@@ -161,8 +161,8 @@ def _print_accuracy(accuracy: Accuracy, out: Console) -> None:
         _line(out, "chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
     estimate = accuracy.estimated_attitude_error
     if accuracy.certified is not None:
-        asked = accuracy.requested or math.nan
-        text = f"certified to {accuracy.certified:.1e} rad, {asked:.1e} asked for ({accuracy.how}, "
+        asked = "" if accuracy.requested is None else f", {accuracy.requested:.1e} asked for"
+        text = f"certified to {accuracy.certified:.1e} rad{asked} ({accuracy.how}, "
         _line(out, "attitude", f"{text}{accuracy.times_compared} times)")
     elif estimate is not None:
         factor = accuracy.amplification or 1.0
@@ -171,6 +171,11 @@ def _print_accuracy(accuracy: Accuracy, out: Console) -> None:
         _line(out, "attitude", f"{size} at the end{unstable}")
     elif accuracy.amplification is None:
         _line(out, "errors", accuracy.estimated_how)
+    if accuracy.certified_position is not None:
+        length = accuracy.requested_position or math.nan
+        text = f"certified to {accuracy.certified_position:.1e} m, {length:.1e} m asked for"
+        _line(out, "path", text)
+        return
     place, speed = accuracy.estimated_position_error, accuracy.estimated_velocity_error
     if place is not None and speed is not None:
         text = f"position uncertain by about {place:.1e} m, velocity by {speed:.1e} m/s, at the end"

@@ -176,6 +176,7 @@ class Integrator(ConfigTable):
     method: Literal["taylor", "closed_form"] = "taylor"
     hold_invariants: StrictBool = False
     accuracy: Dimensionless | None = None
+    accuracy_position: Metre | None = None
 
     @field_validator("euler_sequence")
     @classmethod
@@ -207,6 +208,13 @@ class Integrator(ConfigTable):
             raise refuse(str(error)) from None
         if not 0 < number.rational < 3:
             raise refuse(f"given {shown(value)}; an angle above 0 and below pi is allowed, in rad")
+        return value
+
+    @field_validator("accuracy_position")
+    @classmethod
+    def _possible_accuracy_of_position(cls, value: Any) -> Any:
+        if value is not None and not value.rational > 0:
+            raise refuse(f"given {shown(value)}; a length above 0 is allowed, in m")
         return value
 
     @field_validator("tolerance", mode="before")

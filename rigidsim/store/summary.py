@@ -145,6 +145,7 @@ class Accuracy(_Part):
     """How right the attitude is at the end, rad: asked for, estimated, and certified by a reference.
 
     Attributes:
+        requested_position, certified_position: of the path, m.
         estimated_position_error, estimated_velocity_error: at the end, m and m/s.
         amplification: of rounding errors by the motion; None where nothing was estimated.
         error_growth_rate: 1/s; 0 where errors don't grow exponentially.
@@ -154,6 +155,8 @@ class Accuracy(_Part):
     """
 
     requested: FiniteNumber | None
+    requested_position: FiniteNumber | None = None
+    certified_position: FiniteNumber | None = None
     estimated_attitude_error: FiniteNumber | None
     estimated_position_error: FiniteNumber | None = None
     estimated_velocity_error: FiniteNumber | None = None

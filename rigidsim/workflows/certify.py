@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rigidsim.accuracy.certificate import certify, verdict
-from rigidsim.accuracy.choice import Choice
+from rigidsim.accuracy.choice import Choice, wanted
 from rigidsim.scene.config import Experiment
 from rigidsim.session.session import Session
 from rigidsim.solve.status import Status
@@ -29,25 +29,30 @@ def certified(
     Returns:
         The run, and False where the accuracy was not kept.
     """
-    asked, summary = experiment.config.integrator.accuracy, result.outcome
+    integrator, summary = experiment.config.integrator, result.outcome
+    accuracy, length = wanted(experiment), integrator.accuracy_position
     complete = result.status in (Status.FINISHED.value, Status.EVENT.value)
-    if asked is None or not complete or not isinstance(summary, Summary):
+    if accuracy is None or not complete or not isinstance(summary, Summary):
         return result, True
     session.observer.phase("certify")
-    accuracy = float(asked.rational)
+    requested = None if integrator.accuracy is None else float(integrator.accuracy.rational)
+    place = None if length is None else float(length.rational)
     with result.dataset as dataset:
         found = certify(
             dataset,
             experiment,
             accuracy=accuracy,
+            accuracy_position=place,
             loads=loads,
             known=None if choice is None else choice.known,
             told=session.observer.trying,
         )
-    known: dict[str, Any] = {"requested": accuracy}
+    known: dict[str, Any] = {"requested": requested}
+    if place is not None:
+        known["requested_position"] = place
     doubt: str | None = "too little was recorded to certify the accuracy asked for"
     if found is not None:
-        doubt = verdict(found, accuracy)
+        doubt = verdict(found, requested, place)
         known |= found.as_dict()
     if choice is not None:
         known |= {"chosen": choice.setting.title, "chosen_why": choice.why, "forecast": choice.forecast}
