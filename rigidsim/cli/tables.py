@@ -167,8 +167,8 @@ def _print_accuracy(accuracy: Accuracy, out: Console) -> None:
     elif estimate is not None:
         factor = accuracy.amplification or 1.0
         unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 else ""
-        size = f"uncertain by about {estimate:.1e} rad" if estimate < math.pi else "unknown"
-        _line(out, "attitude", f"{size} at the end{unstable}")
+        size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
+        _line(out, "attitude", size if estimate < math.pi else "unknown at the end")
     elif accuracy.amplification is None:
         _line(out, "errors", accuracy.estimated_how)
     if accuracy.certified_position is not None:
