@@ -126,7 +126,7 @@ class SwitchedEngines(Stepper):
         options = dict(self.precision.options)
         equations, kind = system.equations, self.precision.scalar
         events = [
-            hy.nt_event(u, self._noting(j), fp_type=kind)
+            hy.nt_event(u + hy.par[system.parameters + j], self._noting(j), fp_type=kind)
             for j, u in enumerate(system.surfaces)
             if j not in along
         ]
@@ -197,9 +197,22 @@ class SwitchedEngines(Stepper):
         self._angles = [a + 2 * np.pi * n for a, n in zip(plain, turns, strict=True)]
         self._quaternion = [sign * x for x in quaternion]
 
-    @staticmethod
-    def _set(engine: Integrator, pars: np.ndarray) -> None:
-        engine.pars[:] = pars[: len(engine.pars)]  # along a surface the last ones may have no meaning
+    def _set(self, engine: Integrator) -> None:
+        """Give an engine its parameters at this boundary.
+
+        The engine finds a zero at a step's very beginning again and again, in place of those that follow. So
+        an argument that is zero there but for rounding is watched for the zero of its sum with a rounding, on
+        the side that the motion is on.
+        """
+        pars = self._parameters()
+        look = self._probe.look(self.state, self.time, pars)
+        moved = []
+        for j, mode in enumerate(self._modes):  # what a unit of time makes of the state tells its size
+            noise = self._probe.noise(look, j, [self.state, look.field])
+            moved.append(mode * noise if abs(float(look.u[j])) <= noise else 0.0)
+        offsets = self.precision.array([mpmath.mpf(x) for x in moved])
+        everything = np.concatenate([pars, offsets])
+        engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
 
     def _keep_to_surfaces(self) -> None:
         """Take off what rounding moved the state away from the surfaces that it slides along."""
@@ -210,6 +223,15 @@ class SwitchedEngines(Stepper):
             square = sum((g * g for g in gradient), gradient[0] * 0)
             if square != 0:
                 state[:] = state - (look.u[j] / square) * gradient
+
+    def _seen(self, j: int, begin: Scalar) -> Scalar | None:
+        """A time shortly after a step's beginning at which an argument has the sign of its side, if any."""
+        end = self._integrator.time
+        for power in range(1, self.precision.bits // 2):
+            then = begin + (end - begin) * self.precision.number(mpmath.ldexp(1, -power))
+            if self._modes[j] * float(self._values(self._integrator.update_d_output(then), then)[j]) > 0:
+                return then
+        return None
 
     def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
         """A root that the engine missed."""

@@ -23,8 +23,10 @@ from rigidsim.solve.switching import SLIDES, Choice, Fields, Look
 
 _ATTEMPTS = 32  # at one step
 _MOST_SWITCHES = 256
-"""Within ``_WINDOW``: more are an accumulation point, which no count of switches gets past."""
-_WINDOW = 2.0**-20  # internal units of time
+"""At intervals shorter than ``_SHORTEST``: they accumulate, or go on for ever with what rounding leaves of
+their swing, whose time is the square root of its size."""
+_SHORTEST = 2.0**-8  # internal units of time; with more digits less, see ``_window``
+_ROUNDINGS = 2.0**15  # in the square of an interval
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
 _NEAR = 2.0**-12  # of a step: within it Newton's method improves a root
 
@@ -104,7 +106,7 @@ class SwitchingStepper(SwitchedEngines):
         log, events = self.log, len(self.log.found)
         for _ in range(_ATTEMPTS):
             begun = self._integrator
-            self._set(begun, self._parameters())
+            self._set(begun)
             time, before = begun.dtime, np.array(begun.state)
             self._roots.clear()
             outcome, size = begun.step(longest, write_tc=True)
@@ -196,10 +198,10 @@ class SwitchingStepper(SwitchedEngines):
             look = self._look(after, end)
             if -mode * float(look.u[j]) <= self._probe.noise(look, j, states):
                 continue
-            first = self._look(before, begin)
-            if mode * float(first.u[j]) <= self._probe.noise(first, j, states):
+            inside = self._seen(j, begin)
+            if inside is None:
                 return begin, j, -mode
-            return self._bisected(j, begin, end), j, -mode
+            return self._bisected(j, inside, end), j, -mode
         return None
 
     # --- surfaces -------------------------------------------------------------------------------------------
@@ -220,13 +222,18 @@ class SwitchingStepper(SwitchedEngines):
             else:
                 self._take(choice)
 
+    @property
+    def _window(self) -> float:
+        """Internal units of time within which ``_MOST_SWITCHES`` are an accumulation."""
+        return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * float(self.precision.epsilon)) ** 0.5)
+
     def _arrive(self, root: Root, states: list[np.ndarray]) -> bool:
         """Go on from a surface; False where that can't be."""
         _, j, side = root
         self._fresh = True
         self.switches += 1
         now = float(self.time)
-        if now - self._since > _WINDOW:
+        if now - self._since > self._window:
             self._since, self._count = now, 0
         self._count += 1
         if self._count > _MOST_SWITCHES:
@@ -316,7 +323,7 @@ class SwitchingStepper(SwitchedEngines):
         """The side of a surface that a step leads to, which is taken back; 0 for none."""
         engine = self._integrator
         time, before = engine.dtime, np.array(engine.state)
-        self._set(engine, self._parameters())
+        self._set(engine)
         self.log.muted = True
         engine.step(self._longest, write_tc=True)
         end, after = engine.time, np.array(engine.state)

@@ -131,6 +131,7 @@ def test_friction_about_three_axes_ends_in_rest() -> None:
         ("abs(abs(t - 5) - 2)", 4 + 9.0),
         ("sign(sign(t - 3) + 0.5)", 7 - 3.0),  # an argument that jumps itself
         ("abs(t)", 50.0),  # from a surface on
+        ("step(sin(t - 2)*(2.5 - t))", 0.5 + np.pi),  # on a surface again within the step after one
         ("1 - 0.3*abs(wx)", 10.0),  # never left
     ],
 )
@@ -148,7 +149,7 @@ def test_each_side_integrates_by_itself(torque: str, rate: float) -> None:
         (
             "-sign(wrap(psi - 1)) - 0.3*sign(wz)",
             "angular_velocity = [0, 0, 0.5]\n" + TILTED.split("\n")[1],
-            "again",
+            "almost no time",
         ),
     ],
 )
