@@ -85,12 +85,12 @@ class IntegrationLoop:
             return self._ended(Status.FINISHED)
         self._look_ahead()
         while True:
-            if self.receiver.due():
-                if not self._hand_over():
-                    return self.progress
-                self.receiver.save(self.position())
             stop = self.check(self.progress) or self._out_of_steps()
             if stop is None:
+                if self.receiver.due():
+                    if not self._hand_over():
+                        return self.progress
+                    self.receiver.save(self.position())
                 stop = self._interruptible_round()
             if stop is not None:
                 return self._ended(stop)
@@ -107,7 +107,10 @@ class IntegrationLoop:
             self.buffer.back_to(found)
             self.corrected.back_to(boundary)
             self._account()
-            return Status.INTERRUPTED
+            stop = self.check(self.progress)
+            if stop is None:  # nobody here wants to be told
+                raise
+            return stop
 
     def _round(self, boundary: StepBoundary) -> Status | None:
         """A chunk of steps, or a block of samples within those taken; the status that ends the run here."""

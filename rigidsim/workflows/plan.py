@@ -22,10 +22,11 @@ from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.store.segments import SegmentLimits
 
 _PILOT_SECONDS = 0.5
 _LARGEST_CHUNK = 1024  # of steps: calls cost next to nothing
-_BASE_MEMORY = 250e6  # interpreter, libraries and compiled code
+_BASE_MEMORY = 170e6  # interpreter, libraries and compiled code
 _COMPRESSION = 2.5e-8  # seconds a byte: gzip 4 with shuffle writes about 40 MB/s
 _BUFFERING = 2e-7  # seconds a sample
 _EVALUATED = {True: 4096, False: 16}  # samples, in precisions with cheap arithmetic and without
@@ -117,7 +118,7 @@ def plan(
             "integration_seconds": integrate,
             "recording_seconds": record,
             "total_seconds": compile_seconds + integrate + record,
-            "memory_bytes": _BASE_MEMORY + min(room.segments, 64e6) * 3,
+            "memory_bytes": _BASE_MEMORY + 3 * min(room.segments, SegmentLimits().bytes),
             "segment_bytes": room.segments,
             "dataset_bytes": room.dataset,
             "timeline_bytes": room.timeline,

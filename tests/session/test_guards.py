@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.status import Status
 
 pytestmark = pytest.mark.compact
@@ -36,6 +37,10 @@ SCENES = {
     "projected": config(time="end = 150\nsamples = 76", integrator="hold_invariants = true"),
     "charts": config(time="end = 60\nsamples = 61", integrator='formulation = "euler_angles"'),
     "events": config(time="end = 150\nsamples = 16", more='[[events]]\nname = "a"\nexpression = "wy"'),
+    "surfaces": config(
+        loads='kind = "torque"\ncomponents = ["-0.05*sign(wx)", "0", "0.02*abs(wy)"]',
+        time="end = 40\nsamples = 81",
+    ),
     "many samples in a step": config(time="end = 4\nsamples = 4001"),
     "80 bits": config(time="end = 60\nsamples = 31", integrator='precision = "extended"'),
 }
@@ -98,7 +103,7 @@ def test_max_steps_is_never_exceeded_and_always_used_up(scene: str) -> None:
         assert kept.all() == reference, drive
 
 
-@pytest.mark.parametrize("scene", ["free", "charts", "events", "many samples in a step"])
+@pytest.mark.parametrize("scene", ["free", "charts", "events", "surfaces", "many samples in a step"])
 def test_a_run_that_is_stopped_within_a_step_goes_on_within_it(scene: str) -> None:
     """After every look at the guards; samples of a step may be handed over over several of them."""
     prepared, again = made(scene, stride=32)
@@ -120,6 +125,45 @@ def test_a_run_that_is_stopped_within_a_step_goes_on_within_it(scene: str) -> No
     assert kept.all() == reference
     if scene == "many samples in a step":
         assert sessions > 4 * total.steps  # a step of a thousand samples is interrupted many times
+
+
+@pytest.mark.parametrize("scene", ["free", "charts", "many samples in a step"])
+def test_ctrl_c_within_a_chunk_takes_it_back(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a run looks after it; anywhere else, such as in a trial, it goes on its way."""
+    prepared, again = made(scene, stride=32)
+    parts = again()
+    kept = Kept(parts.evaluator)
+    total = sampler(prepared, parts, kept).run().steps
+    reference = kept.all()
+    parts = again()
+    kept = Kept(parts.evaluator)
+    corrected = parts.corrected.samples
+    calls = itertools.count(1)
+    heard: list[int] = []
+
+    def samples(*arguments: Any) -> SampleBlock:
+        if (call := next(calls)) % 3 == 0:  # after steps were taken, and some of their samples
+            heard.append(call)
+            raise KeyboardInterrupt
+        return corrected(*arguments)
+
+    monkeypatch.setattr(parts.corrected, "samples", samples)
+    with pytest.raises(KeyboardInterrupt):
+        sampler(prepared, parts, Kept(parts.evaluator), pacing=Pacing(chunk_seconds=0.0)).run()
+    parts, start = again(), None
+    status = Status.INTERRUPTED
+    while status is Status.INTERRUPTED:
+        heard.clear()
+
+        def look(_: Progress) -> Status | None:
+            return Status.INTERRUPTED if heard else None
+
+        loop = sampler(prepared, parts, kept, look, start, Pacing(chunk_seconds=0.0))
+        status, start = loop.run().status, loop.position()
+    assert status is Status.FINISHED
+    assert next(calls) > 6
+    assert loop.progress.steps == total
+    assert kept.all() == reference
 
 
 def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
