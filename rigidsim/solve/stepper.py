@@ -26,6 +26,7 @@ _FAR = 1e300  # a target that no run reaches: propagation ends by the count of s
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
 _LONGEST_STEP = 2.0**30
 _MOST_TO_WHOLE_TIME = 1000  # steps
+_CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
 _HOPELESS_STEPS = 1e15  # to the last sample; at the fastest pace they would take years
 _TINY_STEPS = 32  # one after the other, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
@@ -235,7 +236,12 @@ class Stepper:
 
     def to(self, time: float) -> bool:
         """Go exactly to a time, with a shortened last step: for comparisons, never for a run's samples."""
-        outcome = self._integrator.propagate_until(time, max_steps=100_000, max_delta_t=self._longest)[0]
+        for _ in range(_MOST_CHUNKS_TO):  # Ctrl-C is heeded between them
+            outcome = self._integrator.propagate_until(time, max_steps=_CHUNK_TO, max_delta_t=self._longest)[
+                0
+            ]
+            if outcome != hy.taylor_outcome.step_limit:
+                break
         return bool(outcome == hy.taylor_outcome.time_limit)
 
     def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:

@@ -46,7 +46,9 @@ def test_plan_warns_of_it(tmp_path: Path) -> None:
 
 def test_what_is_predicted_is_what_it_takes(tmp_path: Path) -> None:
     """Segments beside labels of some kilobytes a file; a dataset is compressed by what repeats."""
-    text = config(time="end = 20000\nsamples = 20001", more="[limits]\nmax_steps = 1000000")
+    text = config(
+        time="end = 20000\nsamples = 20001", output="estimate = false", more="[limits]\nmax_steps = 1000000"
+    )
     predicted = storage(prepare(rigidsim.parse(text)), tmp_path)
     whole = run_text(text, tmp_path)
     size = whole.folder.dataset.stat().st_size

@@ -17,6 +17,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.building import building, interruptible
 from rigidsim.solve.stepper import Stepper
 
+PLAIN = "estimate = false"
 AWAKE = 60.0  # seconds that nobody waits for
 
 
@@ -51,7 +52,7 @@ def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pyt
     """In the middle of a chunk of steps: what was integrated before it is kept, and resumed with the bits of
     a run in one go.
     """
-    text = config(time="end = 60\nsamples = 241", integrator='formulation = "euler_angles"')
+    text = config(time="end = 60\nsamples = 241", integrator='formulation = "euler_angles"', output=PLAIN)
     whole = run_text(text, tmp_path / "whole")
     assert whole.summary["chart_changes"]["count"] > 0
     compiled: Callable[[Stepper, System], Any] = Stepper._compiled
