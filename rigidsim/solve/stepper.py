@@ -237,9 +237,8 @@ class Stepper:
     def to(self, time: float) -> bool:
         """Go exactly to a time, with a shortened last step: for comparisons, never for a run's samples."""
         for _ in range(_MOST_CHUNKS_TO):  # Ctrl-C is heeded between them
-            outcome = self._integrator.propagate_until(time, max_steps=_CHUNK_TO, max_delta_t=self._longest)[
-                0
-            ]
+            engine = self._integrator
+            outcome = engine.propagate_until(time, max_steps=_CHUNK_TO, max_delta_t=self._longest)[0]
             if outcome != hy.taylor_outcome.step_limit:
                 break
         return bool(outcome == hy.taylor_outcome.time_limit)

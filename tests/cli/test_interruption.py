@@ -97,10 +97,7 @@ CROWDED = {
 MEMORY = 400e6  # bytes; measured are 170 to 270 MB, most of them libraries and compiled code
 
 
-@pytest.mark.parametrize(
-    "case",
-    [c if c in ("double", "closed form") else pytest.param(c, marks=pytest.mark.slow) for c in CROWDED],
-)
+@pytest.mark.parametrize("case", cases(CROWDED, ("double", "closed form")))
 def test_any_number_of_samples_in_a_step(case: str, config: Config, start: Start) -> None:
     """Billions of them: a run keeps to its memory, answers Ctrl-C at once, and keeps what it has."""
     samples, precision, method = CROWDED[case]
