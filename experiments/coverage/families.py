@@ -169,12 +169,38 @@ def _kink(draw: Draw) -> None:
         draw.load("torque", 'components = ["-k*sqrt((wx-0.3*n)^2)/n", "0", "0"]')
 
 
-def _odd(draw: Draw) -> None:
-    """Loads odd in the quaternion."""
+def _switching(draw: Draw) -> None:
+    """Kinks and jumps that a tumbling body comes to again and again."""
+    draw.body(draw.moments())
+    draw.start(draw.direction())
+    draw.parameters += [
+        f"k = {draw.mass * draw.length**2 / draw.time**2 * draw.decades(-3, -1)!r}",
+        f"n = {1 / draw.time!r}",
+    ]
+    torque = draw.random.choice(
+        [
+            '["-k*abs(wx)*wx/n^2", "-k*abs(wy)*wy/n^2", "-k*abs(wz)*wz/n^2"]',
+            '["-k*sign(wx)", "0", "-0.5*k*sign(wz)"]',
+            '["k*max(qx*qw, 0)", "k*min(wy/n, 0.2)", "0"]',
+            '["0", "k*abs(sin(n*t))", "k*sqrt((wx-0.1*n)^2)/n"]',
+        ]
+    )
+    draw.load("torque", f"components = {torque}")
+
+
+def _signed(draw: Draw) -> None:
+    """Loads that would be odd in the quaternion, but for a sign or a product."""
     draw.body(draw.moments())
     draw.start(draw.direction())
     draw.parameters += [f"k = {draw.mass * draw.length**2 / draw.time**2 * draw.decades(-2, -0.3)!r}"]
-    draw.load("torque", 'components = ["k*qx", "0", "0.4*k*qw"]')
+    torque = draw.random.choice(
+        [
+            '["k*qx*qw", "0", "0.4*k*qw^2"]',
+            '["k*sign(qw)*qx", "0", "0.4*k*abs(qw)"]',
+            '["k*qx", "0", "0.4*k*qw"]',
+        ]
+    )
+    draw.load("torque", f"components = {torque}")
 
 
 FAMILIES: dict[str, Family] = {
@@ -195,7 +221,8 @@ FAMILIES: dict[str, Family] = {
     "torque in time": Family(KINDS["torque, space axes"], (1.0, 3.3)),
     "late pulse": Family(KINDS["late pulse"], (1.0, 3.3)),
     "kink": Family(_kink, (1.0, 1.5)),
-    "odd load": Family(_odd, (1.0, 2.3)),
+    "switching": Family(_switching, (1.0, 2.3)),
+    "odd load": Family(_signed, (1.0, 2.3)),
 }
 """By the name under which the table shows them."""
 

@@ -57,7 +57,8 @@ def motion_growth(prepared: InitialValueProblem) -> Growth:
         return Growth(factor=1.0, seconds=0.0, rate=0.0, window=0.0)
     system = double_twin(prepared)
     clock, last = prepared.clock, prepared.clock.count - 1
-    growth = measure_growth(system, precision_of("double"), float(clock.start), float(clock.at(last)))
+    precision = replace(precision_of("double"), compact=True)  # compiled in a tenth of the time
+    growth = measure_growth(system, precision, float(clock.start), float(clock.at(last)))
     return _beyond_measure(prepared, growth) if growth.saturated else growth
 
 

@@ -17,9 +17,10 @@ import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
 from rigidsim.accuracy.exact_error import ExactError, exact_error
+from rigidsim.accuracy.growth import exponential_growth, power_of_time
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
-from rigidsim.solve.lanes import BatchLanes, Lanes, OwnLanes, SeriesErrors
+from rigidsim.solve.lanes import BatchLanes, Lanes, OwnLanes, SeriesErrors, SwitchingLanes
 from rigidsim.solve.neighbours import Neighbours, Pushes, Spread
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
@@ -28,8 +29,6 @@ from rigidsim.solve.trail import Trail
 _LAST_BITS = 0.5  # of a recorded value, rounded
 _LABEL = 0.25  # of a sample's time, rounded: what is recorded belongs to another moment
 _AS_LARGE = 4.0  # as the whole way: of a place that can't be told
-LOST = 1e-2
-"""rad (or relative to the rates); what is so uncertain is no result any more."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +41,9 @@ class Margins:
     Attributes:
         safety: over the root mean square of three neighbours.
         compared: over the largest difference from a closed form at some samples.
-        angles, angle_series: errors of a step in Euler angles over those in quaternions: of rounding, and of
-            series that a tolerance cuts off.
+        angles, angle_series, momentum_series: errors of a step in Euler angles over those in quaternions: of
+            rounding, and of series that a tolerance cuts off; of the latter with canonical momenta.
+        cut_off: of a tolerance, what a step is wrong by in motions with switching surfaces.
         own_steps: up to which the run's own integrator is good enough, and nothing is compiled.
         all_steps: that are followed to the end whatever they cost.
         part: of the steps of a longer run in double precision.
@@ -57,9 +57,11 @@ class Margins:
     compared: float = 3.0
     angles: float = 4.0
     angle_series: float = 5.0
+    momentum_series: float = 20.0
+    cut_off: float = 0.1
     own_steps: int = 3000
-    all_steps: int = 30_000
-    part: float = 0.1
+    all_steps: int = 60_000
+    part: float = 0.15
     dearer: tuple[tuple[str, float], ...] = (("single", 0.3), ("double", 1.0), ("extended", 10.0))
     stable: float = 4.0
     power: float = 1.5
@@ -170,15 +172,16 @@ def _neighbours(
     series: SeriesErrors | None = None
     stand_in = False
     own = steps <= margins.own_steps and precision.name == "double" and not _loose(prepared)
-    if own and integrator is not None and system.partner is None and not system.crossings:
+    own = own and system.partner is None and not system.crossings and not system.switches
+    if own and integrator is not None:
         lanes: Lanes = OwnLanes(copy.deepcopy(integrator))
     else:
         charts = system.requirements.formulation in ("euler_angles", "canonical")
         # in the run's own states, unless they have singularities that a loose tolerance would run into
         system = double_twin(prepared) if charts else system.rounded(precision_of("double").number)
-        lanes = BatchLanes(system, steps)
+        lanes = SwitchingLanes(system, start, end, steps) if system.switches else BatchLanes(system, steps)
         stand_in = charts and prepared.system.partner is None
-        if _loose(prepared):
+        if _loose(prepared) and not system.switches:
             series = SeriesErrors(system, prepared.effective_tolerance)
     rounded = np.array([precision.exact(precision.number(x)) != x for x in system.initial])
     pushes = _pushes(prepared, condition if stand_in else None, margins)
@@ -198,10 +201,16 @@ def _pushes(prepared: InitialValueProblem, condition: float | None, margins: Mar
         condition: of canonical momenta whose place quaternions take.
     """
     plain, formulation = Pushes(), prepared.system.requirements.formulation
+    if prepared.system.switches and _loose(prepared):
+        plain = replace(
+            plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
+        )
     if formulation not in ("euler_angles", "canonical"):
         return plain
     angles = replace(plain, own=plain.own * margins.angles, series=margins.angle_series)
-    return angles if condition is None else replace(angles, shared=plain.own * condition)
+    if condition is None:
+        return angles
+    return replace(angles, shared=plain.own * condition, series=margins.momentum_series)
 
 
 def _of_closed_form(prepared: InitialValueProblem, error: float, carried: bool) -> Estimate:
@@ -255,16 +264,7 @@ def _leading(spread: Spread, carried: bool) -> np.ndarray:
 
 def _suspicious(spread: Spread, start: float, carried: bool, margins: Margins) -> bool:
     """Whether errors grow faster than those of a stable motion."""
-    return _power(np.array(spread.times) - start, _leading(spread, carried)) > margins.most_power
-
-
-def _power(times: np.ndarray, errors: np.ndarray) -> float:
-    """Of time that errors grew with over the last three quarters."""
-    largest = np.maximum.accumulate(errors)
-    early = int(np.searchsorted(times, times[-1] / 4))
-    if not (0 < largest[early] < math.inf and times[early] < times[-1] and largest[-1] < math.inf):
-        return math.inf if largest[-1] > 0 else 0.0
-    return float(math.log(largest[-1] / largest[early]) / math.log(times[-1] / times[early]))
+    return power_of_time(np.array(spread.times) - start, _leading(spread, carried)) > margins.most_power
 
 
 def _conclusion(
@@ -287,7 +287,7 @@ def _conclusion(
         )
     times = np.array(spread.times) - start
     errors = level * margins.safety * _leading(spread, carried)
-    power = min(max(_power(times, errors), margins.power), margins.most_power)
+    power = min(max(power_of_time(times, errors), margins.power), margins.most_power)
     beyond = max((end - start) / times[-1], 1.0) ** power
 
     label = math.ldexp(_label(prepared, duration), -exponent)
@@ -301,7 +301,7 @@ def _conclusion(
     lead = at_end(spread.attitude if carried else spread.rates, 1.0, sys.float_info.max, rate)
     law = round_off_law(level, steps, float(system.rate_bound), duration)
     amplification = lead / law if law > 0 else 1.0
-    growth, horizon = _exponential(times, errors, exponent, margins)
+    growth, horizon = exponential_growth(times, errors, exponent, margins.power, margins.exponential)
     scaling, size, speed = system.scaling, spread.extent, spread.fastest
     return Estimate(
         attitude=min(lead, math.pi) if carried else None,
@@ -318,27 +318,6 @@ def _conclusion(
         seconds=math.ldexp(float(times[-1]), exponent),
         how=_words(prepared, beyond > 1),
     )
-
-
-def _exponential(
-    times: np.ndarray, errors: np.ndarray, exponent: int, margins: Margins
-) -> tuple[float, float | None]:
-    """Rate of exponential growth, 1/s, and when digits are gone, seconds after the start; 0 and None where
-    growth is none.
-    """
-    largest = np.maximum.accumulate(errors)
-    gone = int(np.searchsorted(largest, LOST))
-    last = min(gone, len(times) - 1)
-    if last < 2 or _power(times[: last + 1], largest[: last + 1]) < margins.exponential:
-        return 0.0, None
-    early = int(np.searchsorted(times, times[last] / 4))
-    span = math.ldexp(float(times[last] - times[early]), exponent)
-    ratio = min(largest[last], 1e300) / largest[early]
-    rate = (math.log(ratio) - margins.power * math.log(times[last] / times[early])) / span
-    seconds = math.ldexp(float(times[last]), exponent)
-    if rate > 0 and gone >= len(times):
-        seconds += math.log(LOST / largest[last]) / rate
-    return max(rate, 0.0), seconds
 
 
 def _words(prepared: InitialValueProblem, extrapolated: bool) -> str:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from rigidsim.accuracy.error_law import DRIFT_FACTOR
-from rigidsim.accuracy.estimate import LOST, Estimate, estimate_errors
+from rigidsim.accuracy.estimate import Estimate, estimate_errors
+from rigidsim.accuracy.growth import LOST
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.loop import Progress

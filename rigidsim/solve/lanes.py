@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import heyoka as hy
@@ -9,6 +10,8 @@ import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.solve.engine import Integrator
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.steppers import stepper_of
 
 NEIGHBOURS = 3
 TOLERANCE = 1e-8
@@ -84,6 +87,43 @@ class OwnLanes:
                 return None
             result[:, lane] = integrator.state
         return result, int(steps)
+
+
+class SwitchingLanes:
+    """One after the other, by a stepper that ends its steps on switching surfaces.
+
+    Args:
+        start, end: internal units.
+        steps: of the motion between these.
+    """
+
+    def __init__(self, system: System, start: float, end: float, steps: int) -> None:
+        precision = replace(precision_of("double"), compact=True)
+        self._stepper = stepper_of(system, precision, None, precision.scalar(start))
+        self._begin = self._stepper.mark()
+        self._reached = {start: self._begin}  # by the motion itself, which may slide
+        self._pace = steps / (end - start)
+
+    def advance(
+        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
+    ) -> tuple[np.ndarray, int] | None:
+        """As of ``Lanes``."""
+        stepper, result = self._stepper, np.empty_like(states)
+        for lane in range(states.shape[1]):
+            time, state = float(begin[lane]), states[:, lane]
+            known = self._reached.get(time) if lane == 0 else None
+            if known is not None and (known.state == state).all():
+                stepper.back_to(known)
+            else:
+                stepper.back_to(replace(self._begin, time=(time, 0.0), state=state.copy()))
+                stepper.settle()
+            if not stepper.to(float(end[lane])):
+                return None
+            result[:, lane] = stepper.state
+            if lane == 0:
+                mark = replace(stepper.mark(), time=(float(end[0]), 0.0))
+                self._reached = {time: known or mark, float(end[0]): mark}
+        return result, max(round(float(end[0] - begin[0]) * self._pace), 1)
 
 
 class SeriesErrors:

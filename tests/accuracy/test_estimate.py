@@ -138,3 +138,12 @@ def test_a_request_to_stop_ends_the_estimate() -> None:
     prepared = prepare(rigidsim.parse(LATE))
     asked = iter([True] * 5)
     assert estimate_errors(prepared, 18_000, 4000.0, go_on=lambda: next(asked, False)) is None
+
+
+def test_kinks_and_jumps_are_followed(runs: Path) -> None:
+    """Neighbours come to switching surfaces at other times than the motion."""
+    drag = 'kind = "torque"\ncomponents = ["-0.2*abs(wx)*wx", "-0.1*sign(wy)", "0.05*abs(wz)"]'
+    text = scene("[1, 2, 3]", "[0.5, 0.25, 1]", "15", drag)
+    run = run_text(text, runs)
+    announced, true = run.summary["accuracy"]["estimated_attitude_error"], true_error(run, text)
+    assert true <= COVERED * announced < 1e-11

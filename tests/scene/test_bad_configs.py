@@ -96,12 +96,12 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "integrator key misspelt": (
         {"integrator": 'precison = "double"'},
         "[integrator] precison",
-        ['did you mean "precision"?', "allowed: accuracy, euler_sequence, formulation"],
+        ['did you mean "precision"?', "allowed: accuracy, accuracy_position, euler_sequence, formulation"],
     ),
     "output key misspelt": (
         {"output": 'recrod = ["energy"]'},
         "[output] recrod",
-        ['did you mean "record"?', "allowed: lyapunov, record"],
+        ['did you mean "record"?', "allowed: estimate, lyapunov, record"],
     ),
     "limits key misspelt": (
         {"limits": "wal_time = 1"},
