@@ -19,7 +19,7 @@ from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_o
 from rigidsim.accuracy.exact_error import ExactError, exact_error
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
-from rigidsim.solve.lanes import BatchLanes, Lanes, OwnLanes, SeriesErrors
+from rigidsim.solve.lanes import Lanes, OwnLanes, SeriesErrors, lanes_of
 from rigidsim.solve.neighbours import Neighbours, Pushes, Spread
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
@@ -45,7 +45,7 @@ class Margins:
         angles, angle_series: errors of a step in Euler angles over those in quaternions: of rounding, and of
             series that a tolerance cuts off.
         own_steps: up to which the run's own integrator is good enough, and nothing is compiled.
-        all_steps: that are followed to the end whatever they cost.
+        all_steps: that are followed to the end whatever they cost; switching_steps: where they are single.
         part: of the steps of a longer run in double precision.
         dearer: a step in other precisions than one in double precision, roughly.
         stable: amplification up to which a motion is as stable as the law of rounding takes it to be.
@@ -59,6 +59,7 @@ class Margins:
     angle_series: float = 5.0
     own_steps: int = 3000
     all_steps: int = 30_000
+    switching_steps: int = 500
     part: float = 0.1
     dearer: tuple[tuple[str, float], ...] = (("single", 0.3), ("double", 1.0), ("extended", 10.0))
     stable: float = 4.0
@@ -146,8 +147,9 @@ def estimate_errors(
         lambda: _neighbours(prepared, start, end, steps, integrator, condition, margins)
     )
     dear = dict(margins.dearer).get(prepared.precision.name, math.inf)
-    whole = steps <= max(margins.all_steps, margins.part * dear * steps)
-    asked = end if whole else start + (end - start) * max(margins.all_steps / steps, margins.part * dear)
+    cheap = margins.switching_steps if system.switches else margins.all_steps
+    whole = steps <= max(cheap, margins.part * dear * steps)
+    asked = end if whole else start + (end - start) * max(cheap / steps, margins.part * dear)
     lost = math.pi / level
     spread = neighbours.follow(asked, go_on, lost)
     if not whole and spread.whole and _suspicious(spread, start, carried, margins):
@@ -167,16 +169,16 @@ def _neighbours(
     margins: Margins,
 ) -> Neighbours:
     precision, system = prepared.precision, prepared.system
-    series: SeriesErrors | None = None
-    stand_in = False
+    series, stand_in = None, False
     own = steps <= margins.own_steps and precision.name == "double" and not _loose(prepared)
-    if own and integrator is not None and system.partner is None and not system.crossings:
+    plain = system.partner is None and not (system.crossings or system.switches)
+    if own and integrator is not None and plain:
         lanes: Lanes = OwnLanes(copy.deepcopy(integrator))
     else:
         charts = system.requirements.formulation in ("euler_angles", "canonical")
         # in the run's own states, unless they have singularities that a loose tolerance would run into
         system = double_twin(prepared) if charts else system.rounded(precision_of("double").number)
-        lanes = BatchLanes(system, steps)
+        lanes = lanes_of(system, steps)
         stand_in = charts and prepared.system.partner is None
         if _loose(prepared):
             series = SeriesErrors(system, prepared.effective_tolerance)

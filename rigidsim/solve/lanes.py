@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import heyoka as hy
@@ -9,6 +10,8 @@ import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.solve.engine import Integrator
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.switching_stepper import SwitchingStepper
 
 NEIGHBOURS = 3
 TOLERANCE = 1e-8
@@ -61,6 +64,40 @@ class BatchLanes:
         return np.array(integrator.state), int(results[0][3])
 
 
+class SteppedLanes:
+    """One after the other, step by step: for motions that switch sides, each lane when it gets there."""
+
+    def __init__(self, system: System) -> None:
+        self._stepper = SwitchingStepper(system, precision_of("double"), TOLERANCE, 0.0)
+        self._memories: dict[int, tuple[float, ...]] = {}
+
+    def advance(
+        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
+    ) -> tuple[np.ndarray, int] | None:
+        """As of ``Lanes``."""
+        stepper, result, steps = self._stepper, np.empty_like(states), 0
+        for lane in reversed(range(states.shape[1])):
+            mark = stepper.mark()
+            memory = self._memories.get(lane, mark.switching)
+            time = float(begin[lane]), 0.0
+            stepper.back_to(replace(mark, time=time, state=states[:, lane], steps=0, switching=memory))
+            stepper.settle()
+            if not stepper.to(float(end[lane])):
+                return None
+            result[:, lane], steps = stepper.state, stepper.steps
+            self._memories[lane] = stepper.mark().switching
+        return result, steps
+
+
+def lanes_of(system: System, steps: int) -> Lanes:
+    """Lanes of a system in double precision, with code of their own.
+
+    Args:
+        steps: of the motion; decides how it is compiled.
+    """
+    return SteppedLanes(system) if system.switches else BatchLanes(system, steps)
+
+
 class OwnLanes:
     """One after the other, by an integrator that is there already: for short motions.
 
@@ -97,6 +134,8 @@ class SeriesErrors:
             hy.taylor_adaptive(system.equations, initial, compact_mode=True, **options)
             for options in ({"tol": self._tried}, {})
         )
+        for integrator in (self._loose, self._exact):
+            integrator.pars[:] = 1.0  # on whichever side of its surfaces
 
     def rate(self, state: np.ndarray, time: float) -> np.ndarray:
         """Error (states,) for each unit of time, internal units."""

@@ -280,3 +280,22 @@ def test_a_norm_that_vanishes_is_not_passed_over() -> None:
     assert progress.status is Status.FINISHED
     smooth, _ = about_z(drag.format("sqrt(1 + wx^2 + wy^2 + wz^2)"), initial=start)
     assert smooth.status is Status.FINISHED
+
+
+def test_the_announced_error_knows_the_sides(runs: Path) -> None:
+    """Neighbours cross, and slide, on their own: a motion that forgets its torques isn't near this one."""
+    torque = '"-0.2*abs(wx)*wx", "0.3*sign(sin(3*t))", "-0.3*sign(wz)"'
+    text = config(
+        "principal_moments = [1, 1.2, 1.5]",
+        "angular_velocity = [0.3, 0.2, 0.5]",
+        f'kind = "torque"\ncomponents = [{torque}]',
+        "end = 20\nsamples = 3",
+    )
+    run = run_text(text, runs)
+    truth = try_setting(rigidsim.parse(text), Setting("extended"), compact=True)
+    dataset = run.dataset
+    error = angles_between([dataset["quaternion"].values], truth.attitudes)[-1]
+    announced = run.summary["accuracy"]["estimated_attitude_error"]
+    assert error <= 3 * announced
+    assert announced < 1e-11
+    assert run.summary["warnings"] == []
