@@ -121,8 +121,14 @@ def samples_at(found: Sequence[FoundEvent], precision: Precision) -> SampleBlock
     )
 
 
-def engine_events(system: System, precision: Precision, log: EventLog) -> list[hy.nt_event]:
-    """heyoka's events for a system's crossings."""
+def engine_events(
+    system: System, precision: Precision, log: EventLog, offsets: int | None = None
+) -> list[hy.nt_event]:
+    """heyoka's events for a system's crossings.
+
+    Args:
+        offsets: number of the first of the parameters to be added to their expressions, one to each.
+    """
 
     def callback(index: int) -> Callable[[Integrator, Scalar, int], None]:
         def called(integrator: Integrator, time: Scalar, _: int) -> None:
@@ -130,7 +136,9 @@ def engine_events(system: System, precision: Precision, log: EventLog) -> list[h
 
         return called
 
-    return [
-        hy.nt_event(c.expression, callback(i), direction=_DIRECTIONS[c.direction], fp_type=precision.scalar)
-        for i, c in enumerate(system.crossings)
-    ]
+    events = []
+    for i, c in enumerate(system.crossings):
+        expression = c.expression if offsets is None else c.expression + hy.par[offsets + i]
+        way = _DIRECTIONS[c.direction]
+        events.append(hy.nt_event(expression, callback(i), direction=way, fp_type=precision.scalar))
+    return events

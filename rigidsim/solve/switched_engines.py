@@ -24,6 +24,7 @@ from rigidsim.solve.sliding import sliding
 from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.switching import SLIDES, Look, Probe, continued
 
+_BESIDE = 60  # bits below a rounding of one
 _BISECTIONS = 4  # of a step for each bit of the precision
 
 Root = tuple[Any, int, int]
@@ -138,7 +139,8 @@ class SwitchedEngines(Stepper):
                     leaves = self._noting(j, end)
                     events.append(hy.nt_event(side - float(end), leaves, direction=way, fp_type=kind))
         if self.has_events:
-            events += engine_events(system, self.precision, self.log)
+            offsets = system.parameters + len(system.surfaces)
+            events += engine_events(system, self.precision, self.log, offsets)
         if self._tolerance is not None:
             options["tol"] = self._tolerance
         integrator = hy.taylor_adaptive(
@@ -202,7 +204,8 @@ class SwitchedEngines(Stepper):
 
         The engine finds a zero at a step's very beginning again and again, in place of those that follow. So
         an argument that is zero there but for rounding is watched for the zero of its sum with a rounding, on
-        the side that the motion is on.
+        the side that the motion is on; and an event that lies there, and was found on the way to it, for the
+        zero of its sum with next to nothing.
         """
         pars = self._parameters()
         look = self._probe.look(self.state, self.time, pars)
@@ -210,9 +213,17 @@ class SwitchedEngines(Stepper):
         for j, mode in enumerate(self._modes):  # what a unit of time makes of the state tells its size
             noise = self._probe.noise(look, j, [self.state, look.field])
             moved.append(mode * noise if abs(float(look.u[j])) <= noise else 0.0)
+        if self.has_events:
+            moved += [self._beside(*found) for found in self._probe.crossings(self.state, self.time, pars)]
         offsets = self.precision.array([mpmath.mpf(x) for x in moved])
         everything = np.concatenate([pars, offsets])
         engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
+
+    def _beside(self, value: float, noise: float) -> float:
+        """What to add to an event's expression."""
+        if self._along and abs(value) <= noise:  # it is zero all along the surface, and crosses nothing
+            return 2 * noise
+        return 2.0 ** (-self.precision.bits - _BESIDE) if self._fresh and value == 0 else 0.0
 
     def _keep_to_surfaces(self) -> None:
         """Take off what rounding moved the state away from the surfaces that it slides along."""

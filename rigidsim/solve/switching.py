@@ -80,6 +80,10 @@ class Probe:
         self._values = hy.cfunc(
             [*system.surfaces, *system.turning, *system.signed, *named], variables, **options
         )
+        found = [c.expression for c in system.crossings]
+        sizes = [[g * g for g in slopes(expression)[1].values()] for expression in found]
+        lengths = [hy.sqrt(hy.sum(squares)) if squares else hy.expression(0.0) for squares in sizes]
+        self._crossings = hy.cfunc([*found, *lengths, *named], variables, **options)
         outputs = [*system.surfaces, *by_time, *gradients, *field, *named]
         self._everything = hy.cfunc(outputs, variables, **options)
 
@@ -90,6 +94,12 @@ class Probe:
         found = self._values(np.array(state), pars=pars, time=time)
         rest = [float(x) for x in found[self.surfaces : -2]]
         return found[: self.surfaces], rest[: self.angles], rest[self.angles :]
+
+    def crossings(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[tuple[float, float]]:
+        """Values of the events' expressions, and what rounding of the states, of order one, makes of them."""
+        found = [float(x) for x in self._crossings(np.array(state), pars=pars, time=time)[:-2]]
+        noise, half = _RATE_ROUNDINGS * float(self._precision.epsilon), len(found) // 2
+        return [(value, noise * size) for value, size in zip(found[:half], found[half:], strict=True)]
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
         """Everything."""

@@ -74,12 +74,10 @@ class SwitchingStepper(SwitchedEngines):
 
     def to(self, time: float) -> bool:
         """As ``Stepper.to``."""
-        steps = self.steps
         for _ in range(100_000):
             high, low = self._integrator.dtime
             left = (time - high) - low
             if left <= abs(time) * float(self.precision.epsilon):
-                self.steps = steps
                 return True
             if not self._step(min(left, self._longest))[0]:
                 break

@@ -206,6 +206,19 @@ def test_an_event_on_a_surface_is_found_once(runs: Path) -> None:
     assert dataset["half_time"].values == pytest.approx([1 / 3, 5 / 3], rel=8 * EPSILON["double"])
 
 
+def test_an_event_on_a_surface_is_found_again_within_the_next_step(runs: Path) -> None:
+    """w = 1 - t until t = 1, then w = 2 (t - 1)^2 - (t - 1), back at zero at t = 1.5, where it sticks."""
+    text = config(
+        SPHERE,
+        "angular_velocity = [0, 0, 1]",
+        'kind = "torque"\ncomponents = ["0", "0", "-1 + 4*max(t - 1, 0)*step(-wz)"]',
+        "end = 3\nsamples = 3",
+        more='[[events]]\nname = "still"\nexpression = "wz"\n',
+    )
+    dataset = run_text(text, runs).dataset
+    assert dataset["still_time"].values == pytest.approx([1, 1.5], rel=8 * EPSILON["double"])
+
+
 def test_a_certificate_knows_the_kink(runs: Path) -> None:
     """The scene on which the reference and the run once shared an error of 0.086 rad."""
     text = config(
@@ -280,3 +293,22 @@ def test_a_norm_that_vanishes_is_not_passed_over() -> None:
     assert progress.status is Status.FINISHED
     smooth, _ = about_z(drag.format("sqrt(1 + wx^2 + wy^2 + wz^2)"), initial=start)
     assert smooth.status is Status.FINISHED
+
+
+def test_the_announced_error_knows_the_sides(runs: Path) -> None:
+    """Neighbours cross, and slide, on their own: a motion that forgets its torques isn't near this one."""
+    torque = '"-0.2*abs(wx)*wx", "0.3*sign(sin(3*t))", "-0.3*sign(wz)"'
+    text = config(
+        "principal_moments = [1, 1.2, 1.5]",
+        "angular_velocity = [0.3, 0.2, 0.5]",
+        f'kind = "torque"\ncomponents = [{torque}]',
+        "end = 20\nsamples = 3",
+    )
+    run = run_text(text, runs)
+    truth = try_setting(rigidsim.parse(text), Setting("extended"), compact=True)
+    dataset = run.dataset
+    error = angles_between([dataset["quaternion"].values], truth.attitudes)[-1]
+    announced = run.summary["accuracy"]["estimated_attitude_error"]
+    assert error <= 3 * announced
+    assert announced < 1e-11
+    assert run.summary["warnings"] == []

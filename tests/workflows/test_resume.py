@@ -114,6 +114,7 @@ USUAL = (
     "double, sparse, derived angles",
     "double, held invariants, angles",
     "double, events, angles",
+    "double, switching, Euler angles",
     "double, ended by an event",
     "extended, Euler angles, events",
     "30 digits, tiny components",
