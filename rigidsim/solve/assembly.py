@@ -23,8 +23,8 @@ from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.turn_count import MOST_OF_A_CLOSED_FORM, radians_between
 
-_RADIANS_AT_ONCE = 2e5
-_PATIENCE = 0.25  # seconds, in place of those of other runs
+_RADIANS_AT_ONCE = 5e4
+_PATIENCE = 0.1  # seconds, in place of those of other runs
 
 
 @dataclass(frozen=True)

@@ -296,7 +296,7 @@ class Evaluator:
         return self._wrapping.unwrapped(block, turns)
 
     def follow(self, time: float) -> None:
-        """Count turns from the latest sample on as far as the run has come, for a third of a second at most.
+        """Count turns from the latest sample on as far as the run has come, for a fifth of a second at most.
 
         Args:
             time: internal units.

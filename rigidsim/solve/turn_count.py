@@ -157,7 +157,7 @@ class TurnCounter:
         self._lost = False
         self._rate = self._bound
 
-    def follow(self, time: float, seconds: float = 0.3) -> None:
+    def follow(self, time: float, seconds: float = 0.2) -> None:
         """Go on towards the next sample as far as the run itself has come, for so long at most."""
         started = clock_time.perf_counter()
         while (
