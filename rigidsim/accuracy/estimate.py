@@ -18,6 +18,7 @@ import numpy as np
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
 from rigidsim.accuracy.exact_error import ExactError, exact_error
 from rigidsim.accuracy.growth import exponential_growth, power_of_time
+from rigidsim.model.system import System
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.lanes import BatchLanes, Lanes, OwnLanes, SeriesErrors, SwitchingLanes
@@ -60,8 +61,8 @@ class Margins:
     momentum_series: float = 20.0
     cut_off: float = 0.1
     own_steps: int = 3000
-    all_steps: int = 60_000
-    part: float = 0.15
+    all_steps: int = 20_000
+    part: float = 0.1
     dearer: tuple[tuple[str, float], ...] = (("single", 0.3), ("double", 1.0), ("extended", 10.0))
     stable: float = 4.0
     power: float = 1.5
@@ -144,15 +145,16 @@ def estimate_errors(
             law = round_off_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
             return _by_comparison(prepared, exact_error(prepared, form, trail), law, duration, margins)
     level = float(prepared.precision.epsilon)
-    neighbours = interruptible(
-        lambda: _neighbours(prepared, start, end, steps, integrator, condition, margins)
-    )
     dear = dict(margins.dearer).get(prepared.precision.name, math.inf)
-    whole = steps <= max(margins.all_steps, margins.part * dear * steps)
-    asked = end if whole else start + (end - start) * max(margins.all_steps / steps, margins.part * dear)
+    part = min(1.0, max(margins.all_steps / max(steps, 1), margins.part * dear))
+    neighbours = interruptible(
+        lambda: _neighbours(prepared, start, end, steps, part, integrator, condition, margins)
+    )
     lost = math.pi / level
-    spread = neighbours.follow(asked, go_on, lost)
-    if not whole and spread.whole and _suspicious(spread, start, carried, margins):
+    spread = neighbours.follow(start + (end - start) * part if part < 1 else end, go_on, lost)
+    if part < 1 and spread.whole and _suspicious(spread, start, carried, margins):
+        rest = steps * (1 - part)
+        interruptible(lambda: neighbours.prepare_for(rest))
         spread = neighbours.follow(end, go_on, lost)
     if not go_on():
         return None
@@ -164,6 +166,7 @@ def _neighbours(
     start: float,
     end: float,
     steps: int,
+    part: float,
     integrator: Integrator | None,
     condition: float,
     margins: Margins,
@@ -179,7 +182,7 @@ def _neighbours(
         charts = system.requirements.formulation in ("euler_angles", "canonical")
         # in the run's own states, unless they have singularities that a loose tolerance would run into
         system = double_twin(prepared) if charts else system.rounded(precision_of("double").number)
-        lanes = SwitchingLanes(system, start, end, steps) if system.switches else BatchLanes(system, steps)
+        lanes = _lanes(system, start, end, steps, part)
         stand_in = charts and prepared.system.partner is None
         if _loose(prepared) and not system.switches:
             series = SeriesErrors(system, prepared.effective_tolerance)
@@ -187,6 +190,12 @@ def _neighbours(
     pushes = _pushes(prepared, condition if stand_in else None, margins)
     epsilon = float(precision.epsilon)
     return Neighbours(system, lanes, start, end, steps, pushes, epsilon, rounded, series)
+
+
+def _lanes(system: System, start: float, end: float, steps: int, part: float) -> Lanes:
+    if system.switches:
+        return SwitchingLanes(system, start, end, steps)
+    return BatchLanes(system, steps * part)
 
 
 def _loose(prepared: InitialValueProblem) -> bool:

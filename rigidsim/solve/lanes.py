@@ -15,8 +15,8 @@ from rigidsim.solve.steppers import stepper_of
 
 NEIGHBOURS = 3
 TOLERANCE = 1e-8
-_UNROLLED_FROM = 20_000
-"""Steps from which code that takes longer to compile pays."""
+_UNROLLED_FROM = 200_000
+"""Steps to be taken from which code that takes longer to compile pays."""
 _HOPELESS_STEPS = 32_768
 """In one stretch: the motion comes to no end, say towards a collision."""
 _LEAST_TOLERANCE = 1e-11
@@ -38,10 +38,11 @@ class BatchLanes:
     """All lanes in one call, in code of their own.
 
     Args:
-        steps: of the motion; decides how it is compiled.
+        steps: to be taken; decides how it is compiled.
     """
 
-    def __init__(self, system: System, steps: int) -> None:
+    def __init__(self, system: System, steps: float) -> None:
+        self._system = system
         initial = np.repeat(np.array([[float(x)] for x in system.initial]), NEIGHBOURS + 1, axis=1)
         self._integrator = hy.taylor_adaptive_batch(
             system.equations,
@@ -49,6 +50,10 @@ class BatchLanes:
             tol=TOLERANCE,
             compact_mode=steps < _UNROLLED_FROM or system.wide,
         )
+
+    def again(self, steps: float) -> BatchLanes:
+        """For more steps."""
+        return self if steps < _UNROLLED_FROM else BatchLanes(self._system, steps)
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray

@@ -22,7 +22,7 @@ import numpy as np
 
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
-from rigidsim.solve.lanes import NEIGHBOURS, Lanes, SeriesErrors
+from rigidsim.solve.lanes import NEIGHBOURS, BatchLanes, Lanes, SeriesErrors
 
 _LARGEST = 2.0**-24
 """Distance from which neighbours are drawn in. A chord that is drawn in leaves the surfaces on which the
@@ -151,6 +151,11 @@ class Neighbours:
         self._stretch = self._longest
         self._push(pushes.first, np.abs(initial), rounded)
         self.spread = Spread()
+
+    def prepare_for(self, steps: float) -> None:
+        """More steps than were expected follow."""
+        if isinstance(self._lanes, BatchLanes):
+            self._lanes = self._lanes.again(steps)
 
     def follow(self, until: float, go_on: Callable[[], bool], lost: float = math.inf) -> Spread:
         """Go on to a time.
