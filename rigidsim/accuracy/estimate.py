@@ -21,7 +21,7 @@ from rigidsim.accuracy.growth import exponential_growth, power_of_time
 from rigidsim.model.system import System
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
-from rigidsim.solve.lanes import BatchLanes, Lanes, OwnLanes, SeriesErrors, SwitchingLanes
+from rigidsim.solve.lanes import TIGHT, TOLERANCE, BatchLanes, Lanes, OwnLanes, SeriesErrors, SwitchingLanes
 from rigidsim.solve.neighbours import Neighbours, Pushes, Spread
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
@@ -41,6 +41,9 @@ class Margins:
 
     Attributes:
         safety: over the root mean square of three neighbours.
+        drifted: growth of a step's error from which a loosely followed motion is another one; ``gone``: over
+            what leaves no digit, from which that doesn't matter; ``tight_steps``: of runs that are followed
+            tightly at most.
         compared: over the largest difference from a closed form at some samples.
         angles, angle_series, momentum_series: errors of a step in Euler angles over those in quaternions: of
             rounding, and of series that a tolerance cuts off; of the latter with canonical momenta.
@@ -54,7 +57,10 @@ class Margins:
         exponential: power of time past which growth is none.
     """
 
-    safety: float = 2.0
+    safety: float = 3.0
+    drifted: float = 1e6
+    gone: float = 1e6
+    tight_steps: int = 200_000
     compared: float = 3.0
     angles: float = 4.0
     angle_series: float = 5.0
@@ -131,13 +137,12 @@ def estimate_errors(
         None where ``go_on`` ended it.
     """
     scene, system = prepared.scene, prepared.system
-    carried = prepared.system.requirements.formulation != "rates"
+    carried = system.requirements.formulation != "rates"
     if prepared.closed is not None:
         error = CLOSED_FORM * float(prepared.precision.epsilon)
         return _of_closed_form(prepared, error, carried)
-    unit = math.ldexp(1.0, system.scaling.time)
     start = float(prepared.clock.start)
-    end = start + (reached - float(scene.start)) / unit
+    end = start + math.ldexp(reached - float(scene.start), -system.scaling.time)
     if trail is not None and trail.samples:
         form, _ = closed_form_if_any(scene, driven=bool(prepared.python_loads))
         if form is not None:
@@ -145,17 +150,25 @@ def estimate_errors(
             law = round_off_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
             return _by_comparison(prepared, exact_error(prepared, form, trail), law, duration, margins)
     level = float(prepared.precision.epsilon)
-    dear = dict(margins.dearer).get(prepared.precision.name, math.inf)
-    part = min(1.0, max(margins.all_steps / max(steps, 1), margins.part * dear))
-    neighbours = interruptible(
-        lambda: _neighbours(prepared, start, end, steps, part, integrator, condition, margins)
-    )
+    part = margins.part * dict(margins.dearer).get(prepared.precision.name, math.inf)
+    part = min(1.0, max(margins.all_steps / max(steps, 1), part))
     lost = math.pi / level
-    spread = neighbours.follow(start + (end - start) * part if part < 1 else end, go_on, lost)
-    if part < 1 and spread.whole and _suspicious(spread, start, carried, margins):
-        rest = steps * (1 - part)
-        interruptible(lambda: neighbours.prepare_for(rest))
-        spread = neighbours.follow(end, go_on, lost)
+
+    def followed(part: float, tolerance: float) -> Spread:
+        neighbours = interruptible(
+            lambda: _neighbours(prepared, start, end, steps, part, tolerance, integrator, condition, margins)
+        )
+        spread = neighbours.follow(start + (end - start) * part if part < 1 else end, go_on, lost)
+        if part < 1 and spread.whole and _suspicious(spread, start, carried, margins):
+            interruptible(lambda: neighbours.prepare_for(steps * (1 - part)))
+            spread = neighbours.follow(end, go_on, lost)
+        return spread
+
+    spread = followed(part, TOLERANCE)
+    grown = spread.times and margins.own_steps < steps < margins.tight_steps
+    if grown and go_on() and _suspicious(spread, start, carried, margins):
+        if spread.whole and margins.drifted < max(_leading(spread, carried)) < margins.gone * lost:
+            spread = followed(1.0, TIGHT)
     if not go_on():
         return None
     return _conclusion(prepared, spread, end, steps, level, carried, margins)
@@ -167,6 +180,7 @@ def _neighbours(
     end: float,
     steps: int,
     part: float,
+    tolerance: float,
     integrator: Integrator | None,
     condition: float,
     margins: Margins,
@@ -182,7 +196,7 @@ def _neighbours(
         charts = system.requirements.formulation in ("euler_angles", "canonical")
         # in the run's own states, unless they have singularities that a loose tolerance would run into
         system = double_twin(prepared) if charts else system.rounded(precision_of("double").number)
-        lanes = _lanes(system, start, end, steps, part)
+        lanes = _lanes(system, start, end, steps, part, tolerance)
         stand_in = charts and prepared.system.partner is None
         if _loose(prepared) and not system.switches:
             series = SeriesErrors(system, prepared.effective_tolerance)
@@ -192,10 +206,10 @@ def _neighbours(
     return Neighbours(system, lanes, start, end, steps, pushes, epsilon, rounded, series)
 
 
-def _lanes(system: System, start: float, end: float, steps: int, part: float) -> Lanes:
+def _lanes(system: System, start: float, end: float, steps: int, part: float, tolerance: float) -> Lanes:
     if system.switches:
         return SwitchingLanes(system, start, end, steps)
-    return BatchLanes(system, steps * part)
+    return BatchLanes(system, steps * part, tolerance)
 
 
 def _loose(prepared: InitialValueProblem) -> bool:

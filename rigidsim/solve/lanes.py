@@ -14,7 +14,8 @@ from rigidsim.solve.precision import precision_of
 from rigidsim.solve.steppers import stepper_of
 
 NEIGHBOURS = 3
-TOLERANCE = 1e-8
+TOLERANCE, TIGHT = 1e-8, 1e-14
+"""The tight one where errors grow so much that a loosely followed motion is soon another one."""
 _UNROLLED_FROM = 200_000
 """Steps to be taken from which code that takes longer to compile pays."""
 _HOPELESS_STEPS = 32_768
@@ -41,19 +42,19 @@ class BatchLanes:
         steps: to be taken; decides how it is compiled.
     """
 
-    def __init__(self, system: System, steps: float) -> None:
-        self._system = system
+    def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
+        self._system, self._tolerance = system, tolerance
         initial = np.repeat(np.array([[float(x)] for x in system.initial]), NEIGHBOURS + 1, axis=1)
         self._integrator = hy.taylor_adaptive_batch(
             system.equations,
             initial,
-            tol=TOLERANCE,
+            tol=tolerance,
             compact_mode=steps < _UNROLLED_FROM or system.wide,
         )
 
     def again(self, steps: float) -> BatchLanes:
         """For more steps."""
-        return self if steps < _UNROLLED_FROM else BatchLanes(self._system, steps)
+        return self if steps < _UNROLLED_FROM else BatchLanes(self._system, steps, self._tolerance)
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
