@@ -9,7 +9,7 @@ import numpy as np
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 
-_MOST = {True: 64, False: 4}  # of narrow precisions, whose closed forms take arrays, and of others
+_MOST = {True: 64, False: 16}  # of narrow precisions, whose closed forms take arrays, and of others
 
 
 @dataclass
