@@ -40,7 +40,7 @@ class Margins:
     (``experiments/error_coverage.py``).
 
     Attributes:
-        safety: over the root mean square of three neighbours.
+        safety: over the root mean square of three neighbours; ``path``: of it, for position and velocity.
         drifted: growth of a step's error from which a loosely followed motion is another one; ``gone``: over
             what leaves no digit, from which that doesn't matter; ``tight_steps``: of runs that are followed
             tightly at most.
@@ -60,7 +60,8 @@ class Margins:
     safety: float = 3.0
     drifted: float = 1e6
     gone: float = 1e6
-    tight_steps: int = 200_000
+    tight_steps: int = 50_000
+    path: float = 0.5
     compared: float = 3.0
     angles: float = 4.0
     angle_series: float = 5.0
@@ -165,10 +166,10 @@ def estimate_errors(
         return spread
 
     spread = followed(part, TOLERANCE)
-    grown = spread.times and margins.own_steps < steps < margins.tight_steps
-    if grown and go_on() and _suspicious(spread, start, carried, margins):
-        if spread.whole and margins.drifted < max(_leading(spread, carried)) < margins.gone * lost:
-            spread = followed(1.0, TIGHT)
+    far = spread.whole and margins.own_steps < steps < margins.tight_steps and bool(spread.times)
+    far = far and margins.drifted < max(_leading(spread, carried)) < margins.gone * lost
+    if far and go_on() and _suspicious(spread, start, carried, margins):
+        spread = followed(1.0, TIGHT)
     if not go_on():
         return None
     return _conclusion(prepared, spread, end, steps, level, carried, margins)
@@ -326,15 +327,13 @@ def _conclusion(
     amplification = lead / law if law > 0 else 1.0
     growth, horizon = exponential_growth(times, errors, exponent, margins.power, margins.exponential)
     scaling, size, speed = system.scaling, spread.extent, spread.fastest
+    place = margins.path * at_end(spread.position, size, _AS_LARGE * size, speed)
+    pace = margins.path * at_end(spread.velocity, speed, _AS_LARGE * speed)
     return Estimate(
         attitude=min(lead, math.pi) if carried else None,
         rates=at_end(spread.rates, 1.0, 2.0),
-        position=math.ldexp(at_end(spread.position, size, _AS_LARGE * size, speed), scaling.length)
-        if flight
-        else None,
-        velocity=math.ldexp(at_end(spread.velocity, speed, _AS_LARGE * speed), scaling.speed)
-        if flight
-        else None,
+        position=math.ldexp(place, scaling.length) if flight else None,
+        velocity=math.ldexp(pace, scaling.speed) if flight else None,
         amplification=amplification if amplification > margins.stable else 1.0,
         growth_rate=growth,
         predictable_seconds=horizon,
