@@ -115,20 +115,21 @@ class SwitchingLanes:
     ) -> tuple[np.ndarray, int] | None:
         """As of ``Lanes``."""
         stepper, result = self._stepper, np.empty_like(states)
+        # all lanes are on the sides, and have the signs, that the motion has
+        known = self._reached.get(float(begin[0]), self._begin)
         for lane in range(states.shape[1]):
-            time, state = float(begin[lane]), states[:, lane]
-            known = self._reached.get(time) if lane == 0 else None
-            if known is not None and (known.state == state).all():
+            state = states[:, lane]
+            if lane == 0 and (known.state == state).all():
                 stepper.back_to(known)
             else:
-                stepper.back_to(replace(self._begin, time=(time, 0.0), state=state.copy()))
+                stepper.back_to(replace(known, time=(float(begin[lane]), 0.0), state=state.copy()))
                 stepper.settle()
             if not stepper.to(float(end[lane])):
                 return None
             result[:, lane] = stepper.state
             if lane == 0:
                 mark = replace(stepper.mark(), time=(float(end[0]), 0.0))
-                self._reached = {time: known or mark, float(end[0]): mark}
+                self._reached = {float(begin[0]): known, float(end[0]): mark}
         return result, max(round(float(end[0] - begin[0]) * self._pace), 1)
 
 
