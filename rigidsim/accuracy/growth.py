@@ -37,6 +37,8 @@ def exponential_growth(
     if last < 2 or power_of_time(times[: last + 1], largest[: last + 1]) < least:
         return 0.0, None
     early = int(np.searchsorted(times, times[last] / 4))
+    if not largest[early] > 0:  # errors begin where a load does: they have not grown from anything
+        return 0.0, None
     span = math.ldexp(float(times[last] - times[early]), exponent)
     ratio = min(largest[last], 1e300) / largest[early]
     rate = (math.log(ratio) - stable * math.log(times[last] / times[early])) / span

@@ -57,13 +57,14 @@ def storage(prepared: InitialValueProblem, place: Path) -> Storage:
     row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
     shown = min(samples, output.timeline_rows) if output.timeline else 0
     there = next(folder for folder in [place.absolute(), *place.absolute().parents] if folder.exists())
+    disk = shutil.disk_usage(there)
     replaced = sum(file.stat().st_size for file in place.glob("**/*") if file.is_file())
     return Storage(
         row=row,
         segments=samples * row,
         dataset=samples * row * _SHRINK,
         timeline=shown * _TIMELINE_ROW_BYTES,
-        free=shutil.disk_usage(there).free + float(replaced),
+        free=disk.free + float(replaced) if disk.total else math.inf,  # what has no size can't tell
     )
 
 

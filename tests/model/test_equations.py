@@ -486,12 +486,13 @@ SCENES: dict[str, tuple[list[float], list[float], str, bool, set[str]]] = {
     ),
     "asymmetric in free fall": (
         [1, 2, 2.5], [0, 0, 0], FLIGHT, True,
-        {"angular_momentum", "angular_momentum_norm", "energy", "rotational_energy"},
+        {"angular_momentum", "angular_momentum_norm", "energy", "rotational_energy",
+         "linear_momentum_horizontal"},
     ),
     "symmetric in free fall": (
         [1, 1, 1.5], [0, 0, 0], FLIGHT, True,
         {"angular_momentum", "angular_momentum_norm", "angular_momentum_axial", "energy",
-         "rotational_energy"},
+         "rotational_energy", "linear_momentum_horizontal"},
     ),
 }  # fmt: skip
 
@@ -548,6 +549,8 @@ def test_exactly_what_is_conserved_is_listed(case: str) -> None:
         potential = -position @ DOWN if gravity else 0 * spinning
         candidates["rotational_energy"] = spinning
         candidates["linear_momentum"] = velocity
+        if gravity:
+            candidates["linear_momentum_horizontal"] = velocity[:, :2]
     else:
         flying = 0 * spinning
         potential = -np.einsum("nij,j,i->n", r, center, DOWN) if gravity else 0 * spinning
