@@ -110,6 +110,7 @@ def test_the_default_costs_one_and_every_speed_has_a_spread(dataset: xarray.Data
     assert int(tight["work"]) == int(tight["steps"]) * int(tight["taylor_order"]) ** 2 * 7
 
 
+@pytest.mark.slow
 def test_held_invariants_drift_less_over_a_long_run() -> None:
     plan = fixed_plan(3e4, closed=True)
     long = dataset_of(measure(free(3e4), plan=plan, repeats=1, settings=[HELD], budget=LONG))
@@ -211,6 +212,7 @@ def test_the_advice_is_the_cheapest_that_keeps_the_accuracy(points: list[tuple[f
             assert row.cost == min(full or short)
 
 
+@pytest.mark.slow
 def test_a_formulation_that_refuses_is_listed_with_its_reason() -> None:
     canonical = Setting(formulation="canonical")
     plan = fixed_plan(5.0, closed=False, count=3)
@@ -225,6 +227,7 @@ def test_a_formulation_that_refuses_is_listed_with_its_reason() -> None:
     assert np.isnan(row["cpu_ratio"])
 
 
+@pytest.mark.slow
 def test_a_reference_without_closed_form_knows_its_own_error() -> None:
     plan = fixed_plan(8.0, closed=False, count=3)
     found = measure(free(8.0), plan=plan, repeats=1, settings=[HELD], budget=LONG)

@@ -90,6 +90,7 @@ def test_every_kind_of_scene_is_certified_to_what_is_true(number: int, tmp_path:
     assert run.summary["cost"]["seconds"]["choose"] > 0
 
 
+@pytest.mark.slow
 def test_a_choice_is_the_same_each_time_and_dearer_for_more_accuracy() -> None:
     of = experiment(FREE, 1e-6, 60)
     first, again = (choose(of, 1e-6) for _ in range(2))
@@ -218,6 +219,7 @@ def test_digits_lost_to_chaos_are_certified_as_lost(tmp_path: Path) -> None:
     assert run.summary["accuracy"]["certified"] == math.pi
 
 
+@pytest.mark.slow
 def test_a_pulse_that_the_beginning_knows_nothing_of_is_in_the_certificate(tmp_path: Path) -> None:
     of = experiment(PULSE, 1e-9, 200, samples=50)
     run = rigidsim.run(of, out=tmp_path)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import same_bits
+from support import cases, same_bits
 
 import rigidsim
 from rigidsim.errors import RunFolderError
@@ -134,7 +134,9 @@ def test_a_partial_run_is_read_and_gone_on_with_later(
     same_bits(rigidsim.open_run("disk/free"), rigidsim.open_run("runs/free"))
 
 
-@pytest.mark.parametrize("moment", ["a later segment", "the dataset", "the end of the segments"])
+@pytest.mark.parametrize(
+    "moment", cases(["a later segment", "the dataset", "the end of the segments"], ["the dataset"])
+)
 def test_a_folder_that_becomes_read_only_on_the_way(
     moment: str,
     config: Config,

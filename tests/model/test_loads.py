@@ -230,6 +230,7 @@ def circulating_error(end: int, runs: Path) -> tuple[float, float]:
     return float(angle_between(*found).max()), allowed
 
 
+@pytest.mark.slow
 def test_attitude_on_a_circular_orbit_after_long(runs: Path) -> None:
     """n t = 2^13, 28,672 rad in some 59,000 steps: the law gives 4.5e-10, and runs scatter below it."""
     error, allowed = circulating_error(2**13, runs)

@@ -224,7 +224,7 @@ def test_the_bits_do_not_depend_on_how_it_is_driven(sequence: str, time: str, ru
         assert driven.summary["chart_changes"] == plain.summary["chart_changes"]
 
 
-@pytest.mark.parametrize("precision", ["double", "quadruple"])
+@pytest.mark.parametrize("precision", cases(["double", "quadruple"], ["double"]))
 def test_a_resumed_run_has_the_same_bits(precision: str, runs: Path) -> None:
     """Stopped after each few steps, in either chart."""
     end = "end = 30\nsamples = 151" if precision == "double" else "end = 12\nsamples = 61"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
-from support import same_bits
+from support import cases, same_bits
 
 import rigidsim
 from rigidsim.errors import RunFolderError
@@ -217,7 +217,7 @@ def test_any_cuts_give_the_same_dataset(cuts: list[int], tmp_path: Path) -> None
                 np.testing.assert_array_equal(dataset[name].values, part.reshape(dataset[name].shape))
 
 
-@pytest.mark.parametrize("precision", ['"double"', '"quadruple"'])
+@pytest.mark.parametrize("precision", cases(['"double"', '"quadruple"'], ['"double"']))
 def test_a_run_in_many_segments_is_the_run_in_one(
     precision: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
 ) -> None:
