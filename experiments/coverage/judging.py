@@ -171,7 +171,8 @@ def _truth(
     if scene.family == "kink":
         last = prepared.scene.samples.last
         times = [last * n / (SAMPLES - 1) for n in range(SAMPLES)]
-        return {"quaternion": [kinked_attitude(prepared, mpmath.mpf(time)) for time in times]}
+        with mpmath.workdps(50):  # else times are rounded to doubles
+            return {"quaternion": [kinked_attitude(prepared, mpmath.mpf(time)) for time in times]}
     precision = _TRUTH[prepared.precision.name]
     if precision == "extended" and "tolerance" in scene.text:
         precision = "double" if prepared.effective_tolerance > 1e-10 else "extended"
