@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import config, loaded, run_text, same_bits
+from support import cases, config, loaded, run_text, same_bits
 
 import rigidsim
 from rigidsim.session.tuning import Tuning
@@ -79,7 +79,7 @@ def made(scene: str, stride: int) -> tuple[InitialValueProblem, Callable[[], Ass
     return prepared, again
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", cases(SCENES, ("free", "charts", "events")))
 def test_max_steps_is_never_exceeded_and_always_used_up(scene: str) -> None:
     """A step is a natural step of the engine, as ``cost.steps`` counts them; in sessions of so many each, the
     run has as many steps and the same bits as in one go, whichever way it takes.
@@ -104,7 +104,12 @@ def test_max_steps_is_never_exceeded_and_always_used_up(scene: str) -> None:
         assert kept.all() == reference, drive
 
 
-@pytest.mark.parametrize("scene", ["free", "charts", "events", "surfaces", "many samples in a step"])
+@pytest.mark.parametrize(
+    "scene",
+    cases(
+        ["free", "charts", "events", "surfaces", "many samples in a step"], ["free", "many samples in a step"]
+    ),
+)
 def test_a_run_that_is_stopped_within_a_step_goes_on_within_it(scene: str) -> None:
     """After every look at the guards; samples of a step may be handed over over several of them."""
     prepared, again = made(scene, stride=32)

@@ -103,7 +103,7 @@ def test_one_of_two_charts_is_always_regular(sequence: str, angles: tuple[float,
 # --- runs -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+@pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyz", "yxy")))
 def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str, runs: Path) -> None:
     text = tumbling(sequence)
     exact = run_text(text, runs, 'name="x"', RECORD, 'integrator.precision="extended"')
@@ -134,7 +134,7 @@ def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str, runs
     assert (np.abs(np.diff(np.rint(turns), axis=0))[~lost] == 0).all()
 
 
-@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+@pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyz", "yxy")))
 def test_a_run_may_start_in_the_singularity(sequence: str, runs: Path) -> None:
     start = f'euler_angles = [0.4, "{pole(sequence)}", 0.3]'
     run = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), runs, EULER, RECORD)
@@ -153,7 +153,7 @@ def test_a_run_may_start_in_the_singularity(sequence: str, runs: Path) -> None:
     assert (np.einsum("ij,ij->i", found[1:], found[:-1]) > 0.99).all()
 
 
-@pytest.mark.parametrize("offset", ["0", "1e-16", "1e-12", "1e-9"])
+@pytest.mark.parametrize("offset", cases(["0", "1e-16", "1e-12", "1e-9"], ["0", "1e-12"]))
 @pytest.mark.parametrize("sequence", ["zxz", "zyx"])
 def test_a_pass_that_no_sampling_shows_goes_straight_through(sequence: str, offset: str, runs: Path) -> None:
     """A body that spins about the line of nodes: the middle angle grows like t through 16 singularities."""
