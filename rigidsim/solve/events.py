@@ -21,6 +21,8 @@ from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 
 MOST_EVENTS = 1_000_000
+BESIDE = 60
+"""Bits below a rounding of one, of what takes an expression off a zero that a step begins at."""
 _DIRECTIONS = {
     0: hy.event_direction.any,
     1: hy.event_direction.positive,
@@ -122,11 +124,20 @@ def samples_at(found: Sequence[FoundEvent], precision: Precision) -> SampleBlock
 
 
 def engine_events(
-    system: System, precision: Precision, log: EventLog, offsets: int | None = None
+    system: System,
+    precision: Precision,
+    log: EventLog,
+    *,
+    start: Scalar | None = None,
+    offsets: int | None = None,
 ) -> list[hy.nt_event]:
     """heyoka's events for a system's crossings.
 
+    The engine finds a zero at the very beginning of a step twice, and misses the one that follows within it.
+    So an expression that is zero at the start has far less than a rounding added.
+
     Args:
+        start: of the motion; None where it may begin at a zero anywhere.
         offsets: number of the first of the parameters to be added to their expressions, one to each.
     """
 
@@ -136,9 +147,20 @@ def engine_events(
 
         return called
 
+    at_zero = [False] * len(system.crossings) if start is None else _zero_at(system, start)
     events = []
     for i, c in enumerate(system.crossings):
         expression = c.expression if offsets is None else c.expression + hy.par[offsets + i]
+        if at_zero[i]:
+            expression = expression + 2.0 ** (-precision.bits - BESIDE)
         way = _DIRECTIONS[c.direction]
         events.append(hy.nt_event(expression, callback(i), direction=way, fp_type=precision.scalar))
     return events
+
+
+def _zero_at(system: System, start: Scalar) -> list[bool]:
+    """Which events' expressions are zero at the start, as double precision tells."""
+    expressions = [c.expression for c in system.crossings]
+    compiled = hy.cfunc(expressions, system.variables, compact_mode=True)
+    values = compiled(np.array([float(x) for x in system.initial]), time=float(start))
+    return [bool(value == 0) for value in values]

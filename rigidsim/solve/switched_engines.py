@@ -18,13 +18,12 @@ import numpy as np
 from rigidsim.model.system import System
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
-from rigidsim.solve.events import EventLog, engine_events
+from rigidsim.solve.events import BESIDE, EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sliding import sliding
 from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.switching import SLIDES, Look, Probe, continued
 
-_BESIDE = 60  # bits below a rounding of one
 _BISECTIONS = 4  # of a step for each bit of the precision
 
 Root = tuple[Any, int, int]
@@ -140,7 +139,7 @@ class SwitchedEngines(Stepper):
                     events.append(hy.nt_event(side - float(end), leaves, direction=way, fp_type=kind))
         if self.has_events:
             offsets = system.parameters + len(system.surfaces)
-            events += engine_events(system, self.precision, self.log, offsets)
+            events += engine_events(system, self.precision, self.log, offsets=offsets)
         if self._tolerance is not None:
             options["tol"] = self._tolerance
         integrator = hy.taylor_adaptive(
@@ -223,7 +222,7 @@ class SwitchedEngines(Stepper):
         """What to add to an event's expression."""
         if self._along and abs(value) <= noise:  # it is zero all along the surface, and crosses nothing
             return 2 * noise
-        return 2.0 ** (-self.precision.bits - _BESIDE) if self._fresh and value == 0 else 0.0
+        return 2.0 ** (-self.precision.bits - BESIDE) if self._fresh and value == 0 else 0.0
 
     def _keep_to_surfaces(self) -> None:
         """Take off what rounding moved the state away from the surfaces that it slides along."""

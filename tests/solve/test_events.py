@@ -213,3 +213,22 @@ def test_an_event_that_never_happens_is_an_empty_variable(runs: Path) -> None:
 def test_bad_events_are_refused(event: str, message: str, runs: Path) -> None:
     with pytest.raises(ConfigError, match=message):
         run_text(FLIPS.format(samples=11) + f"[[events]]\n{event}\n", runs)
+
+
+@pytest.mark.parametrize("precision", ["double", "extended"])
+@pytest.mark.parametrize(("direction", "count"), [("down", 1), ("any", 1), ("up", 0)])
+def test_a_throw_from_the_ground_comes_down_within_the_first_step(
+    precision: str, direction: str, count: int, runs: Path
+) -> None:
+    """z = 3 t - g t^2 / 2 is zero at the start and at 6 / g; a body that hardly turns takes long steps."""
+    text = config(
+        "principal_moments = [1, 1, 2]\nmass = 1",
+        "angular_velocity = [0.1, 0, 0.1]\nposition = [0, 0, 0]\nvelocity = [0, 0, 3]",
+        'kind = "uniform_gravity"\nacceleration = [0, 0, -9.75]',
+        "end = 2\nsamples = 3",
+        integrator=f'precision = "{precision}"',
+        more=f'[[events]]\nname = "ground"\nexpression = "z"\ndirection = "{direction}"\n',
+    )
+    times = run_text(text, runs).dataset["ground_time"].values
+    assert len(times) == count
+    assert all(abs(times - 6 / 9.75) <= 4 * 2.0**-52)
