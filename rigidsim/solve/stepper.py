@@ -117,7 +117,7 @@ class Stepper:
     def _compiled(self, system: System) -> Integrator:
         options = dict(self.precision.options)
         if self.has_events:
-            options["nt_events"] = engine_events(system, self.precision, self.log)
+            options["nt_events"] = engine_events(system, self.precision, self.log, start=self._start)
         if self._tolerance is not None:
             options["tol"] = self._tolerance
         return hy.taylor_adaptive(
@@ -207,9 +207,10 @@ class Stepper:
         self._watched()
         before = self._integrator.time
         outcome, size = self._integrator.step(self._longest, write_tc=True)
-        self.smallest = self.largest = abs(float(size))
         if outcome == hy.taylor_outcome.err_nf_state:
+            self.smallest, self.largest = np.inf, 0.0  # as where no step was taken: its size may be no number
             return False
+        self.smallest = self.largest = abs(float(size))
         self.steps += 1
         self._judge(before, 1)
         if self.watcher is not None:
