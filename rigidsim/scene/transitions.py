@@ -10,7 +10,7 @@ on smoothly along the wrong branch likewise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -29,18 +29,23 @@ _BOUNDED: Mapping[str, float] = {
 }  # fmt: skip
 
 
+def _operations(expression: Expression) -> Iterator[Operation]:
+    """Every operation, those that hold others first."""
+    waiting = [expression.root]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Operation):
+            waiting += node.operands
+            yield node
+
+
 def narrow_parts(expression: Expression) -> list[Expression]:
     """Arguments of flat functions, denominators, and bases of negative or high powers, each once.
 
     Left out are constants and what can't leave ``WIDE``, such as a sine.
     """
     found: dict[Node, None] = {}
-    waiting = [expression.root]
-    while waiting:
-        node = waiting.pop()
-        if not isinstance(node, Operation):
-            continue
-        waiting += node.operands
+    for node in _operations(expression):
         part: Node | None = None
         if node.operator in _FLAT:
             part = node.operands[0]
@@ -64,12 +69,7 @@ def root_parts(expression: Expression) -> list[Expression]:
     Left out is what is a sum of squares and a positive number, or is positive by its form otherwise.
     """
     found: dict[Node, None] = {}
-    waiting = [expression.root]
-    while waiting:
-        node = waiting.pop()
-        if not isinstance(node, Operation):
-            continue
-        waiting += node.operands
+    for node in _operations(expression):
         part: Node | None = None
         if node.operator == "sqrt":
             part = node.operands[0]
