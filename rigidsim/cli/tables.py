@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from rigidsim.look.readable_time import span_text
 from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
 
 
@@ -27,17 +28,6 @@ def _table(*columns: str) -> Table:
         right = name in ("largest drift", "final", "bound", "initial", "put back")
         table.add_column(name, justify="right" if right else "left", overflow="fold")
     return table
-
-
-def duration(seconds: float) -> str:
-    """A time span in the unit that suits it."""
-    for unit, size in (("yr", 31557600.0), ("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.3g} {unit}"
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.3g} s"
 
 
 def size(count: float) -> str:
@@ -108,11 +98,11 @@ def _print_ended(summary: Summary, out: Console) -> None:
         out,
         "cost",
         f"{cost.steps:,} steps, {summary.samples:,} of {summary.samples_planned:,} samples, "
-        f"{duration(seconds)} wall ({duration(cost.seconds[ENGINE])} integrating), "
-        f"{duration(cost.cpu_seconds)} CPU",
+        f"{span_text(seconds)} wall ({span_text(cost.seconds[ENGINE])} integrating), "
+        f"{span_text(cost.cpu_seconds)} CPU",
     )
     if cost.cpu_by_phase:
-        spent = [f"{name.replace('_', ' ')} {duration(s)}" for name, s in cost.cpu_by_phase.items()]
+        spent = [f"{name.replace('_', ' ')} {span_text(s)}" for name, s in cost.cpu_by_phase.items()]
         _line(out, "CPU", ", ".join(spent))
     out.print(_invariants(summary))
     _line(out, "drifts", "relative to: " + _scales(summary.invariants))
@@ -220,8 +210,8 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     if plan["accuracy"] is not None:
         out.print(f"chosen     {plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
     out.print(
-        f"predicted  {predicted['steps']:.3g} steps of about {duration(pilot['step'])} "
-        f"(pilot of {pilot['steps']:.0f}), {duration(predicted['total_seconds'])}, "
+        f"predicted  {predicted['steps']:.3g} steps of about {span_text(pilot['step'])} "
+        f"(pilot of {pilot['steps']:.0f}), {span_text(predicted['total_seconds'])}, "
         f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
         f"timeline {size(predicted['timeline_bytes'])}"
     )
@@ -281,10 +271,10 @@ def print_tradeoff(result: dict[str, Any]) -> None:
     out.print(table)
     if marked:
         less = next(row["seconds"] for row in result["advice"] if row["less"])
-        out.print(Text(f"  * over the first {duration(less)} only: quadruple precision is slow"))
+        out.print(Text(f"  * over the first {span_text(less)} only: quadruple precision is slow"))
     part = over / result["horizon_seconds"]
     how_much = "all" if part >= 1 else f"the first {100 * part:.2g} %"
-    _line(out, "measured", f"{how_much} of {duration(result['horizon_seconds'])}; nothing is extrapolated")
+    _line(out, "measured", f"{how_much} of {span_text(result['horizon_seconds'])}; nothing is extrapolated")
     _line(out, "compared", f"{result['compared']}; largest error at up to 38 times")
     _line(out, "against", result["reference"])
     _line(

@@ -11,6 +11,7 @@ Importing this package loads nothing heavy.
 | `roles` | residuals, drifts and what was put back, by the variables' attributes |
 | `plots` | which variable goes into which plot |
 | `clock` | seconds to the viewer's integer timelines |
+| `readable_time` | spans in the unit that suits them, instants as dates, the axis of time |
 | `page` | the summary page |
 | `figures` | `save_figure`: dataset to PNG or SVG |
 | `panels` | the single panels of that figure |

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.page import read_config
+from rigidsim.look.readable_time import unit_for
 from rigidsim.look.roles import drifts, put_backs
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stage import plane_view
@@ -29,8 +30,6 @@ PINK = "#c2327a"
 PALETTE = ("#2f6fbf", "#e08e2b", "#8f5bb5", "#3a9a5b", "#d1495b", "#17a2b0", "#8c6d46", "#6b7280")
 VIEW = (22.0, 36.0)  # elevation and azimuth of the 3D panels, degrees
 
-_YEAR = 365.25 * 86400.0
-_TIME_UNITS = ((_YEAR, "yr"), (86400.0, "d"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
 _PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f", -18: "a", 3: "k", 6: "M", 9: "G"}
 
 
@@ -44,16 +43,8 @@ class Panel:
 
 def time_scale(seconds: Array) -> tuple[float, str]:
     """Divisor and unit in which the span of `seconds` reads as a number of order 1 to 1000."""
-    span = float(np.abs(seconds).max(initial=0.0)) or 1.0
-    if span >= 1000 * _YEAR:
-        exponent = 3 * int(np.log10(span / _YEAR) // 3)
-        return _YEAR * 10.0**exponent, {3: "kyr", 6: "Myr", 9: "Gyr"}.get(exponent, f"1e{exponent} yr")
-    for size, unit in _TIME_UNITS:
-        # Two of the next unit up read worse than many of this one: 90 s, not 1.5 min.
-        if span >= (2 * size if size > 1 else 0.5):
-            return size, unit
-    exponent = 3 * int(np.floor(np.log10(span) / 3 + 1e-9))
-    return 10.0**exponent, f"{_PREFIXES.get(exponent, f'1e{exponent} ')}s"
+    unit = unit_for(float(np.abs(seconds).max(initial=0.0)))
+    return unit.seconds, unit.symbol
 
 
 def si_scale(values: Array, unit: str) -> tuple[float, str]:

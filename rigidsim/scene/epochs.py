@@ -26,6 +26,7 @@ _FORM = re.compile(
 )
 _WIDE = Context(prec=80, rounding=ROUND_HALF_EVEN)
 _TT_MINUS_TAI = Fraction(32184, 1000)  # by definition
+_JULIAN_DATE_OF_DAY_0 = Fraction(2 * 1721424 + 1, 2)  # 2451544.5 at 0 h of 2000-01-01, which is day 730120
 _FIRST_OFFSET = 10  # TAI - UTC on 1972-01-01, before which seconds of UTC had other lengths
 
 
@@ -73,6 +74,17 @@ class Epoch:
         if found + 1 < len(days) and day >= days[found + 1]:
             day, rest = day - 1, rest + _DAY
         return _dated(self.scale, day, rest)
+
+    def uniform(self) -> Epoch:
+        """The same instant in a scale whose days all have 86,400 s: its own, for UTC that is TT."""
+        if self.scale != "UTC":
+            return self
+        return Epoch("TT", *divmod(self._uniform() + int(_TT_MINUS_TAI * _SECOND), _DAY))
+
+    def julian_date(self) -> Fraction:
+        """The Julian date in ``uniform``'s scale, exactly."""
+        uniform = self.uniform()
+        return uniform.day + _JULIAN_DATE_OF_DAY_0 + Fraction(uniform.ticks, _DAY)
 
     def since_j2000(self) -> Fraction:
         """Seconds of TDB since J2000 (2000-01-01T12:00:00 TDB); for TT and UTC right to some 1e-5 s."""

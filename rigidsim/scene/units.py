@@ -137,3 +137,17 @@ def conversion(text: str, expected: str) -> tuple[Fraction, int]:
     if dimensions != wanted:
         raise UnitError(f'"{text}" is not a unit of the dimension asked for, which is {expected}')
     return factor / wanted_factor, pi_power
+
+
+def time_unit(name: str) -> Fraction:
+    """Seconds in a unit of time that has a name, such as ``day``, ``yr`` or ``kyr``.
+
+    Raises:
+        UnitError: it is none.
+    """
+    if not re.fullmatch(r"[^\W\d]+", name):
+        raise UnitError(f'"{name[:40]}" is not the name of a unit of time')
+    factor, pi_power = conversion(name, "s")
+    if pi_power:
+        raise UnitError(f'"{name}" is not a unit of time')
+    return factor

@@ -1,0 +1,166 @@
+"""Times as people read them: a span in the unit that suits it, fs to Gyr, and an instant as a date.
+
+What a config says of it in ``[time] unit`` and ``epoch`` stands in the dataset's attributes ``time_unit`` and
+``epoch``; without a unit the span chooses one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.scene.epochs import J2000, Epoch, parse_epoch
+from rigidsim.scene.units import time_unit
+
+if TYPE_CHECKING:
+    import xarray
+
+DAY = 86400.0
+YEAR = 365.25 * DAY
+"""Julian, s: the unit ``yr`` of configs."""
+_J2000_YEAR = 2000.0
+_LONG = ((1e9 * YEAR, "Gyr"), (1e6 * YEAR, "Myr"), (1e3 * YEAR, "kyr"))
+_CALENDAR = ((YEAR, "yr"), (DAY, "d"), (3600.0, "h"), (60.0, "min"))
+_SHORT = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"), (1e-12, "ps"), (1e-15, "fs"))
+_CLOSE = 1 + 1e-9  # a span this near below a unit counts as one
+
+
+@dataclass(frozen=True)
+class TimeUnit:
+    """A unit of time.
+
+    Attributes:
+        symbol: as it is written behind a number.
+        seconds: in one of it.
+    """
+
+    symbol: str
+    seconds: float
+
+
+def unit_for(span: float) -> TimeUnit:
+    """The unit in which a span (s, of either sign) reads as a number of about 1 to 1000.
+
+    Two minutes, hours, days and years are where these begin: 90 s reads better than 1.5 min.
+    """
+    size = abs(span) * _CLOSE
+    if not math.isfinite(size) or size == 0:
+        return TimeUnit("s", 1.0)
+    for factor, units in ((1.0, _LONG), (2.0, _CALENDAR), (1.0, _SHORT)):
+        for seconds, symbol in units:
+            if size >= factor * seconds:
+                return TimeUnit(symbol, seconds)
+    exponent = 3 * math.floor(math.log10(size) / 3)
+    return TimeUnit(f"1e{exponent} s", 10.0**exponent)
+
+
+def named_unit(name: str) -> TimeUnit:
+    """The unit that a config calls so, such as ``day``.
+
+    Raises:
+        ValueError: it is no unit of time.
+    """
+    return TimeUnit(name, float(time_unit(name)))
+
+
+def unit_of(attributes: Mapping[str, Any], span: float) -> TimeUnit:
+    """The unit that a run's attributes ask for, or else the one that suits a span (s)."""
+    name = str(attributes.get("time_unit") or "")
+    try:
+        return named_unit(name) if name else unit_for(span)
+    except ValueError:  # of a dataset that was tampered with
+        return unit_for(span)
+
+
+def epoch_of(attributes: Mapping[str, Any]) -> Epoch | None:
+    """What time 0 is, where a run's attributes say it."""
+    try:
+        return parse_epoch(str(attributes.get("epoch") or ""))
+    except ValueError:
+        return None
+
+
+def number_text(value: float, digits: int = 3) -> str:
+    """A number to so many digits, without an exponent where that is short: ``999.7`` gives ``1000``."""
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e" in text and 1 <= abs(value) < 1e6 else text
+
+
+def span_text(seconds: float, digits: int = 3, unit: TimeUnit | None = None) -> str:
+    """A time span, in the unit that suits it unless one is given: ``304 d``, ``25.8 kyr``, ``4.2 µs``."""
+    unit = unit or unit_for(seconds)
+    return f"{number_text(seconds / unit.seconds, digits)} {unit.symbol}"
+
+
+def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
+    """Date and time some seconds after an epoch, to about a thousandth of a span (s).
+
+    A day, a minute, a second, or decimals of one, in the epoch's scale; times of the day are rounded, dates
+    are those of the day. Where UTC isn't known it is TT; outside the years 1 to 9999 a Julian year is given.
+    """
+    step = abs(span) * 1e-3 * _CLOSE or 1e-6
+    decimals = min(max(math.ceil(-math.log10(step)), 0), 9)
+    half = 0.0 if step >= DAY else 30.0 if step >= 60 else 0.5 * 10.0**-decimals
+    for scale in (epoch, epoch.uniform()):
+        try:
+            then = scale.after(Decimal(seconds) + Decimal(half))
+        except ValueError:
+            continue
+        text = then.calendar()
+        if step >= DAY:
+            text = text[:10]
+        elif step >= 60:
+            text = text[:16]
+        else:
+            text = text[:19] + (f".{text[20:].ljust(decimals, '0')[:decimals]}" if decimals else "")
+        return f"{text} {then.scale}"
+    uniform = epoch.uniform()
+    return f"year {number_text(julian_year(epoch) + seconds / YEAR, 9)} {uniform.scale}"
+
+
+def julian_year(epoch: Epoch) -> float:
+    """2000 at J2000, one more each 365.25 days, in the epoch's scale (TT for UTC)."""
+    uniform = epoch.uniform()
+    return _J2000_YEAR + float(uniform.julian_date() - J2000.julian_date()) / 365.25
+
+
+@dataclass(frozen=True)
+class TimeAxis:
+    """How times are shown along an axis.
+
+    Attributes:
+        unit: of the numbers.
+        label: with the unit.
+        origin: the number that time 0 has.
+    """
+
+    unit: TimeUnit
+    label: str
+    origin: float = 0.0
+
+    def numbers(self, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Times of the scene, s, as the axis shows them."""
+        return np.asarray(self.origin + np.asarray(seconds) / self.unit.seconds, dtype=np.float64)
+
+
+def time_axis_of(dataset: xarray.Dataset) -> TimeAxis:
+    """The axis for a dataset's times: years of the calendar, time since the epoch, or time alone.
+
+    Args:
+        dataset: of a run; its first and last time are read.
+    """
+    ends = [float(dataset["time"][i]) for i in (0, -1)] if dataset.sizes["time"] else [0.0]
+    unit = unit_of(dataset.attrs, max(map(abs, ends)))
+    epoch = epoch_of(dataset.attrs)
+    if epoch is None:
+        return TimeAxis(unit, f"time [{unit.symbol}]")
+    if unit.seconds == YEAR:
+        return TimeAxis(unit, f"year ({epoch.uniform().scale})", julian_year(epoch))
+    since = "J2000" if epoch == J2000 else str(epoch)
+    return TimeAxis(unit, f"time since {since} [{unit.symbol}]")
