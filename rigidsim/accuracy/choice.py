@@ -87,7 +87,7 @@ def wanted(experiment: Experiment) -> float | None:
     they are, and a dearer setting is chosen where they are larger than that.
     """
     integrator = experiment.config.integrator
-    found = [] if integrator.accuracy is None else [float(integrator.accuracy.rational)]
+    found = [] if integrator.accuracy is None else [float(integrator.accuracy)]
     if integrator.accuracy_position is not None:
         scene = build_scene(experiment)
         if scene.position is None or scene.velocity is None:
@@ -95,7 +95,7 @@ def wanted(experiment: Experiment) -> float | None:
             raise ConfigError(Problem("[integrator] accuracy_position", what), experiment.source)
         seconds = float(scene.samples.last - scene.start)
         size = math.hypot(*map(float, scene.position)) or math.hypot(*map(float, scene.velocity)) * seconds
-        found.append(min(float(integrator.accuracy_position.rational) / (size or 1.0), _MOST))
+        found.append(min(float(integrator.accuracy_position) / (size or 1.0), _MOST))
     return min(found) if found else None
 
 

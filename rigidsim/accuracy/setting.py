@@ -92,7 +92,7 @@ def setting_of(experiment: Experiment) -> Setting:
     tolerance = integrator.tolerance
     return Setting(
         integrator.precision,
-        None if isinstance(tolerance, str) else float(tolerance.rational),
+        None if isinstance(tolerance, str) else float(tolerance),
         "quaternion" if integrator.formulation in ("auto", "rates") else integrator.formulation,
         integrator.hold_invariants,
         integrator.method,

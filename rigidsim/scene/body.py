@@ -68,8 +68,11 @@ def _fail(key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[body] {key}".strip(), text))
 
 
-def build_body(table: schema.Body, context: Any) -> RigidBody:
+def build_body(table: schema.Body, context: Any, sequence: str = "zxz") -> RigidBody:
     """Work out the body that ``[body]`` describes, in the context's precision.
+
+    Args:
+        sequence: of Euler angles of parts that name none.
 
     Raises:
         ConfigError: not exactly one source of inertia, a dimension missing or foreign, a tensor that no
@@ -91,7 +94,7 @@ def build_body(table: schema.Body, context: Any) -> RigidBody:
         )
     if source != "shape" and table.mass is not None:
         raise _fail("mass", f"it follows from {source}; remove it")
-    return _from_pieces(table, source, context)
+    return _from_pieces(table, source, context, sequence)
 
 
 def _refuse_foreign(table: schema.Solid, allowed: tuple[str, ...], why: str, place: str) -> None:
@@ -147,7 +150,7 @@ def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
                 )
 
 
-def _from_pieces(table: schema.Body, source: str, context: Any) -> RigidBody:
+def _from_pieces(table: schema.Body, source: str, context: Any, sequence: str) -> RigidBody:
     if source == "shape":
         pieces = [_solid(table, table.mass, [context.zero] * 3, None, "", context)]
     elif source == "parts":
@@ -155,7 +158,8 @@ def _from_pieces(table: schema.Body, source: str, context: Any) -> RigidBody:
         for number, part in enumerate(table.parts or []):
             position = [x.at(context) for x in part.position]
             place = f"parts[{number}]."
-            pieces.append(_solid(part, part.mass, position, part.quaternion, place, context))
+            turn = _attitude_of(part, sequence, place, context)
+            pieces.append(_solid(part, part.mass, position, turn, place, context))
     else:
         pieces = []
         for number, point in enumerate(table.points or []):
@@ -205,7 +209,7 @@ def _solid(
     table: schema.Solid,
     mass: ExactNumber | None,
     position: Vector,
-    quaternion: list[ExactNumber] | None,
+    quaternion: Vector | None,
     place: str,
     context: Any,
 ) -> _Piece:
@@ -236,14 +240,28 @@ def _solid(
     sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in plain.items()}
     drawing = _drawn(name, sizes, position)
     if quaternion is not None:
-        q = [x.at(context) for x in quaternion]
-        if all(x == 0 for x in q):
-            raise _fail(f"{place}quaternion", "given zero; a quaternion w x y z that is not zero is allowed")
-        q = attitude.unit_quaternion(context, q)
-        turn = attitude.rotation_matrix(q)
+        turn = attitude.rotation_matrix(quaternion)
         inertia = multiply(multiply(turn, inertia), transpose(turn))
-        drawing["quaternion"] = [float(x) for x in q]
+        drawing["quaternion"] = [float(x) for x in quaternion]
     return _Piece(heavy, position, inertia, drawing)
+
+
+def _attitude_of(part: schema.Part, sequence: str, place: str, context: Any) -> Vector | None:
+    """Unit quaternion from the part's own axes to the body's; None where it isn't turned."""
+    if part.quaternion is not None and part.euler_angles is not None:
+        what = "given beside quaternion; only one attitude is allowed: remove one of them"
+        raise _fail(f"{place}euler_angles", what)
+    if part.euler_sequence is not None and part.euler_angles is None:
+        raise _fail(f"{place}euler_sequence", "given without euler_angles; give them, or remove it")
+    if part.euler_angles is not None:
+        angles = [x.at(context) for x in part.euler_angles]
+        return attitude.quaternion_from_euler(context, angles, part.euler_sequence or sequence)
+    if part.quaternion is None:
+        return None
+    q = [x.at(context) for x in part.quaternion]
+    if all(x == 0 for x in q):
+        raise _fail(f"{place}quaternion", "given zero; a quaternion w x y z that is not zero is allowed")
+    return attitude.unit_quaternion(context, q)
 
 
 def _drawn(solid: str, dimensions: dict[str, Any], position: Vector) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from typing import Any
@@ -21,19 +21,34 @@ _LARGEST_DECIMAL_EXPONENT = 5000
 _LONGEST_TEXT = 5000
 _TOO_LONG = f"digits and exponent of a number may make at most {_LARGEST_DECIMAL_EXPONENT}"
 
-_DECIMAL = r"[+-]?(?:\d+(?:_\d+)*\.?(?:\d+(?:_\d+)*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_MOST_FACTORS = 20
+_LARGEST_POWER_OF_PI = 64
+_LARGEST_BITS = 150_000  # of a product, which a single power may have
+
+_DECIMAL = r"[+-]?(?:\d+(?:_\d+)*(?:\.(?:\d+(?:_\d+)*)?)?|\.\d+)(?:[eE][+-]?\d+)?"
+_PI = r"[+-]?(?:pi(?![\w])|π)"
+_FACTOR = rf"(?:{_DECIMAL}|{_PI})(?:\s*(?:\^|\*\*)\s*{_DECIMAL})?"
 _NUMBER_AND_UNIT = re.compile(
-    rf"\s*(?P<number>{_DECIMAL})"
-    rf"(?:\s*(?P<operator>/|\^|\*\*)\s*(?P<operand>{_DECIMAL}))?(?:\s*\*\s*|\s*)(?P<unit>[^\d\s.].*)?"
+    rf"\s*(?P<number>{_FACTOR}(?:(?:\s*[*/]\s*|\s*(?=pi|π)){_FACTOR})*)"
+    r"(?:\s*\*\s*|\s*)(?P<unit>[^\d\s.].*)?"
+)
+_STEP = re.compile(
+    rf"\s*(?P<operator>[*/]?)\s*(?:(?P<number>{_DECIMAL})|(?P<pi>{_PI}))"
+    rf"(?:\s*(?:\^|\*\*)\s*(?P<exponent>{_DECIMAL}))?"
 )
 
 
 @dataclass(frozen=True)
 class ExactNumber:
-    """``rational * pi**pi_power``, in SI units (angles in radians)."""
+    """``rational * pi**pi_power``, in SI units (angles in radians).
+
+    Attributes:
+        assumed: the unit that it was taken in where none was written; empty otherwise.
+    """
 
     rational: Fraction
     pi_power: int = 0
+    assumed: str = field(default="", compare=False)
 
     def at(self, context: Any) -> Any:
         """The value as an ``mpf`` of the given mpmath context, correct to its precision."""
@@ -96,17 +111,31 @@ def _power(base: Fraction, exponent: Fraction) -> Fraction:
     return base ** int(exponent)
 
 
-def _arithmetic(match: re.Match[str]) -> Fraction:
-    """The number of a text, with its one division or power."""
-    rational = _rational(match["number"])
-    if match["operand"] is None:
-        return rational
-    operand = _rational(match["operand"])
-    if match["operator"] != "/":
-        return _power(rational, operand)
-    if operand == 0:
-        raise ValueError("a divisor other than zero is allowed")
-    return rational / operand
+def _product(text: str) -> tuple[Fraction, int]:
+    """The number of a text of factors, quotients and powers, as a rational times a power of pi."""
+    rational, pi_power, begin, count = Fraction(1), 0, 0, 0
+    while begin < len(text):
+        step = _STEP.match(text, begin)
+        assert step is not None  # the whole text is made of them
+        begin, count = step.end(), count + 1
+        exponent = Fraction(1) if step["exponent"] is None else _rational(step["exponent"])
+        if step["pi"] is None:
+            factor, turns = _rational(step["number"]), 0
+            factor = factor if step["exponent"] is None else _power(factor, exponent)
+        else:
+            if exponent.denominator != 1 or abs(exponent) > _LARGEST_POWER_OF_PI:
+                raise ValueError(f"a power of pi has a whole exponent of at most {_LARGEST_POWER_OF_PI}")
+            factor, turns = Fraction(-1 if step["pi"].startswith("-") else 1), int(exponent)
+        if step["operator"] == "/":
+            if factor == 0:
+                raise ValueError("a divisor other than zero is allowed")
+            factor, turns = 1 / factor, -turns
+        rational, pi_power = rational * factor, pi_power + turns
+        if max(rational.numerator.bit_length(), rational.denominator.bit_length()) > _LARGEST_BITS:
+            raise ValueError(f"{_TOO_LONG}; write fewer digits or a larger unit")
+        if count > _MOST_FACTORS or abs(pi_power) > _LARGEST_POWER_OF_PI:
+            raise ValueError(f"at most {_MOST_FACTORS} factors are allowed")
+    return rational, pi_power
 
 
 def _from_text(text: str, unit: str) -> ExactNumber:
@@ -116,19 +145,23 @@ def _from_text(text: str, unit: str) -> ExactNumber:
     if match is None:
         raise ValueError(
             f"given {shown(text)}; a number, or a string of a number and a unit, is allowed, "
-            f'such as 1.5, "1/3", "2^-20" or {example(unit)}'
+            f'such as 1.5, "1/3", "2^-20", "pi/4" or {example(unit)}'
         )
     try:
-        rational = _arithmetic(match)
+        rational, pi_power = _product(match["number"])
     except ValueError as error:
         raise ValueError(f"given {shown(text)}; {error}") from None
     if match["unit"] is None:
-        return ExactNumber(rational)
+        return ExactNumber(rational, pi_power, assumed=_assumed(unit))
     try:
-        factor, pi_power = units.conversion(match["unit"].strip(), unit)
+        factor, turns = units.conversion(match["unit"].strip(), unit)
     except units.UnitError as error:
         raise ValueError(f"given {shown(text)}: {error}; write for instance {example(unit)}") from None
-    return ExactNumber(rational * factor, pi_power)
+    return ExactNumber(rational * factor, pi_power + turns)
+
+
+def _assumed(unit: str) -> str:
+    return "" if unit == "1" else unit
 
 
 def example(unit: str) -> str:
@@ -149,7 +182,8 @@ def parse_number(value: Any, unit: str) -> ExactNumber:
 
     Args:
         value: an int, a Decimal (as the TOML reader yields), a float (taken as the exact binary number
-            that it is), an ExactNumber, or a string such as ``"430 day"``, ``"1/3"`` or ``"2^-20 kg m^2"``.
+            that it is), an ExactNumber, or a string such as ``"430 day"``, ``"1/3"``, ``"-3*pi/4"`` or
+            ``"2^-20 kg m^2"``.
         unit: SI unit that bare numbers have and that a written unit must agree with; ``"1"`` for none.
 
     Raises:
@@ -165,6 +199,7 @@ def parse_number(value: Any, unit: str) -> ExactNumber:
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"given {value}; finite numbers are allowed")
     try:
-        return ExactNumber(_rational(value) if isinstance(value, Decimal) else Fraction(value))
+        rational = _rational(value) if isinstance(value, Decimal) else Fraction(value)
     except ValueError as error:
         raise ValueError(f"given {shown(value)}; {error}") from None
+    return ExactNumber(rational, assumed=_assumed(unit))

@@ -87,7 +87,7 @@ def build_scene(experiment: Experiment) -> Scene:
             problems.extend(error.problems)
             return None
 
-    body = attempt(build_body, config.body, context)
+    body = attempt(build_body, config.body, context, config.integrator.euler_sequence)
     orientation = attempt(_initial_attitude, config, context)
     times = attempt(sample_times, config.time, context)
     attempt(_check_limits, config)

@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import (
+    AfterValidator,
     Discriminator,
     Field,
     StrictBool,
@@ -98,13 +99,26 @@ else:
     )
 
 
+def _sequence(value: str | None) -> str | None:
+    if value is not None and value not in EULER_SEQUENCES:
+        raise refuse(f"given {shown(value)}; allowed: {', '.join(EULER_SEQUENCES)} (intrinsic)")
+    return value
+
+
+EulerSequence = Annotated[StrictStr, AfterValidator(_sequence)]
+
+
 class Part(Solid):
-    """One solid of a composite body, placed by its centre of mass."""
+    """One solid of a composite body, placed by its centre of mass, turned by a quaternion or Euler angles."""
 
     shape: StrictStr
     mass: Kilogram
     position: Triple[Metre] = Field(default_factory=lambda: [ZERO] * 3)
     quaternion: Four[Dimensionless] | None = None
+    euler_angles: Triple[Angle] | None = None
+    euler_sequence: EulerSequence | None = Field(
+        default=None, description="of euler_angles; that of [integrator] by default"
+    )
 
 
 class Body(Solid):
@@ -172,18 +186,11 @@ class Integrator(ConfigTable):
     formulation: Literal["auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical"] = (
         "auto"
     )
-    euler_sequence: StrictStr = "zxz"
+    euler_sequence: EulerSequence = "zxz"
     method: Literal["taylor", "closed_form"] = "taylor"
     hold_invariants: StrictBool = False
     accuracy: Dimensionless | None = None
     accuracy_position: Metre | None = None
-
-    @field_validator("euler_sequence")
-    @classmethod
-    def _known_sequence(cls, value: str) -> str:
-        if value not in EULER_SEQUENCES:
-            raise refuse(f"given {shown(value)}; allowed: {', '.join(EULER_SEQUENCES)} (intrinsic)")
-        return value
 
     @field_validator("precision", mode="before")
     @classmethod
@@ -206,14 +213,14 @@ class Integrator(ConfigTable):
             number = parse_number(value, "rad")
         except ValueError as error:
             raise refuse(str(error)) from None
-        if not 0 < number.rational < 3:
+        if not 0 < float(number) < 3:
             raise refuse(f"given {shown(value)}; an angle above 0 and below pi is allowed, in rad")
         return value
 
     @field_validator("accuracy_position")
     @classmethod
     def _possible_accuracy_of_position(cls, value: Any) -> Any:
-        if value is not None and not value.rational > 0:
+        if value is not None and value.sign <= 0:
             raise refuse(f"given {shown(value)}; a length above 0 is allowed, in m")
         return value
 
@@ -226,7 +233,7 @@ class Integrator(ConfigTable):
             number = parse_number(value, "1")
         except ValueError as error:
             raise refuse(f'{error}; or "auto"') from None
-        if not 0 < number.rational <= 1:
+        if not (number.sign > 0 and float(number) <= 1):
             raise refuse(f'given {shown(value)}; allowed: above 0 and at most 1, or "auto"')
         return number
 

@@ -35,8 +35,8 @@ def certified(
     if accuracy is None or not complete or not isinstance(summary, Summary):
         return result, True
     session.observer.phase("certify")
-    requested = None if integrator.accuracy is None else float(integrator.accuracy.rational)
-    place = None if length is None else float(length.rational)
+    requested = None if integrator.accuracy is None else float(integrator.accuracy)
+    place = None if length is None else float(length)
     with result.dataset as dataset:
         found = certify(
             dataset,

@@ -49,6 +49,7 @@ def spin(rest: str) -> dict[str, str]:
 
 
 BALL = 'shape = "sphere"\nradius = 1\nmass = 1\n'
+PART = 'shape = "sphere", mass = 1, radius = 1'
 BOX = 'shape = "cuboid"\nmass = 1\n'
 ROD = 'shape = "rod"\nmass = 1\nlength = 1'
 GRAVITY = 'kind = "uniform_gravity"'
@@ -121,7 +122,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "part key unknown": (
         {"body": 'parts = [{shape = "sphere", mass = 1, radius = 1, colour = "red"}]'},
         "[body] parts[0].colour",
-        ["unknown key", "allowed: height"],
+        ["unknown key", "allowed: euler_angles"],
     ),
     # names that don't exist
     "load misspelt": (
@@ -631,6 +632,21 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         {"body": 'parts = [{shape = "sphere", mass = 1, radius = 1, quaternion = [0, 0, 0, 0]}]'},
         "[body] parts[0].quaternion",
         ["given zero", "a quaternion w x y z that is not zero is allowed"],
+    ),
+    "part turned twice": (
+        {"body": f"parts = [{{{PART}, quaternion = [1, 0, 0, 0], euler_angles = [0, 0, 0]}}]"},
+        "[body] parts[0].euler_angles",
+        ["given beside quaternion", "remove one of them"],
+    ),
+    "part of an unknown sequence": (
+        {"body": f'parts = [{{{PART}, euler_angles = [0, 0, 0], euler_sequence = "zzx"}}]'},
+        "[body] parts[0].euler_sequence",
+        ['given "zzx"', "allowed: xyx"],
+    ),
+    "part with a sequence alone": (
+        {"body": f'parts = [{{{PART}, euler_sequence = "zyx"}}]'},
+        "[body] parts[0].euler_sequence",
+        ["given without euler_angles"],
     ),
     "mass of a preset": (
         {"body": 'preset = "earth"\nmass = 1'},

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from rigidsim.scene.arithmetic import context_for, cross, diagonal, dot, eigen, multiply, transpose
 from rigidsim.scene.body import RigidBody, build_body, inverse_inertia, parallel_axis
 from rigidsim.scene.config import parse
+from rigidsim.scene.scene import build_scene
 from rigidsim.scene.shapes import SHAPES
 from rigidsim.solve.precision import precision_of
 
@@ -380,6 +381,19 @@ def test_a_part_turns_from_its_own_axes_into_the_bodys() -> None:
     assert abs(rod.inertia[0][0] - CONTEXT.mpf(3) / 4) <= CONTEXT.mpf(10) ** -78
     direction = rod.principal_axes[rod.principal_moments.index(0)]
     assert abs(abs(direction[2]) - CONTEXT.sqrt(3) / 2) <= CONTEXT.mpf(10) ** -76
+
+
+@pytest.mark.parametrize("sequence", ["zxz", "zyx", "xyz"])
+def test_a_parts_euler_angles_turn_its_tensor(sequence: str) -> None:
+    """Intrinsic angles, as scipy's capitals mean them; the config's sequence unless the part has one."""
+    part = 'shape = "cuboid", mass = 2, size = [0.7, 1.9, 3.1], euler_angles = ["40 deg", 0.6, "pi/4"]'
+    straight = numbers(body('shape = "cuboid"\nmass = 2\nsize = [0.7, 1.9, 3.1]').inertia)
+    r = Rotation.from_euler(sequence.upper(), [np.deg2rad(40), 0.6, np.pi / 4]).as_matrix()
+    turned = body(f'parts = [{{{part}, euler_sequence = "{sequence}"}}]')
+    np.testing.assert_allclose(numbers(turned.inertia), r @ straight @ r.T, rtol=0, atol=CLOSE)
+    text = f'name = "b"\nintegrator.euler_sequence = "{sequence}"\n[body]\nparts = [{{{part}}}]\n'
+    scene = build_scene(parse(text + "[initial]\nangular_velocity = [0, 0, 1]\n[time]\nend = 1"))
+    np.testing.assert_allclose(numbers(scene.body.inertia), r @ straight @ r.T, rtol=0, atol=CLOSE)
 
 
 # ---- principal axes ---------------------------------------------------------------------------------------

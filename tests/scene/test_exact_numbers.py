@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from decimal import Decimal
 from fractions import Fraction
 
@@ -148,6 +149,14 @@ UNITS = [
     ("36 km/h", "m/s", lambda m: m.mpf(10)),
     ("1 g0", "m/s^2", lambda m: m.mpf(980665) / 100000),
     ("1/3 t", "kg", lambda m: m.mpf(1000) / 3),
+    ("pi/4", "rad", lambda m: m.pi / 4),
+    ("-3*pi/4 rad", "rad", lambda m: -3 * m.pi / 4),
+    ("π/2", "1", lambda m: m.pi / 2),
+    ("3 pi", "s", lambda m: 3 * m.pi),
+    ("2*pi/365.25 rad/day", "rad/s", lambda m: 2 * m.pi / (m.mpf(36525) * 864)),
+    ("pi^2/6", "1", lambda m: m.pi**2 / 6),
+    ("pi deg", "rad", lambda m: m.pi**2 / 180),
+    ("2*3/4*5", "1", lambda m: m.mpf(15) / 2),
 ]
 
 
@@ -157,6 +166,29 @@ def test_units_to_fifty_digits(written: str, unit: str, value) -> None:
     # three operations of CONTEXT (128 bits past fifty digits) on either side
     assert abs(parse_number(written, unit).at(CONTEXT) - expected) <= 8 * CONTEXT.eps * abs(expected)
     assert float(parse_number(written, unit)) == float(expected)
+
+
+@pytest.mark.parametrize(
+    ("written", "message"),
+    [
+        ("pirad", "a number, or a string of a number and a unit, is allowed"),
+        ("pi/0", "a divisor other than zero is allowed"),
+        ("pi^0.5", "a power of pi has a whole exponent of at most 64"),
+        ("sqrt(2)", '"pi/4" or'),
+        ("2^3^2", '"^2" is not a unit'),
+        ("*".join(["2"] * 21), "at most 20 factors are allowed"),
+        ("*".join(["9^5000"] * 15), "write fewer digits or a larger unit"),
+    ],
+)
+def test_what_is_no_number(written: str, message: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)):
+        parse_number(written, "1")
+
+
+def test_a_number_knows_whether_its_unit_was_written() -> None:
+    assert parse_number("40", "rad").assumed == parse_number(Decimal(40), "rad").assumed == "rad"
+    assert parse_number("40 rad", "rad").assumed == parse_number("40 deg", "rad").assumed == ""
+    assert parse_number(40, "1").assumed == ""
 
 
 @given(any_decimals.filter(lambda d: d != 0))
