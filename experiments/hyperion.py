@@ -42,6 +42,7 @@ if not __package__:  # as a script
 import rigidsim
 from experiments.common import BLUE, GREEN, GREY, ORANGE, RED, Check, main, new_figure, save, simulate, tidy
 from experiments.measure import matrices
+from rigidsim.scene.presets import PRESETS
 from rigidsim.solve.problem import prepare
 
 NAME = "hyperion"
@@ -63,7 +64,7 @@ PLANE, OUT = [2, 3, 6], [0, 1, 4, 5]  # wz qw qz; wx wy qx qy
 CONFIG = """
 name = "hyperion"
 [body]
-principal_moments = ["34021/57125", "49096/57125", 1]   # 190 x 145 x 114 km: 0.59555, 0.85945, 1
+principal_moments = RATIOS   # 190 x 145 x 114 km: 0.59555, 0.85945, 1
 [initial]
 angular_velocity = [0, 0, 1]
 euler_angles = ["90 deg", {tilt}, 0]
@@ -76,7 +77,7 @@ end = {end}
 samples = {samples}
 [output]
 record = ["angular_velocity", "quaternion"]
-"""
+""".replace("RATIOS", str(list(PRESETS["hyperion"].ratios)))
 
 
 class Motion:

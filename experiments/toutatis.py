@@ -42,10 +42,11 @@ from experiments.common import (
     tidy,
 )
 from experiments.measure import matrices, mean_rate, spectral_rate
+from rigidsim.scene.presets import PRESETS
 
 NAME = "toutatis"
 MOMENTS = ("3.09", "3.22", "1")
-RATES = ("20.7", "31.3", "98.0")  # deg/day
+RATES = tuple(rate.split()[0] for rate in PRESETS["toutatis"].rotation)  # deg/day
 PUBLISHED = {"rotation": 5.41, "precession": 7.35}  # days, Hudson & Ostro 1995
 RECOMPUTED = {"rotation": 5.396, "precession": 7.350}  # days
 DAY = 86400

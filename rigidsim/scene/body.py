@@ -123,8 +123,7 @@ def _from_tensor(table: schema.Body, source: str, context: Any) -> RigidBody:
             raise _fail("preset", f"given {shown(table.preset)}{near}; allowed: {', '.join(PRESETS)}")
         if table.mass is not None:
             raise _fail("mass", "it follows from preset; remove it")
-        largest = parse_number(preset.largest_moment, "kg m^2").at(context)
-        inertia = diagonal([parse_number(r, "1").at(context) * largest for r in preset.ratios])
+        inertia = diagonal(preset.moments(context))
         mass = parse_number(preset.mass, "kg").at(context)
         described = f"preset {table.preset} ({preset.source})"
         axes = [float(parse_number(a, "m").at(context)) for a in preset.semi_axes]

@@ -1,8 +1,11 @@
-"""Published bodies. Every value names its source; the docs print the same text."""
+"""Published bodies. Every value names its source; ``docs/presets.md`` says more, and what is uncertain."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.scene.exact import parse_number
 
 
 @dataclass(frozen=True)
@@ -11,10 +14,13 @@ class Preset:
 
     Attributes:
         ratios: I_x, I_y, I_z over the largest moment, as exact texts.
-        largest_moment: kg m^2.
+        largest_moment: kg m^2, or the factor C/(M R^2) where ``radius`` is given.
         mass: kg.
         semi_axes: m, for the picture.
         source: where the numbers are published.
+        radius: R of the factor C/(M R^2), m.
+        rotation: the published rotation, rad/s about the body axes; empty where there is none that lasts.
+            A scene starts with what its ``[initial]`` says.
     """
 
     ratios: tuple[str, str, str]
@@ -22,6 +28,16 @@ class Preset:
     mass: str
     semi_axes: tuple[str, str, str]
     source: str
+    radius: str = ""
+    rotation: tuple[str, str, str] | tuple[()] = ()
+
+    def moments(self, context: Any) -> list[Any]:
+        """I_x, I_y, I_z, kg m^2 (mpf)."""
+        largest = parse_number(self.largest_moment, "1" if self.radius else "kg m^2").at(context)
+        if self.radius:
+            radius = parse_number(self.radius, "m").at(context)
+            largest *= parse_number(self.mass, "kg").at(context) * radius**2
+        return [parse_number(ratio, "1").at(context) * largest for ratio in self.ratios]
 
 
 PRESETS: dict[str, Preset] = {
@@ -34,5 +50,70 @@ PRESETS: dict[str, Preset] = {
         source="(C-A)/C: Mathews, Herring & Buffett 2002, J. Geophys. Res. 107(B4), 2068; "
         "C, axes: Groten 2004, J. Geodesy 77, 724 (mean equatorial moment: A = B); "
         "mass: Astronomical Almanac",
+        rotation=("0", "0", "7.292115e-5 rad/s"),
+    ),
+    "moon": Preset(
+        # A/C = (1 - beta gamma)/(1 + beta), B/C = (1 + gamma)/(1 + beta) with beta = (C - A)/B = 631.0213e-6
+        # and gamma = (B - A)/C = 227.7317e-6
+        ratios=("99999985629644661479/100063102130000000000", "10002277317/10006310213", "1"),
+        largest_moment="0.392863",  # of the mean moment 0.392728 and the ratios
+        radius="1738 km",
+        mass="7.34579e22",
+        semi_axes=("1737400", "1737400", "1737400"),
+        source="(C-A)/B, (B-A)/C: Folkner et al. 2014 (DE430), IPN Progr. Rep. 42-196; mean moment "
+        "0.392728 M (1738 km)^2: Williams et al. 2014, J. Geophys. Res. Planets 119, 1546; mass: G M of "
+        "DE430; radius, rotation: Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22",
+        rotation=("0", "0", "13.17635815 deg/day"),
+    ),
+    "mars": Preset(
+        # 1 - H -+ 2 J22 M R^2 / C with H = (C - (A+B)/2)/C = 0.00538017, J22 = 6.311e-5
+        ratios=("0.99427276", "0.99496690", "1"),
+        largest_moment="0.36367",
+        radius="3396 km",
+        mass="6.41691e23",
+        semi_axes=("3396190", "3396190", "3376200"),
+        source="(C-(A+B)/2)/C, C/MR^2: Baland et al. 2020, Celest. Mech. Dyn. Astr. 132, 47, from the "
+        "precession of Konopliv et al. 2016, Icarus 274, 253; (B-A)/C, mass: gravity field and G M there; "
+        "axes, rotation: Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22",
+        rotation=("0", "0", "350.891982 deg/day"),
+    ),
+    "mercury": Preset(
+        # 1 - (J2 +- 2 C22)/0.346 with J2 = 5.0334e-5, C22 = 0.8067e-5
+        ratios=("345933532/346000000", "3459658/3460000", "1"),
+        largest_moment="0.346",
+        radius="2440 km",
+        mass="3.30100e23",
+        semi_axes=("2440530", "2440530", "2438260"),
+        source="C/MR^2: Margot et al. 2012, J. Geophys. Res. 117, E00L09; J2, C22, mass: Verma and Margot "
+        "2016, J. Geophys. Res. Planets 121, 1627; axes, rotation: Archinal et al. 2018, "
+        "Celest. Mech. Dyn. Astr. 130, 22",
+        rotation=("0", "0", "6.1385108 deg/day"),
+    ),
+    "hyperion": Preset(
+        # a homogeneous ellipsoid, (b^2 + c^2)/(a^2 + b^2) and so on
+        ratios=("34021/57125", "49096/57125", "1"),
+        largest_moment="6.3420e28",  # M (a^2 + b^2)/5
+        mass="5.5510e18",
+        semi_axes=("190000", "145000", "114000"),
+        source="axes, homogeneous: Wisdom, Peale & Mignard 1984, Icarus 58, 137; mass: Jacobson 2022, "
+        "Astron. J. 164, 199",
+    ),
+    "toutatis": Preset(
+        # 3.09 : 3.22 : 1
+        ratios=("309/322", "1", "100/322"),
+        largest_moment="2.6e19",  # M (a^2 + c^2)/5 of the axes: a scale, not a measurement
+        mass="1.9e13",
+        semi_axes=("1200", "960", "2300"),
+        source="ratios, axes, rotation: Hudson & Ostro 1995, Science 270, 84; mass not measured: 2500 kg/m^3 "
+        "assumed",
+        rotation=("20.7 deg/day", "31.3 deg/day", "98.0 deg/day"),
+    ),
+    "apophis": Preset(
+        ratios=("0.61", "0.965", "1"),
+        largest_moment="7.8e14",  # M (a^2 + b^2)/5 of the axes: a scale, not a measurement
+        mass="5.35e10",
+        semi_axes=("221.9", "153.1", "144.6"),
+        source="ratios: Pravec et al. 2014, Icarus 233, 48; axes: the ellipsoid that has them, with the "
+        "diameter 0.34 km of Brozovic et al. 2018, Icarus 300, 115; mass not measured: 2600 kg/m^3 assumed",
     ),
 }

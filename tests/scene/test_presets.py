@@ -1,0 +1,141 @@
+"""Published bodies, held against published facts that they were not made from, where there are any."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import pytest
+
+from experiments.closed_forms import free_top
+from experiments.toutatis import MOMENTS, PUBLISHED, RATES
+from rigidsim.scene.body import RigidBody, build_body
+from rigidsim.scene.exact import parse_number
+from rigidsim.scene.presets import PRESETS
+from rigidsim.scene.schema import Body
+
+CONTEXT = mpmath.MPContext()
+CONTEXT.prec = 200
+LAST = CONTEXT.mpf(2) ** -180  # of 200 bits; differences of moments lose up to 14
+PAGE = (Path(__file__).parents[2] / "docs" / "presets.md").read_text()
+SUN = 1.32712440018e20  # G M, m^3/s^2
+DAY, YEAR, ARCSEC = 86400, 365.25 * 86400, math.pi / 648000
+
+
+def body(name: str) -> RigidBody:
+    return build_body(Body(preset=name), CONTEXT)
+
+
+def exact(text: str) -> Any:
+    value = Fraction(text)
+    return CONTEXT.mpf(value.numerator) / value.denominator
+
+
+def close(value: Any, text: str) -> bool:
+    """Equal to the published decimals, to the last bits of the context."""
+    return bool(abs(value / exact(text) - 1) <= LAST)
+
+
+def spin(name: str) -> float:
+    return float(parse_number(PRESETS[name].rotation[2], "rad/s"))  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_page_has_every_number_of_every_preset(name: str) -> None:
+    section = PAGE.split(f"\n## {name}\n")[1].split("\n## ")[0]
+    preset = PRESETS[name]
+    texts = [*preset.ratios[:2], preset.largest_moment, preset.mass, preset.radius, *preset.semi_axes]
+    texts += [rate.split()[0] for rate in preset.rotation]
+    assert [text for text in texts if text not in section] == []
+    resolved = body(name)
+    assert max(resolved.principal_moments) == max(resolved.inertia[i][i] for i in range(3))
+    assert resolved.source.startswith(f"preset {name} (")
+
+
+def test_the_moon_librates_as_published() -> None:
+    """beta, gamma (DE430); J2, C22 of the gravity field (Konopliv et al. 2013) but for the permanent tide."""
+    moon = body("moon")
+    a, b, c = moon.principal_moments
+    assert close((c - a) / b, "0.0006310213")
+    assert close((b - a) / c, "0.0002277317")
+    scale = moon.mass * 1738000**2
+    assert abs((a + b + c) / 3 / scale - exact("0.392728")) < 5e-7  # Williams et al. 2014
+    assert float((c - (a + b) / 2) / scale) == pytest.approx(203.3e-6, rel=4e-3)
+    assert float((b - a) / (4 * scale)) == pytest.approx(22.43e-6, rel=4e-3)
+    assert float(moon.mass) * 6.67430e-11 == pytest.approx(4902.80007e9, rel=1e-6)
+    assert 2 * math.pi / spin("moon") / DAY == pytest.approx(27.3216616, abs=5e-7)  # sidereal month
+
+
+def test_mars_precesses_under_the_sun_as_published() -> None:
+    """7608.3 mas/yr measured (Konopliv et al. 2016), and 6.7 of geodetic precession the other way."""
+    mars = body("mars")
+    a, b, c = mars.principal_moments
+    flattening = (c - (a + b) / 2) / c
+    assert close(flattening, "0.00538017")  # Baland et al. 2020
+    assert close(c / (mars.mass * 3396000**2), "0.36367")
+    eccentricity, axis = 0.0934, 1.52371 * 149597870700
+    rate = 1.5 * SUN / axis**3 / spin("mars") * float(flattening) * math.cos(math.radians(25.1893))
+    rate *= (1 - eccentricity**2) ** -1.5
+    assert rate * YEAR / ARCSEC == pytest.approx(7.6083 + 0.0067, rel=1e-3)  # other torques, a year's digits
+    j2 = float((c - (a + b) / 2) / (mars.mass * 3396000**2))
+    assert j2 == pytest.approx(1.9566e-3, rel=1e-3)  # of the gravity field, normalised 8.7502e-4
+    assert float((b - a) / c) == pytest.approx(6.94e-4, rel=1e-3)
+    assert float(mars.mass) * 6.67430e-11 == pytest.approx(42828.3758e9, rel=2e-6)
+    assert 2 * math.pi / spin("mars") / 3600 == pytest.approx(24.6229, abs=1e-4)  # sidereal day
+
+
+def test_mercury_turns_three_times_in_two_years_and_librates_as_its_shell_says() -> None:
+    mercury = body("mercury")
+    a, b, c = mercury.principal_moments
+    assert close(c / (mercury.mass * 2440000**2), "0.346")  # Margot et al. 2012
+    assert close((c - (a + b) / 2) / (mercury.mass * 2440000**2), "5.0334e-5")
+    assert close((b - a) / (4 * mercury.mass * 2440000**2), "0.8067e-5")
+    # of the shell: (B - A)/C_m = 2.18e-4 (4 %) from its libration, C_m = 0.431 C (6 %): Margot et al. 2012
+    assert float((b - a) / c) == pytest.approx(2.18e-4 * 0.431, rel=0.07)
+    assert spin("mercury") * 87.969 * DAY / (2 * math.pi) == pytest.approx(1.5, rel=1e-5)
+    assert float(mercury.mass) * 6.67430e-11 == pytest.approx(22031.874e9, rel=5e-6)
+
+
+def test_hyperion_is_the_ellipsoid_of_wisdom_peale_and_mignard() -> None:
+    hyperion = body("hyperion")
+    a, b, c = hyperion.principal_moments
+    assert float(a / c) == pytest.approx(0.59555, abs=5e-6)
+    assert float(b / c) == pytest.approx(0.85945, abs=7e-6)
+    assert (b - a) / c == pytest.approx(0.264, abs=5e-4)  # as the paper gives it
+    shape = {"shape": "ellipsoid", "mass": 5.551e18, "semi_axes": [190e3, 145e3, 114e3]}
+    ellipsoid = build_body(Body.model_validate(shape), CONTEXT)
+    for ours, theirs in zip(hyperion.principal_moments, ellipsoid.principal_moments, strict=True):
+        assert float(ours / theirs) == pytest.approx(1, abs=1e-5)  # five digits are given
+    assert PRESETS["hyperion"].rotation == ()
+
+
+def test_toutatis_has_both_periods() -> None:
+    toutatis = body("toutatis")
+    x, y, z = toutatis.principal_moments
+    assert close(x / z, "3.09")
+    assert close(y / z, "3.22")
+    assert [exact(m) for m in MOMENTS] == [exact("3.09"), exact("3.22"), 1]
+    assert RATES == ("20.7", "31.3", "98.0")
+    rates = [float(parse_number(rate, "rad/s")) for rate in PRESETS["toutatis"].rotation]
+    top = free_top([float(m) for m in toutatis.principal_moments], rates)
+    assert float(top.period) / DAY == pytest.approx(PUBLISHED["rotation"], rel=0.01)
+    assert float(2 * mpmath.pi / top.precession) / DAY == pytest.approx(PUBLISHED["precession"], rel=0.01)
+
+
+def test_apophis_has_both_periods_and_the_published_energy() -> None:
+    """Pravec et al. 2014: 27.38 h, 263 h, energy 1.024(13) of the least that its momentum allows."""
+    apophis = body("apophis")
+    i1, i2, i3 = (float(m) for m in apophis.principal_moments)
+    assert i1 / i3 == pytest.approx(0.61)
+    assert i2 / i3 == pytest.approx(0.965)
+    assert "0.0639465 rad/hour" in PAGE
+    assert "0.1990845 rad/hour" in PAGE
+    w1, w3 = 0.0639465 / 3600, 0.1990845 / 3600
+    top = free_top([i1, i2, i3], [w1, 0.0, w3])
+    assert float(2 * mpmath.pi / abs(top.precession)) / 3600 == pytest.approx(27.38, abs=1e-3)
+    assert float(top.period) / 3600 == pytest.approx(263, abs=0.01)
+    momentum, energy = math.hypot(i1 * w1, i3 * w3), (i1 * w1**2 + i3 * w3**2) / 2
+    assert energy / (momentum**2 / (2 * i3)) == pytest.approx(1.024, abs=0.001)
