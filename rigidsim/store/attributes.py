@@ -90,7 +90,6 @@ class RootAttributes(BaseModel):
     version_rigidsim: Annotated[str, Use.PLATFORM, Use.REPEATED]
     version_mpmath: Annotated[str, Use.PLATFORM, Use.REPEATED]
     version_h5py: Annotated[str, Use.PLATFORM, Use.REPEATED]
-    version_h5netcdf: Annotated[str, Use.PLATFORM, Use.REPEATED]
     code_llvm: Annotated[str, Use.PLATFORM, Use.REPEATED]
     code_target_cpu: Annotated[str, Use.PLATFORM, Use.REPEATED]
     code_target_features_sha256: Annotated[str, Use.PLATFORM, Use.REPEATED]

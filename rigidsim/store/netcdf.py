@@ -1,4 +1,4 @@
-"""Writing netCDF-4 files that xarray, netCDF4, h5py and ncdump all read."""
+"""Datasets and segments as netCDF-4 files, which xarray, netCDF4, h5py and ncdump all read."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import h5netcdf
 import h5py
 import numpy as np
+from h5py import h5d, h5ds
 
 from rigidsim.errors import RunFolderError
+from rigidsim.store.netcdf_file import NetcdfFile, write_rows, writing
 from rigidsim.store.variables import LABELS, Extra, Variable
 
 CHUNK_ROWS = 8192
@@ -21,53 +22,46 @@ Block = Mapping[str, Sequence[np.ndarray]]
 """Variable name to float64 parts, each of shape (rows, components)."""
 
 
+Created = Mapping[str, h5d.DatasetID]
+"""Variables in a file under construction, by the names of their parts."""
+
+
 def declare(
-    file: Any,
+    file: NetcdfFile,
     variables: Sequence[Variable],
     rows: int,
     attributes: Mapping[str, Any],
     *,
     compressed: bool,
-) -> None:
-    """Lay out dimensions, coordinates, variables and attributes in an open h5netcdf file."""
-    dims = {dim for variable in variables for dim in variable.dims}
-    file.dimensions = {"time": rows, **{d: len(LABELS[d]) for d in LABELS if d in dims}}
-    for dim in LABELS:
-        if dim in dims:
-            labels = file.create_variable(dim, (dim,), h5py.string_dtype())
-            labels[...] = np.array(LABELS[dim], dtype=object)
-            labels.attrs["long_name"] = dim.replace("_", " ")
-    for variable in variables:
-        options: dict[str, Any] = {}
-        if rows:
-            options["chunks"] = (min(CHUNK_ROWS, rows), *variable.shape) if compressed else None
-            if compressed:
-                options |= {"compression": "gzip", "compression_opts": GZIP_LEVEL, "shuffle": True}
-        for part, name in enumerate(variable.part_names()):
-            created = file.create_variable(name, ("time", *variable.dims), np.dtype("<f8"), **options)
-            for key, value in variable.part_attributes(part).items():
-                created.attrs[key] = value
-    for key, value in attributes.items():
-        file.attrs[key] = value
+) -> Created:
+    """Lay out dimensions, coordinates, variables and attributes."""
+    used = {dim for variable in variables for dim in variable.dims}
+    file.attributes(attributes)
+    file.dimension("time", rows)
+    for dim, labels in LABELS.items():
+        if dim in used:
+            file.labels(dim, labels, {"long_name": dim.replace("_", " ")})
+    options = {"chunk_rows": min(CHUNK_ROWS, rows), "gzip": GZIP_LEVEL} if compressed and rows else {}
+    return {
+        name: file.variable(name, ("time", *variable.dims), variable.part_attributes(part), **options)
+        for variable in variables
+        for part, name in enumerate(variable.part_names())
+    }
 
 
-def add_extras(file: Any, extras: Sequence[Extra]) -> None:
+def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
     """Write variables with dimensions of their own."""
     for extra in extras:
         for dim, size in zip(extra.dims, extra.values.shape, strict=True):
-            if dim not in file.dimensions:
-                file.dimensions[dim] = size
-        created = file.create_variable(extra.name, extra.dims, np.dtype("<f8"))
-        created[...] = extra.values
-        for key, value in extra.attributes.items():
-            created.attrs[key] = value
+            file.dimension(dim, size)
+        write_rows(file.variable(extra.name, extra.dims, extra.attributes), 0, extra.values)
 
 
-def fill(file: Any, variables: Sequence[Variable], block: Block, first: int, rows: int) -> None:
+def fill(created: Created, variables: Sequence[Variable], block: Block, first: int) -> None:
     """Write one block of rows."""
     for variable in variables:
         for name, values in zip(variable.part_names(), block[variable.name], strict=True):
-            file.variables[name][first : first + rows] = values.reshape(rows, *variable.shape)
+            write_rows(created[name], first, values)
 
 
 def image(
@@ -79,24 +73,13 @@ def image(
 ) -> io.BytesIO:
     """A whole uncompressed file built in memory; ``groups`` hold plain arrays beside the variables."""
     buffer = io.BytesIO()
-    with h5netcdf.File(buffer, "w") as file:
-        declare(file, variables, rows, attributes, compressed=False)
+    with writing(buffer) as file:
+        created = declare(file, variables, rows, attributes, compressed=False)
         if rows:
-            fill(file, variables, block, 0, rows)
+            fill(created, variables, block, 0)
         for name, arrays in groups.items():
-            _add_group(file.create_group(name), arrays)
+            file.group(name, arrays)
     return buffer
-
-
-def _add_group(group: Any, arrays: Mapping[str, np.ndarray]) -> None:
-    for name, values in arrays.items():
-        if not values.size:  # an array that isn't there reads as empty
-            continue
-        dims = tuple(f"{name}_{axis}" for axis in range(values.ndim))
-        for dim, size in zip(dims, values.shape, strict=True):
-            group.dimensions[dim] = size
-        created = group.create_variable(name, dims, np.dtype("<i8" if values.dtype.kind == "i" else "<f8"))
-        created[...] = values
 
 
 @contextmanager
@@ -129,5 +112,6 @@ def read_group(path: Path, name: str) -> dict[str, np.ndarray]:
 
 
 def _is_data(name: str, item: Any) -> bool:
-    dimension = name[-2:-1] == "_" and name[-1:].isdigit()  # netCDF's scales, see _add_group
-    return isinstance(item, h5py.Dataset) and not dimension
+    """Older files hold the scales of each array's dimensions beside it."""
+    dimension = name[-2:-1] == "_" and name[-1:].isdigit()
+    return isinstance(item, h5py.Dataset) and not (dimension and h5ds.is_scale(item.id))

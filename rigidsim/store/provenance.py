@@ -27,7 +27,7 @@ def cpu_model() -> str:
 def versions() -> dict[str, str]:
     """Of everything that takes part in the numbers."""
     found = {"python": platform.python_version(), "heyoka": str(hy.__version__), "numpy": np.__version__}
-    for name in ("rigidsim", "mpmath", "h5py", "h5netcdf"):
+    for name in ("rigidsim", "mpmath", "h5py"):
         try:
             found[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:  # run from a source tree

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import h5netcdf
 import h5py
 import numpy as np
 
@@ -189,14 +188,14 @@ class SegmentWriter:
             raise RunFolderError(f"{self._folder}: segment {len(paths):08d}.h5 is missing")
         rows = self.saved_rows + self._rows
         with self._writing(), atomic.replacing(target) as temporary:
-            with sink(temporary) as target_file, h5netcdf.File(target_file, "w") as file:
-                netcdf.declare(file, self._variables, rows, attributes, compressed=True)
+            with sink(temporary) as target_file, netcdf.writing(target_file) as file:
+                created = netcdf.declare(file, self._variables, rows, attributes, compressed=True)
                 first = 0
                 for path in paths:
                     target_file.check()
-                    first += _copy(path, file, self._variables, first)
+                    first += _copy(path, created, first)
                 if self._blocks:
-                    netcdf.fill(file, self._variables, self._collected(), first, self._rows)
+                    netcdf.fill(created, self._variables, self._collected(), first)
                 netcdf.add_extras(file, extras)
             content_seal, self.dataset_sha256 = seal(temporary)
         with self._writing():
@@ -308,17 +307,17 @@ def root_attributes(path: Path) -> dict[str, Any]:
         raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
 
 
-def _copy(path: Path, file: Any, variables: Sequence[Variable], first: int) -> int:
+def _copy(path: Path, created: netcdf.Created, first: int) -> int:
     """Copy one segment piece by piece, along the target's chunks so that none is compressed twice."""
-    with h5netcdf.File(path, "r") as segment:
-        rows = int(segment.dimensions["time"].size)
+    with netcdf.reading(path) as segment:
+        saved = {name: segment[name] for name in created}
+        rows = len(saved["time"])
         start = 0
         while start < rows:
             to_boundary = netcdf.CHUNK_ROWS - (first + start) % netcdf.CHUNK_ROWS
             stop = min(rows, start + to_boundary + (_CHUNKS_AT_ONCE - 1) * netcdf.CHUNK_ROWS)
-            for variable in variables:
-                for name in variable.part_names():
-                    file.variables[name][first + start : first + stop] = segment.variables[name][start:stop]
+            for name, target in created.items():
+                netcdf.write_rows(target, first + start, saved[name][start:stop])
             start = stop
     return rows
 
