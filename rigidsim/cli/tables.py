@@ -12,8 +12,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from rigidsim.cli.understood import understood
 from rigidsim.look.readable_time import span_text
 from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
+from rigidsim.store.understood import Body, Span, Start
 
 
 def console() -> Console:
@@ -80,7 +82,14 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None) -> No
     _line(out, "folder", folder)
 
 
+def print_understood(body: Body | None, start: Start | None, time: Span | None, out: Console) -> None:
+    """Body, start and time as they were understood."""
+    for label, text in understood(body, start, time):
+        _line(out, label, text)
+
+
 def _print_ended(summary: Summary, out: Console) -> None:
+    print_understood(summary.body, summary.start, summary.time, out)
     how = f"tolerance {summary.tolerance:.3g}"
     if summary.method == "closed_form":
         how = "in closed form"
@@ -176,8 +185,10 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     """What ``rigidsim plan`` says."""
     out = out or console()
     out.print(Text.assemble((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}"))
+    parts = Body(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
+    print_understood(*parts, out)
     for effect in plan["loads"]:
-        out.print(Text("  " + effect))
+        _line(out, "load", effect)
     for surface in plan["switching"]:
         where = f"steps end on the kinks and jumps of {surface['surface']} ({surface['where']})"
         out.print(Text("  " + where))

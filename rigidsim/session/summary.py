@@ -10,6 +10,7 @@ import numpy as np
 
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
@@ -21,7 +22,6 @@ from rigidsim.store.attributes import RootAttributes, Use
 from rigidsim.store.summary import (
     Accuracy,
     BitForBit,
-    Body,
     Caution,
     ChartChanges,
     Cost,
@@ -68,7 +68,7 @@ def summarise(
         status=progress.status.value,
         message=message,
         exit_code=progress.status.exit_code,
-        **as_fields([*remarks, *found.cautions()]),
+        **as_fields([*remarks, *cautions_of(scene.config), *found.cautions()]),
         samples=progress.next_sample,
         samples_planned=progress.samples,
         time_reached=time_reached,
@@ -83,12 +83,9 @@ def summarise(
         invariants=_invariants(found, initial),
         accuracy=_accuracy(found),
         lyapunov=_lyapunov(found, spectrum),
-        body=Body(
-            source=scene.body.source,
-            principal_moments=tuple(float(m) for m in scene.body.principal_moments),
-            principal_axes=tuple(tuple(float(x) for x in axis) for axis in scene.body.principal_axes),
-            mass=None if scene.body.mass is None else float(scene.body.mass),
-        ),
+        body=body_of(scene),
+        start=start_of(scene),
+        time=span_of(scene),
         bit_for_bit=_bit_for_bit(prepared, progress, attributes.mixed_provenance),
         provenance=attributes.of_use(Use.REPEATED),
         events=events,

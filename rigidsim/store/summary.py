@@ -15,8 +15,6 @@ from typing import Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
     StrictBool,
     StrictInt,
@@ -25,25 +23,12 @@ from pydantic import (
 )
 
 from rigidsim.errors import RunFolderError
+from rigidsim.store.summary_fields import Claim, FiniteNumber, Part, Text
+from rigidsim.store.understood import Body, Span, Start
 
 ENGINE = "engine"
 """Beside the phases in ``Cost.seconds``: what the engine alone took of integrating and recording."""
 _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
-
-
-@dataclass(frozen=True)
-class Claim:
-    """Marks a field that follows from the config alone, so that running it again must confirm it.
-
-    Attributes:
-        since: schema version of the dataset from which the field means what it means now.
-        of_end: whether it says how the run ended, which an interruption changes.
-        beside: a field without which, in older summaries, this one means something else; empty for none.
-    """
-
-    since: int = 1
-    of_end: bool = False
-    beside: str = ""
 
 
 class WarningCode(Enum):
@@ -58,6 +43,7 @@ class WarningCode(Enum):
     SET_ASIDE = "set_aside"
     BEGUN_ANEW = "begun_anew"
     NOT_CERTIFIED = "not_certified"
+    ANGLE_WITHOUT_UNIT = "angle_without_unit"
 
 
 @dataclass(frozen=True)
@@ -74,28 +60,11 @@ def _with_engine(seconds: dict[str, float]) -> dict[str, float]:
     return seconds
 
 
-FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Text = Annotated[StrictStr, Field(max_length=20_000)]
 Digest = Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")]
 Seconds = Annotated[dict[Text, FiniteNumber], AfterValidator(_with_engine)]
 
 
-class _Part(BaseModel):
-    """Immutable; what a newer version wrote beside the fields is kept."""
-
-    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants", defer_build=True)
-
-    def having(self, **known: Any) -> Self:
-        """A copy with what has become known since, checked as on reading."""
-        given = {name: value for name, value in self if name in self.model_fields_set}
-        return type(self).model_validate({**given, **known})
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON; nothing that wasn't given."""
-        return self.model_dump(mode="json", exclude_unset=True)
-
-
-class Cost(_Part):
+class Cost(Part):
     """What a run took.
 
     Attributes:
@@ -116,7 +85,7 @@ class Cost(_Part):
     wall_seconds: FiniteNumber | None = None
 
 
-class Invariant(_Part):
+class Invariant(Part):
     """How well one was kept.
 
     Attributes:
@@ -141,7 +110,7 @@ class Invariant(_Part):
     numerical: Annotated[StrictBool, Claim()]
 
 
-class Accuracy(_Part):
+class Accuracy(Part):
     """How right the attitude is at the end, rad: asked for, estimated, and certified by a reference.
 
     Attributes:
@@ -175,7 +144,7 @@ class Accuracy(_Part):
     forecast: FiniteNumber | None = None
 
 
-class Lyapunov(_Part):
+class Lyapunov(Part):
     """The spectrum of the motion, 1/s, with what it says of the run's digits."""
 
     chaotic: Annotated[StrictBool, Claim()]
@@ -188,23 +157,14 @@ class Lyapunov(_Part):
     units: Text = "s-1"
 
 
-class Body(_Part):
-    """Where the inertia came from; principal moments (kg m^2) and axes, mass (kg)."""
-
-    source: Text
-    principal_moments: tuple[FiniteNumber, ...]
-    principal_axes: tuple[tuple[FiniteNumber, ...], ...]
-    mass: FiniteNumber | None
-
-
-class EventTimes(_Part):
+class EventTimes(Part):
     """When an event happened, s."""
 
     first: Annotated[FiniteNumber, Claim()]
     last: Annotated[FiniteNumber, Claim()]
 
 
-class ChartChanges(_Part):
+class ChartChanges(Part):
     """How often a run in Euler angles went from its sequence to the partner or back."""
 
     count: StrictInt
@@ -212,14 +172,14 @@ class ChartChanges(_Part):
     partner: Text
 
 
-class BitForBit(_Part):
+class BitForBit(Part):
     """Whether running again gives the same bits, and on what condition."""
 
     claim: StrictBool
     holds_for: StrictStr
 
 
-class Brief(_Part):
+class Brief(Part):
     """What any summary says; of a run that is under way, or was killed, no more."""
 
     name: Annotated[Text, Claim()] = ""
@@ -263,6 +223,8 @@ class Summary(Brief):
     accuracy: Accuracy
     lyapunov: Lyapunov | None = None
     body: Annotated[Body, Claim()]
+    start: Annotated[Start | None, Claim()] = None
+    time: Annotated[Span | None, Claim()] = None
     bit_for_bit: BitForBit
     provenance: dict[Text, StrictStr | StrictInt]
     events: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)

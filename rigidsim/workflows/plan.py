@@ -16,6 +16,7 @@ from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.session.storage import storage
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
@@ -78,6 +79,9 @@ def plan(
     system = prepared.system
     rate = float(system.rate_bound)
     growth = motion_growth(prepared)
+    warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene.config)]
+    if room.problem is not None:
+        warnings.append(("disk_space", f"the run {room.problem}"))
     return {
         "name": prepared.scene.name,
         "formulation": system.requirements.formulation,
@@ -128,12 +132,11 @@ def plan(
             else attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth),
             "amplification": growth.at(duration),
         },
-        "warnings": [] if room.problem is None else [f"the run {room.problem}"],
-        "body": {
-            "source": prepared.scene.body.source,
-            "principal_moments": [float(m) for m in prepared.scene.body.principal_moments],
-            "principal_axes": [[float(x) for x in a] for a in prepared.scene.body.principal_axes],
-        },
+        "warnings": [text for _, text in warnings],
+        "warning_codes": [code for code, _ in warnings],
+        "body": body_of(prepared.scene).as_dict(),
+        "start": start_of(prepared.scene).as_dict(),
+        "time": span_of(prepared.scene).as_dict(),
     }
 
 

@@ -14,7 +14,8 @@ from pydantic import BaseModel
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.summary import Brief, Claim, Summary
+from rigidsim.store.summary import Brief, Summary
+from rigidsim.store.summary_fields import Claim
 
 
 def summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: int) -> list[str]:

@@ -31,6 +31,7 @@ def run(
     """
     from rigidsim.cli import progress
     from rigidsim.scene.config import has_earlier_settings
+    from rigidsim.scene.suspicions import suspicious_angles
     from rigidsim.workflows.read import load
     from rigidsim.workflows.run import run as run_experiment
 
@@ -48,6 +49,8 @@ def run(
                 "kept there what --set had replaced); write the values where their keys stand",
                 file=sys.stderr,
             )
+        for problem in suspicious_angles(experiment.config):
+            print(f"rigidsim: warning: {experiment.source}: {problem}", file=sys.stderr)
     worst = 0
     for experiment in experiments:
         with progress.observer() as observer:

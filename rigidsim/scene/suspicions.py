@@ -1,0 +1,57 @@
+"""Numbers of a config that are allowed, but are likely to mean something else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from pydantic import BaseModel
+
+from rigidsim.errors import Problem
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.schema import Config
+from rigidsim.scene.validation_messages import key_path
+
+_TURN = 2 * math.pi
+Path = tuple[str | int, ...]
+
+
+def suspicious_angles(config: Config) -> list[Problem]:
+    """Angles beyond a full turn that were given without a unit: taken as radians, meant as degrees?
+
+    A multiple of pi is meant in radians, and so is whatever has its unit.
+    """
+    found = []
+    for path, numbers in _numbers((), config):
+        beyond = [
+            x for x in numbers if x.assumed == "rad" and not x.pi_power and abs(x.rational) > 2 * math.pi
+        ]
+        if beyond:
+            given, degrees = (
+                ", ".join(f"{value:.6g}" for value in values)
+                for values in (map(float, beyond), (math.degrees(float(x)) for x in beyond))
+            )
+            first = f"{float(beyond[0]):.6g}"
+            found.append(
+                Problem(
+                    key_path(path),
+                    f"given {given} without a unit, which is taken as radians: {degrees} deg; write "
+                    f'"{first} deg" if degrees are meant, "{first} rad" if not',
+                )
+            )
+    return found
+
+
+def _numbers(path: Path, value: object) -> Iterator[tuple[Path, list[ExactNumber]]]:
+    """Where numbers stand in a config: single ones, and arrays of them."""
+    if isinstance(value, ExactNumber):
+        yield path, [value]
+    elif isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            yield from _numbers((*path, name), getattr(value, name))
+    elif isinstance(value, list):
+        if value and all(isinstance(entry, ExactNumber) for entry in value):
+            yield path, value
+            return
+        for number, entry in enumerate(value):
+            yield from _numbers((*path, number), entry)

@@ -1,0 +1,70 @@
+"""What was understood of a config, as values to show; and what of it is suspicious."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.schema import Config
+from rigidsim.scene.suspicions import suspicious_angles
+from rigidsim.store.summary import Caution, WarningCode
+from rigidsim.store.summary_fields import Three
+from rigidsim.store.understood import Body, Span, Start
+
+
+def body_of(scene: Scene) -> Body:
+    """The body, rounded to doubles."""
+    body = scene.body
+    return Body(
+        source=body.source,
+        principal_moments=tuple(float(m) for m in body.principal_moments),
+        principal_axes=tuple(tuple(float(x) for x in axis) for axis in body.principal_axes),
+        mass=None if body.mass is None else float(body.mass),
+        center_of_mass=_three(body.center_of_mass),
+    )
+
+
+def start_of(scene: Scene) -> Start:
+    """The state that the motion starts from; Euler angles in the sequence that the config has."""
+    context, sequence = scene.context, scene.config.integrator.euler_sequence
+    angles = scene.euler_angles
+    if angles is None:
+        angles = attitude.euler_from_matrix(context, attitude.rotation_matrix(scene.quaternion), sequence)
+    w, x, y, z = (float(component) for component in scene.quaternion)
+    return Start(
+        euler_sequence=sequence,
+        euler_angles_deg=_three([180 * angle / context.pi for angle in angles]),
+        quaternion=(w, x, y, z),
+        angular_velocity=_three(scene.angular_velocity),
+        position=None if scene.position is None else _three(scene.position),
+        velocity=None if scene.velocity is None else _three(scene.velocity),
+    )
+
+
+def span_of(scene: Scene) -> Span:
+    """When the motion starts and ends."""
+    samples = scene.samples
+    return Span(
+        start_s=float(scene.start),
+        end_s=float(samples.last),
+        samples=samples.count,
+        every_s=None if samples.times is not None else float(samples.step),
+        epoch="" if scene.epoch is None else str(scene.epoch),
+        unit=getattr(scene.config.time, "unit", None) or "",
+    )
+
+
+def cautions_of(config: Config) -> list[Caution]:
+    """What may be meant otherwise than it was understood."""
+    return [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(problem)) for problem in suspicious_angles(config)]
+
+
+def _three(vector: Vector) -> Three:
+    x, y, z = (_float(component) for component in vector)
+    return x, y, z
+
+
+def _float(value: Any) -> float:
+    return float(value) + 0.0  # no minus sign before zero

@@ -1,0 +1,42 @@
+"""What the parts of ``summary.json`` are made of: fields, and which of them are claims."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, StrictStr
+
+FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Text = Annotated[StrictStr, Field(max_length=20_000)]
+Three = tuple[FiniteNumber, FiniteNumber, FiniteNumber]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Marks a field that follows from the config alone, so that running it again must confirm it.
+
+    Attributes:
+        since: schema version of the dataset from which the field means what it means now.
+        of_end: whether it says how the run ended, which an interruption changes.
+        beside: a field without which, in older summaries, this one means something else; empty for none.
+    """
+
+    since: int = 1
+    of_end: bool = False
+    beside: str = ""
+
+
+class Part(BaseModel):
+    """Immutable; what a newer version wrote beside the fields is kept."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants", defer_build=True)
+
+    def having(self, **known: Any) -> Self:
+        """A copy with what has become known since, checked as on reading."""
+        given = {name: value for name, value in self if name in self.model_fields_set}
+        return type(self).model_validate({**given, **known})
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; nothing that wasn't given."""
+        return self.model_dump(mode="json", exclude_unset=True)

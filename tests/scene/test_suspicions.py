@@ -1,0 +1,63 @@
+"""Angles that were probably meant in degrees are pointed out, and nothing else is."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigidsim.scene.config import parse
+from rigidsim.scene.suspicions import suspicious_angles
+from rigidsim.session.understood import cautions_of
+
+CONFIG = """
+name = "suspicious"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [40, 60, 1000]
+euler_angles = {angles}
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 4e14
+orbit = {{semi_major_axis = 7e6, inclination = {inclination}, mean_anomaly = {anomaly}}}
+[time]
+end = 1
+"""
+
+
+def found(angles: str = "[0, 1, 0]", inclination: str = "1", anomaly: str = "0") -> list[str]:
+    text = CONFIG.format(angles=angles, inclination=inclination, anomaly=anomaly)
+    return [str(problem) for problem in suspicious_angles(parse(text).config)]
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [
+        "[0.4, 1.0, -0.3]",
+        "[6.28, -6.28, 0]",  # within a turn
+        '["40 deg", "60 deg", "30 deg"]',
+        '["40 rad", "60 rad", "-30 rad"]',  # said, so meant
+        '["3*pi", "-10*pi/3", "20 pi"]',  # nobody has degrees with pi in them
+    ],
+)
+def test_no_false_alarm(angles: str) -> None:
+    assert found(angles) == []
+
+
+def test_degrees_without_their_unit() -> None:
+    (first,) = found("[40, 60, 30]")
+    assert first == (
+        "[initial] euler_angles: given 40, 60, 30 without a unit, which is taken as radians: "
+        '2291.83, 3437.75, 1718.87 deg; write "40 deg" if degrees are meant, "40 rad" if not'
+    )
+    (only_one,) = found('[0, "-23.5", 0]')
+    assert "euler_angles: given -23.5 without" in only_one
+    two = found(inclination="51.6", anomaly='"100"')
+    assert [text.partition(":")[0] for text in two] == [
+        "[[loads]] number 1 orbit.inclination",
+        "[[loads]] number 1 orbit.mean_anomaly",
+    ]
+
+
+def test_it_has_a_code() -> None:
+    (caution,) = cautions_of(parse(CONFIG.format(angles="[0, 7, 0]", inclination="0", anomaly="0")).config)
+    assert caution.code.value == "angle_without_unit"
