@@ -19,7 +19,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.needs import work_is_needed
 from rigidsim.model.numbers import Rounder
-from rigidsim.model.observables import WORK
+from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.orbital_frame import orbital_states
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined

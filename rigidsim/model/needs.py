@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from rigidsim.model import central_forces, fixed_axes
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.reference_plane import flies_in_plane
 from rigidsim.model.rotating_frame import rotating_orbit
 from rigidsim.scene.arithmetic import negligible
 from rigidsim.scene.scene import Scene
@@ -81,6 +82,10 @@ def _free_axis(which: int) -> Need:
     return Need(lambda m: m.attitude is not None and fixed_axes.free_axis(m, which) is not None)
 
 
+def _plane_states(scene: Scene) -> str | None:
+    return "flight" if flies_in_plane(scene, scene.loads) else None
+
+
 def _isotropic_damping(m: Mechanics) -> bool:
     """Whether each load with a torque damps, all together in proportion to the inertia tensor, and the body
     turns.
@@ -110,6 +115,7 @@ NEEDS: dict[str, Need] = {
     "field_axis": Need(lambda m: m.attitude is not None and fixed_axes.kept_field_axis(m) is not None),
     **{f"free_axis_{name}": _free_axis(i) for i, name in enumerate("xyz")},
     "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
+    "plane": Need(lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None, _plane_states),
     "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
     "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),
     "attracting_line": Need(

@@ -29,11 +29,13 @@ class OrbitStates:
     Attributes:
         block: the states; its norms stay 1, since each pair of states is a cosine and a sine.
         direction: unit vector towards the attracting body, space axes.
+        normal: of the orbit's plane, space axes; the attracting body goes around it in the direct sense.
         inverse_distance: semi-major axis over distance, 1 for a circle.
     """
 
     block: StateBlock
     direction: list[Symbolic]
+    normal: list[Symbolic]
     inverse_distance: Symbolic
 
 
@@ -89,7 +91,8 @@ def orbit_states(
     x = w_c * along - w_s * across
     y = w_s * along + w_c * across
     direction = [n_c * x - n_s * (i_c * y), n_s * x + n_c * (i_c * y), i_s * y]
-    return OrbitStates(StateBlock(names, derivatives, initial, norms), direction, inverse)
+    normal = [n_s * i_s, -(n_c * i_s), i_c]
+    return OrbitStates(StateBlock(names, derivatives, initial, norms), direction, normal, inverse)
 
 
 def _constant(value: Any, number: Rounder) -> Symbolic:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import heyoka as hy
@@ -25,7 +25,10 @@ class Recorded:
         first, count: its components among ``System.outputs``.
         exponents: binary exponents that bring the components to SI.
         continuity: how samples are joined: "" (as they are), "wrapped" (angles that are states),
-            "unwrap" (angles found from another formulation), "parity" and "nearest" (quaternion signs).
+            "unwrap" (angles that are functions of the state), "parity" and "nearest" (quaternion signs).
+        squared_sizes: of angles that are functions of the state what vanishes where each is undefined; none
+            for Euler angles, whose middle one tells it.
+        attributes: beside units, long name and frame.
     """
 
     name: str
@@ -38,6 +41,8 @@ class Recorded:
     exponents: list[int]
     invariant: bool
     continuity: str = ""
+    squared_sizes: list[Symbolic] = field(default_factory=list)
+    attributes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,8 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
             continue
         if not observable.available(m):
             if record is not None:
-                what = f'given "{observable.name}": this scene has none; leave it out'
+                why = observable.absent(m) if observable.needed(m) else None
+                what = f'given "{observable.name}": {why or "this scene has none"}; leave it out'
                 raise ConfigError(Problem("[output] record", what))
             continue
         components = observable.expressions(m)
@@ -96,6 +102,8 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
                 observable.unit_exponents(m, len(components)),
                 observable.conserved(m) is not None,
                 observable.continuity(m),
+                [] if observable.angles is None else [x.squared_size for x in observable.angles(m)],
+                observable.attributes(m),
             )
         )
         outputs += components

@@ -10,15 +10,13 @@ import heyoka as hy
 from rigidsim.model import central_forces, fixed_axes
 from rigidsim.model.drift_scales import linear_momentum_scale, momentum_scale, total_momentum_scale
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables import (
+from rigidsim.model.observables.mechanical import linear_momentum, mass_exponent, total_momentum
+from rigidsim.model.observables.observable import (
     MOMENTUM,
     SPACE,
     Observable,
-    linear_momentum,
-    mass_exponent,
     only_when_named,
     same_unit,
-    total_momentum,
 )
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene import attitude

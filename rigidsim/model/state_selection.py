@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.model.needs import NEEDS
+from rigidsim.model.reference_plane import refuse_without_plane
 from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
@@ -54,6 +55,7 @@ def choose_requirements(scene: Scene, loads: Sequence[Load] = ()) -> Requirement
     asked = scene.config.integrator.formulation
     record = scene.config.output.record
     _check_recordable(scene, asked, record)
+    refuse_without_plane(scene, loads)
     readers = {need: [load.title for load in loads if need in load.reads] for need in ("attitude", "flight")}
     for event in scene.events:
         for need, names in (("attitude", ATTITUDE_NAMES), ("flight", FLIGHT_NAMES)):

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
+from rigidsim.scene.frame_table import PLANE_OR_NORMAL
 from rigidsim.scene.overrides import apply_overrides, written
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import POINT_OR_NAME, Config, config_model
@@ -78,7 +79,7 @@ def parse(text: str, *, source: str = "config", overrides: Sequence[str] = ()) -
         config = model.model_validate(table)
     except ValidationError as error:
         named = {problem.where for problem in problems}
-        found = messages.config_error(model, error, {*POINT_OR_NAME, *LOAD_KINDS}).problems
+        found = messages.config_error(model, error, {*POINT_OR_NAME, *PLANE_OR_NORMAL, *LOAD_KINDS}).problems
         problems += [problem for problem in found if problem.where not in named]
     if problems:
         raise ConfigError(problems, source)

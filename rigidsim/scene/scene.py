@@ -13,6 +13,7 @@ from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
+from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 
@@ -33,6 +34,9 @@ class Scene:
         events: crossings that are recorded, or end the run.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
         axes, epoch: what the space axes and time 0 are, where the config says it or a load implies it.
+        figure: the body's figure axis, see ``[frame] figure_axis``.
+        reference: unit normal (space axes) of the plane that obliquity and longitudes count from; None for
+            the source's own, moving plane.
     """
 
     name: str
@@ -53,6 +57,8 @@ class Scene:
     samples: SampleTimes
     axes: str | None
     epoch: Epoch | None
+    figure: Figure
+    reference: Vector | None
     config: schema.Config
 
     @property
@@ -125,6 +131,8 @@ def build_scene(experiment: Experiment) -> Scene:
             samples=samples,
             axes=config.frame.axes or next((load.axes for load in resolved if load.axes), None),
             epoch=config.time.epoch or next((load.epoch for load in resolved if load.epoch), None),
+            figure=figure_of(config, body, context),
+            reference=reference_normal(config, context),
             config=config,
         )
     except ConfigError as error:

@@ -40,9 +40,9 @@ from rigidsim.scene.fields import (
     Triple,
     refuse,
 )
+from rigidsim.scene.frame_table import Frame
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.shapes import DIMENSIONS, SHAPES
-from rigidsim.scene.space_axes import SpaceAxes
 from rigidsim.scene.validation_messages import nearest, shown
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
@@ -165,12 +165,6 @@ class Time(ConfigTable):
     every: Second | None = None
     times: list[Second] | None = None
     epoch: Instant | None = Field(default=None, description="what time 0 is; scales TDB, TT and UTC")
-
-
-class Frame(ConfigTable):
-    """``[frame]``: what the scene's axes are, beside its own equations."""
-
-    axes: SpaceAxes | None = Field(default=None, description="of space; an ephemeris has ecliptic J2000")
 
 
 class Integrator(ConfigTable):

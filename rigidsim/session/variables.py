@@ -46,6 +46,9 @@ def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
         if recorded.name == "euler_angles":
             attributes["euler_sequence"] = prepared.system.sequence
             attributes["convention"] = "intrinsic"
+        if recorded.continuity == "unwrap":
+            attributes["angle"] = "continuous"
+        attributes |= recorded.attributes
         if recorded.invariant:
             attributes["invariant"] = 1
         result.append(Variable(recorded.name, recorded.dims, attributes, parts))

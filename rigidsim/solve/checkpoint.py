@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.evaluate import Continuity
+from rigidsim.solve.joined_angles import Continuity
 
 
 @dataclass(frozen=True)

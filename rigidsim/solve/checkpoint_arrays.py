@@ -15,8 +15,8 @@ import numpy as np
 from rigidsim.solve.angle_wrapping import AngleState
 from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
 from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.evaluate import Continuity
 from rigidsim.solve.events import FoundEvent
+from rigidsim.solve.joined_angles import Continuity
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Mark
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import heyoka as hy
@@ -17,16 +16,9 @@ from rigidsim.model.system import System
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.charts import Lift
 from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.joined_angles import JoinedAngles
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.turn_count import (
-    Place,
-    TurnCounter,
-    angles_to_join,
-    doubtful_rows,
-    is_sparse,
-    nearest,
-)
 
 _GROUP = 64  # rows; a multiple of every SIMD width
 
@@ -83,10 +75,17 @@ class _PartnerChart:
         self._angles = slice(found[0], found[0] + 3) if found else None
         self._outputs = compiled(partner.outputs)
         self._singular = compiled([partner.singular_factor])
+        sizes = [size for r in partner.recorded for size in r.squared_sizes]
+        self._sizes = compiled(sizes) if sizes else None
 
     def singular_factors(self, states: np.ndarray) -> np.ndarray:
         """Of the partner chart, (n,)."""
         return np.asarray(evaluate_rows(self._singular, states)[0])
+
+    def sizes(self, states: np.ndarray) -> np.ndarray:
+        """Squared, of the angles' sines and cosines, (angles that have one, n)."""
+        assert self._sizes is not None
+        return evaluate_rows(self._sizes, states)
 
     def values(
         self, states: np.ndarray, reference: np.ndarray, initial: np.ndarray, wrapping: AngleWrapping
@@ -122,27 +121,6 @@ class _PartnerChart:
         return values, angles
 
 
-@dataclass
-class Continuity:
-    """What joins the variables of a block of samples to those of the block before.
-
-    Attributes:
-        turns: full turns added to derived Euler angles, (3,).
-        last_angles, last_quaternion: of the latest sample, float64, the angles before those turns; None
-            before the first block.
-        last_time, last_state: of the latest sample, float64, internal units, where turns are counted from it.
-        wrapped_from: time (internal units) of the first sample whose turns aren't known: from there on angles
-            are recorded within one turn; nan where all are known.
-    """
-
-    turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
-    last_angles: np.ndarray | None = None
-    last_quaternion: np.ndarray | None = None
-    last_time: float = math.nan
-    last_state: np.ndarray | None = None
-    wrapped_from: float = math.nan
-
-
 class Evaluator:
     """Evaluates a system's outputs on blocks of states.
 
@@ -161,16 +139,15 @@ class Evaluator:
         self._system = system
         self._precision = precision
         self._wrapping = wrapping
-        self.continuity = Continuity()
         self._outputs = self._compile(system.outputs) if system.outputs else None
         components = [x for invariant in system.invariants for x in invariant.expressions]
         self._invariants = self._compile(components)
         initial = precision.array(system.initial)
         self.initial = evaluate_rows(self._invariants, initial[None, :])[:, 0] if components else initial[:0]
         self._parameters = len(components)
-        joined = angles_to_join(system)
-        self.sparse = joined is not None and is_sparse(system)
-        self._counter = None if joined is None or not countable else TurnCounter(system, joined)
+        self._angles = JoinedAngles(system, self._compile, wrapping, precision=precision, countable=countable)
+        self.continuity = self._angles.first()
+        self.sparse = self._angles.sparse
         factor = system.singular_factor
         self._singular = None if factor is None else self._compile([factor])
 
@@ -216,8 +193,11 @@ class Evaluator:
             there, angles = self._partner.values(states, reference, self.initial, self._wrapping)
             values[:, in_partner] = there
         result: RecordedParts = {}
+        turned = self._turned(values, block) if self._angles else None
         for variable in self._system.recorded:
             columns = values[variable.first : variable.first + variable.count].T
+            if turned is not None and (part := self._angles.part(variable)) is not None:
+                columns = turned[:, part]
             columns = self._joined(variable, columns, block)
             if angles is not None and variable.continuity == "wrapped":
                 columns[in_partner] = angles
@@ -255,10 +235,25 @@ class Evaluator:
             return block
         if variable.continuity == "nearest":
             return self._nearest(block)
-        if variable.continuity == "unwrap":
-            known = variable.name == "euler_angles"
-            return self._counted(block, samples) if known and self.sparse else self._unwrapped(block, samples)
         return block
+
+    def _turned(self, values: np.ndarray, block: SampleBlock) -> np.ndarray:
+        """The angles that are joined, with their turns, (n, angles)."""
+        sizes = None
+        if self._angles.sizes is not None:
+            sizes = self._sizes(block)
+        angles = values[self._angles.columns].T
+        found, self.continuity = self._angles.joined(self.continuity, angles, sizes, block)
+        return found
+
+    def _sizes(self, block: SampleBlock) -> np.ndarray:
+        """Squared sizes of the angles' sines and cosines, (angles that have one, n)."""
+        assert self._angles.sizes is not None
+        sizes = evaluate_rows(self._angles.sizes, block.states)
+        in_partner = block.chart != 0
+        if in_partner.any():
+            sizes[:, in_partner] = self._partner.sizes(block.states[in_partner])
+        return sizes
 
     def _nearest(self, block: np.ndarray) -> np.ndarray:
         """Give each quaternion the sign nearest to the one before."""
@@ -273,67 +268,13 @@ class Evaluator:
         self.continuity.last_quaternion = plain[-1] * signs[-1]
         return block
 
-    def _unwrapped(self, block: np.ndarray, samples: SampleBlock) -> np.ndarray:
-        """Add the full turns that make each angle nearest to the sample before, but for those of Euler angles
-        near their pole, whose way is followed.
-        """
-        plain, known = block.astype(np.float64), self.continuity
-        before = plain[0] if known.last_angles is None else known.last_angles
-        angles = np.vstack([before, plain])
-        made = -np.rint(np.diff(angles, axis=0) / (2 * np.pi)).astype(np.int64)
-        if self._counter is not None:
-            jumps = nearest(np.diff(angles, axis=0))
-            times, states = samples.times.astype(np.float64), samples.states.astype(np.float64)
-            for row in doubtful_rows(jumps, angles, self._system.sequence):
-                latest = Place(times[row - 1], states[row - 1], plain[row - 1]) if row else self._latest()
-                if latest is not None:
-                    self._counter.begin(latest)
-                    found = self._counter.turns(Place(times[row], states[row], plain[row]))
-                    made[row] = made[row] if found is None else found
-            known = replace(known, last_time=float(times[-1]), last_state=states[-1])
-        turns = known.turns + np.cumsum(made, axis=0)
-        self.continuity = replace(known, turns=turns[-1], last_angles=plain[-1])
-        return self._wrapping.unwrapped(block, turns)
-
     def follow(self, time: float) -> None:
         """Count turns from the latest sample on as far as the run has come, for a fifth of a second at most.
 
         Args:
             time: internal units.
         """
-        if self._counter is not None and (latest := self._latest()) is not None:
-            self._counter.begin(latest)
-            self._counter.follow(time)
-
-    def _latest(self) -> Place | None:
-        """The latest sample; None without one, and where the turns are lost."""
-        known = self.continuity
-        if known.last_state is None or known.last_angles is None or not math.isnan(known.wrapped_from):
-            return None
-        return Place(known.last_time, known.last_state, known.last_angles)
-
-    def _counted(self, block: np.ndarray, samples: SampleBlock) -> np.ndarray:
-        """Add the full turns that the motion from each sample to the next makes; none once they are lost."""
-        plain, turns = block.astype(np.float64), np.zeros(block.shape, dtype=np.int64)
-        times, states = samples.times.astype(np.float64), samples.states.astype(np.float64)
-        for row, (time, state, angles) in enumerate(zip(times.tolist(), states, plain, strict=True)):
-            known, latest, here = self.continuity, self._latest(), Place(time, state, angles)
-            if not math.isnan(known.wrapped_from):
-                break
-            made: np.ndarray | None = None
-            if self._counter is not None and latest is not None:
-                self._counter.begin(latest)
-                made = self._counter.turns(here)
-            elif self._counter is not None and known.last_angles is None:  # the first sample
-                made = known.turns
-            if made is None:
-                self.continuity = replace(known, wrapped_from=time, turns=turns[row])
-                break
-            turns[row] = known.turns + made
-            self.continuity = replace(
-                known, turns=turns[row], last_angles=angles, last_time=time, last_state=state
-            )
-        return self._wrapping.unwrapped(block, turns)
+        self._angles.follow(self.continuity, time)
 
     def initial_invariants(self) -> dict[str, list[float]]:
         """Initial values of the invariants' components in SI, nearest doubles, by name."""

@@ -1,10 +1,11 @@
 """Turns of angles between sparse samples, counted along the motion and not guessed from the samples.
 
-Angles that are functions of the state (Euler angles where a quaternion is carried) are known up to full
-turns. Where the body may turn far between two samples, the motion from the one to the other is integrated
-once more, in double precision from the recorded state on, and its angles are followed in small parts. Whole
-turns are all that is taken from it, so that it needn't be exact: it has to arrive near the second sample,
-which is checked. The run itself, its steps and what it records of the state know nothing of it.
+Angles that are functions of the state (Euler angles where a quaternion is carried, longitudes of axes) are
+known up to full turns. Where the body may turn far between two samples, the motion from the one to the other
+is integrated once more, in double precision from the recorded state on, and its angles are followed in small
+parts. Whole turns are all that is taken from it, so that it needn't be exact: it has to arrive near the
+second sample, which is checked. The run itself, its steps and what it records of the state know nothing of
+it.
 
 Near a pole of the angles two of them swing by up to half a turn at once; there the path is followed in ever
 smaller parts. A pass nearer than that resolves has no direction of its own, and the nearest one is taken.
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import math
 import time as clock_time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import heyoka as hy
@@ -21,6 +23,7 @@ import numpy as np
 
 from rigidsim.model.euler_charts import is_proper
 from rigidsim.model.outputs import Recorded
+from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
 from rigidsim.scene.scene import SampleTimes
 from rigidsim.solve.engine import CompiledFunction
@@ -56,7 +59,7 @@ class Place:
     Attributes:
         time: internal units.
         state: (states,) float64, internal units.
-        angles: (3,) float64, as the run has them, without turns.
+        angles: float64, as the run has them, without turns.
     """
 
     time: float
@@ -76,15 +79,22 @@ def radians_between(samples: SampleTimes, rate: float) -> float:
     return math.sqrt(3) * rate * max(spacing, default=0.0)
 
 
-def angles_to_join(system: System) -> Recorded | None:
-    """The recorded Euler angles that are no states; None without any."""
-    joined = [r for r in system.recorded if r.continuity == "unwrap" and r.name == "euler_angles"]
-    return joined[0] if joined else None
+def angles_to_join(system: System) -> list[Recorded]:
+    """The recorded angles that are functions of the state."""
+    return [r for r in system.recorded if r.continuity == "unwrap"]
+
+
+def angle_rate(system: System, angles: Sequence[Recorded]) -> float:
+    """Bound of each component of the rate at which the body turns against what the angles are counted from,
+    rad/s: Euler angles from space, others maybe from a frame that turns with an orbit.
+    """
+    moving = any(r.name != "euler_angles" for r in angles)
+    return float(system.rate_bound) + (float(source_rate(system.scene)) if moving else 0.0)
 
 
 def is_sparse(system: System) -> bool:
     """Whether samples lie so far apart that they don't tell turns."""
-    return radians_between(system.scene.samples, float(system.rate_bound)) > DENSE
+    return radians_between(system.scene.samples, angle_rate(system, angles_to_join(system))) > DENSE
 
 
 def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.ndarray:
@@ -139,10 +149,10 @@ class TurnCounter:
     """Follows angles from sample to sample.
 
     Args:
-        angles: the recorded variable.
+        angles: the recorded variables.
     """
 
-    def __init__(self, system: System, angles: Recorded) -> None:
+    def __init__(self, system: System, angles: Sequence[Recorded]) -> None:
         self._exact, self._angles = system, angles
         self._place: Place | None = None
         self._built = False
@@ -169,12 +179,13 @@ class TurnCounter:
             self._advance(time)
 
     def turns(self, place: Place) -> np.ndarray | None:
-        """Full turns (3,) that a later sample's angles have, counted from where it began; None where the
+        """Full turns (angles,) that a later sample's angles have, counted from where it began; None where the
         motion followed doesn't lead there.
         """
         while self._time < place.time and not self._lost:
             self._advance(place.time)
-        off = np.abs(self._state[self._attitude] - place.state[self._attitude]).max()
+        watched = self._watched
+        off = np.abs(self._state[watched] - place.state[watched]).max()
         if self._lost or not off < _FAR:
             return None
         return np.rint((self._followed - place.angles) / _TURN).astype(np.int64)
@@ -195,13 +206,18 @@ class TurnCounter:
     def _build(self) -> None:
         double = precision_of("double")
         system = self._exact.rounded(double.number)
-        m, first = system.mechanics, self._angles.first
+        m = system.mechanics
         self._chunk = _CHUNK if not system.switches else _SWITCHING_CHUNK
-        outputs = system.outputs[first : first + 3]
+        outputs = [system.outputs[r.first + i] for r in self._angles for i in range(r.count)]
+        ends = np.cumsum([r.count for r in self._angles]).tolist()
+        self._groups = [slice(end - r.count, end) for r, end in zip(self._angles, ends, strict=True)]
         squared = hy.sum([w * w for w in m.rates])
-        self._attitude = [system.states.index(name) for name in m.carried(m.attitude).names]
+        names = system.states[:3] if m.attitude is None else m.attitude.names
+        self._watched = [system.states.index(name) for name in names]
         self._function: CompiledFunction = hy.cfunc([*outputs, squared], system.variables, compact_mode=True)
-        rate = math.sqrt(3) * float(system.rate_bound)
+        bound = angle_rate(system, self._angles)
+        self._source = math.ldexp(bound - float(system.rate_bound), system.scaling.time)
+        rate = math.sqrt(3) * bound
         span = system.scene.samples
         radians = rate * float(span.exact_last - span.begin)
         compact = system.wide or radians < _WORTH_BUILDING
@@ -215,14 +231,14 @@ class TurnCounter:
         self._built = True
 
     def _path(self, time: float, state: np.ndarray, end: float, parts: int) -> tuple[np.ndarray, ...] | None:
-        """Times (n + 1,), states, angles (n + 1, 3) and largest rate from a time to another."""
+        """Times (n + 1,), states, angles (n + 1, angles) and largest rate from a time to another."""
         times = np.linspace(time, end, parts + 1)
         times[0], times[-1] = time, end
         states = self._follower.states(times, state)
         if states is None or not np.isfinite(states).all():
             return None
         values = np.asarray(self._function(np.ascontiguousarray(states.T)))
-        return times, states, values[:3].T, np.sqrt(values[3].max())
+        return times, states, np.nan_to_num(values[:-1].T), np.sqrt(values[-1].max()) + self._source
 
     def _advance(self, limit: float) -> None:
         """A chunk of points, or as many as there are up to a time."""
@@ -238,10 +254,12 @@ class TurnCounter:
             return
         self._rate = max(_SPARE * float(fastest), self._bound / _SLOWER)
         jumps = nearest(np.diff(angles, axis=0))
-        doubtful = np.flatnonzero(np.abs(jumps).max(axis=1) > _DOUBTFUL)
-        if len(doubtful) <= max(4, _OFTEN * parts):
-            for i in doubtful:
-                jumps[i] = self._looked_at(times[i], states[i], times[i + 1], jumps[i], _DEPTH)
+        doubtful: set[int] = set()
+        for group in self._groups:
+            rows = np.flatnonzero(np.abs(jumps[:, group]).max(axis=1) > _DOUBTFUL)
+            doubtful |= set(rows.tolist()) if len(rows) <= max(4, _OFTEN * parts) else set()
+        for i in sorted(doubtful):
+            jumps[i] = self._looked_at(times[i], states[i], times[i + 1], jumps[i], _DEPTH)
         self._followed += jumps.sum(axis=0)
         self._time, self._state = end, states[-1]
 

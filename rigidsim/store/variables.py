@@ -17,6 +17,10 @@ LABELS: dict[str, list[str]] = {
     "space_axis": ["X", "Y", "Z"],
     "quaternion_component": ["w", "x", "y", "z"],
     "euler_angle": ["phi", "theta", "psi"],
+    "axis": ["figure", "spin", "momentum"],
+    "polar_motion_component": ["m1", "m2"],
+    "andoyer_momentum": ["L", "G", "H"],
+    "andoyer_angle": ["l", "g", "h"],
 }
 """Coordinates beside time, with their labels."""
 

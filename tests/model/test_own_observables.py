@@ -37,24 +37,24 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[rigidsim.Ru
 
 def test_the_example_of_the_readme(run: rigidsim.Run) -> None:
     dataset = run.dataset
-    axis = dataset["figure_axis"]
+    axis = dataset["nose"]
     assert axis.dims == ("time", "space_axis")
     assert (axis.attrs["units"], axis.attrs["long_name"], axis.attrs["frame"]) == (
         "1",
-        "body axis z",
+        "body axis x",
         "space axes",
     )
     # its length is the square of the quaternion's norm, which drifts like sqrt(steps)
     allowed = 2 * run.summary["invariants"]["quaternion_norm"]["bound"]
     assert np.abs(np.linalg.norm(axis.values, axis=1) - 1).max() <= allowed
     assert set(dataset.data_vars) - {n for n in dataset.data_vars if "drift_of" in dataset[n].attrs} == {
-        "figure_axis"
+        "nose"
     }
 
 
 def test_it_is_recorded_only_where_it_is_named(run: rigidsim.Run, tmp_path: Path) -> None:
     plain = rigidsim.load(ROOT / "configs/asymmetric_top.toml", overrides=["time.samples=3", "time.end=1"])
-    assert "figure_axis" not in rigidsim.run(plain, out=tmp_path / "plain").dataset
+    assert "nose" not in rigidsim.run(plain, out=tmp_path / "plain").dataset
 
 
 def test_a_name_that_is_taken_is_refused() -> None:

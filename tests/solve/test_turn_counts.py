@@ -155,7 +155,6 @@ def test_a_motion_that_does_not_arrive_tells_no_turns() -> None:
     )
     parts = assemble(prepared)
     angles = angles_to_join(prepared.system)
-    assert angles is not None
     unit = prepared.clock.exponent
     start = Place(0.0, np.array(parts.stepper.state), np.array([0.3, 1.1, 0.2]))
     assert parts.stepper.to(math.ldexp(100.0, -unit))

@@ -1,14 +1,8 @@
-"""Observables and invariants: everything that can be recorded, as expressions of the state.
-
-A new observable is one ``Observable`` in the list below; a new invariant one whose ``conserved`` says when
-and why it holds. It then shows up in the dataset, the summary, the plots and the timeline.
-"""
+"""What mechanics calls its own: states, momenta, energies, and the constants of the motion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import heyoka as hy
 
@@ -22,74 +16,18 @@ from rigidsim.model.drift_scales import (
     total_momentum_scale,
 )
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.needs import NEEDS
+from rigidsim.model.observables.observable import (
+    BODY,
+    ENERGY,
+    MOMENTUM,
+    NO_UNIT,
+    SPACE,
+    Observable,
+    same_unit,
+)
 from rigidsim.model.rotating_frame import jacobi_constant
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.registry import register_observable
-
-Dims = tuple[str, ...]
-BODY: Dims = ("body_axis",)
-SPACE: Dims = ("space_axis",)
-
-
-def _never(_: Mechanics) -> str | None:
-    return None
-
-
-def _as_it_is(_: Mechanics) -> str:
-    return ""
-
-
-def always(_: Mechanics) -> bool:
-    """Recorded wherever a scene has it, unless the config names what to record."""
-    return True
-
-
-def only_when_named(_: Mechanics) -> bool:
-    """Recorded only where ``[output] record`` names it."""
-    return False
-
-
-@dataclass(frozen=True)
-class Observable:
-    """One recordable quantity; one of your own enters by ``rigidsim.scene.registry.register_observable``.
-
-    Attributes:
-        name: of the dataset's variable.
-        dims: beside time.
-        units: SI.
-        long_name: for readers.
-        frame: "body axes", "space axes" or "".
-        expressions: components as expressions of the state, in internal units (see ``Kinematics``).
-        exponents: binary exponents of the components' internal units; None where they are in SI.
-        needs: what the scene must have, names of ``rigidsim.model.needs.NEEDS``.
-        conserved: why it is an invariant of this scene, or None where it isn't.
-        drift_scale: scale of its drift in SI (mpf), with a name for it.
-        by_default: whether it is recorded where the config names nothing.
-        continuity: how samples are joined, see ``rigidsim.model.outputs.Recorded``.
-    """
-
-    name: str
-    dims: Dims
-    units: str
-    long_name: str
-    expressions: Callable[[Mechanics], list[Symbolic]]
-    exponents: Callable[[Mechanics], list[int]] | None = None
-    frame: str = ""
-    needs: tuple[str, ...] = ()
-    conserved: Callable[[Mechanics], str | None] = _never
-    drift_scale: Callable[[Mechanics], tuple[Any, str]] | None = None
-    by_default: Callable[[Mechanics], bool] = always
-    continuity: Callable[[Mechanics], str] = _as_it_is
-
-    def available(self, m: Mechanics) -> bool:
-        """Whether the scene has all that it needs."""
-        return all(NEEDS[need].met(m) for need in self.needs)
-
-    def unit_exponents(self, m: Mechanics, count: int) -> list[int]:
-        """One for each of ``count`` components."""
-        return [0] * count if self.exponents is None else self.exponents(m)
-
 
 WORK = "work"
 
@@ -186,16 +124,6 @@ def mass_exponent(m: Mechanics) -> int:
     return int(m.scene.context.frexp(m.scene.body.mass)[1])
 
 
-def same_unit(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mechanics], list[int]]:
-    """``Observable.exponents`` of components that have one unit."""
-    return lambda m: [exponent(m)] * count
-
-
-MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
-_ENERGY = lambda m: m.scaling.energy  # noqa: E731
-NO_UNIT = lambda m: 0  # noqa: E731
-
-
 def _carried_as(kind: str) -> Callable[[Mechanics], bool]:
     return lambda m: m.attitude is not None and m.attitude.kind == kind
 
@@ -242,7 +170,7 @@ _BUILT_IN: tuple[Observable, ...] = (
         _along_symmetry_axis, same_unit(MOMENTUM, 1), "body axes", ("symmetry",), _axial, momentum_scale,
     ),
     Observable(
-        "energy", (), "J", "total energy", lambda m: [m.energy], same_unit(_ENERGY, 1), "", ("energy",),
+        "energy", (), "J", "total energy", lambda m: [m.energy], same_unit(ENERGY, 1), "", ("energy",),
         _conservative, energy_scale,
     ),
     Observable(
@@ -252,7 +180,7 @@ _BUILT_IN: tuple[Observable, ...] = (
     ),
     Observable(
         "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [jacobi_constant(m)],
-        same_unit(_ENERGY, 1), "", ("jacobi",),
+        same_unit(ENERGY, 1), "", ("jacobi",),
         _rests_in_orbit, energy_scale,
     ),
     Observable(
@@ -273,22 +201,22 @@ _BUILT_IN: tuple[Observable, ...] = (
     ),
     Observable(
         "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],
-        same_unit(_ENERGY, 1), "", ("work",),
+        same_unit(ENERGY, 1), "", ("work",),
     ),
     Observable(
         "energy_balance", (), "J", "energy less the work done", lambda m: [m.energy - hy.make_vars(WORK)],
-        same_unit(_ENERGY, 1), "", ("work",), lambda m: "energy changes by the work of the loads",
+        same_unit(ENERGY, 1), "", ("work",), lambda m: "energy changes by the work of the loads",
         energy_scale,
     ),
     Observable(
         "rotational_energy", (), "J", "kinetic energy of rotation",
-        lambda m: [m.rotational_energy], same_unit(_ENERGY, 1), "", (),
+        lambda m: [m.rotational_energy], same_unit(ENERGY, 1), "", (),
         lambda m: _torque_free(m) if m.scene.free_flight else None, rotational_scale,
         by_default=lambda m: m.scene.free_flight,
     ),
     Observable(
         "potential_energy", (), "J", "potential energy",
-        lambda m: [m.potential_energy], same_unit(_ENERGY, 1), "", ("potential",),
+        lambda m: [m.potential_energy], same_unit(ENERGY, 1), "", ("potential",),
     ),
     Observable(
         "position", SPACE, "m", "position of the centre of mass", lambda m: m.carried(m.position),

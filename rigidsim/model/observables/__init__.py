@@ -1,0 +1,15 @@
+"""Observables and invariants: everything that can be recorded, as expressions of the state.
+
+One module per subject; what they define enters the registry when this package is imported, in the order in
+which a dataset holds it.
+"""
+
+from rigidsim.model.observables import mechanical  # noqa: F401, I001  (enters what it defines)
+from rigidsim.model.observables import axes  # noqa: F401
+from rigidsim.model.observables.observable import (
+    Angle as Angle,
+    Observable as Observable,
+    always as always,
+    continuous_angles as continuous_angles,
+    only_when_named as only_when_named,
+)

@@ -1,0 +1,166 @@
+"""The plane that obliquity and longitudes count from, as expressions: fixed in space, or a source's own.
+
+Longitudes count from X turned by the smallest rotation that takes Z to the plane's normal n,
+
+    X' = X - n_x (Z + n) / (1 + n_z),    Y' = Y - n_y (Z + n) / (1 + n_z)
+
+(and X itself where n = -Z), so that nothing jumps while a plane moves. Space axes of an ephemeris have the
+equinox as X.
+
+The mean ecliptic of date: its pole is (P, -Q, sqrt(1 - P^2 - Q^2)) in the ecliptic and equinox of J2000, with
+P = sin(pi_A) sin(Pi_A) and Q = sin(pi_A) cos(Pi_A) from Capitaine, Wallace & Chapront 2003 (A&A 412, 567:
+the precession of the ecliptic of IAU 2006).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.kinematics import seconds
+from rigidsim.model.load import Load
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotations import Symbolic, constant
+from rigidsim.model.two_part import as_factor
+from rigidsim.scene.arithmetic import Vector, cross
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.frame import ORBIT
+from rigidsim.scene.scene import Scene
+
+_CENTURY = 36525 * 86400
+_ARCSEC = ExactNumber(Fraction(1, 3600 * 180), pi_power=1)
+_P = ("4.199094", "0.1939873", "-0.00022466", "-0.000000912", "0.0000000120")
+_Q = ("-46.811015", "0.0510283", "0.00052413", "-0.000000646", "-0.0000000172")
+"""Arcseconds by powers of centuries (TDB) from J2000, the first on."""
+
+
+@dataclass(frozen=True)
+class ReferencePlane:
+    """Right-handed unit vectors, space axes.
+
+    Attributes:
+        first: from which longitudes count.
+        normal: from which obliquities count.
+        described: which plane it is.
+    """
+
+    first: list[Symbolic]
+    second: list[Symbolic]
+    normal: list[Symbolic]
+    described: str
+
+    def components(self, vector: list[Symbolic]) -> list[Symbolic]:
+        """Of a vector in space axes, along the plane's own."""
+        return [
+            hy.sum([a * b for a, b in zip(axis, vector, strict=True)])
+            for axis in (self.first, self.second, self.normal)
+        ]
+
+
+def refuse_without_plane(scene: Scene, loads: Sequence[Load]) -> None:
+    """Look whether there is the plane that ``[frame] reference`` names.
+
+    Raises:
+        ConfigError: "orbit" in a scene without one.
+    """
+    if scene.reference is None:
+        _source(scene, loads)
+
+
+def flies_in_plane(scene: Scene, loads: Sequence[Any]) -> bool:
+    """Whether the plane is that of the body's own flight."""
+    return scene.reference is None and _source(scene, loads).attracting_point is not None
+
+
+def reference_plane(m: Mechanics) -> ReferencePlane:
+    """The plane that ``[frame] reference`` names, see above.
+
+    Raises:
+        ConfigError: "orbit" in a scene without one.
+    """
+    scene, context = m.scene, m.scene.context
+    if scene.reference is not None:
+        described = "XY plane of the space axes"
+        if not isinstance(scene.config.frame.reference, str):
+            given = ", ".join(context.nstr(x, 17) for x in scene.reference)
+            described = f"plane with the normal [{given}] in space axes"
+        return _fixed(m, scene.reference, described)
+    load = _source(scene, m.loads)
+    if load.orbit is not None:
+        orbit = load.orbit
+        described = "plane of the source's orbit"
+        sine, cosine = context.sin(orbit.inclination), context.cos(orbit.inclination)
+        if orbit.node_rate == 0:
+            node = orbit.ascending_node
+            return _fixed(m, [sine * context.sin(node), -sine * context.cos(node), cosine], described)
+        return _moving(m.orbit(orbit).normal, described + ", whose node moves")
+    if load.attracting_point is not None:
+        return _moving(_flight_normal(m, load.attracting_point), "osculating plane of the body's own orbit")
+    return _moving(_ecliptic_of_date(m), "mean ecliptic of date (IAU 2006)")
+
+
+def _source(scene: Scene, loads: Sequence[Any]) -> Any:
+    """The first load with a plane of its own."""
+    for load in loads:
+        ephemeris = getattr(load, "ephemeris", None)
+        if load.orbit is not None or load.attracting_point is not None or ephemeris == "sun":
+            return load
+    what = f'given "{ORBIT}", but no load of the scene has an orbit whose plane is known'
+    if any(getattr(load, "ephemeris", None) == "moon" for load in loads):
+        what += " (the series of the Moon alone names none)"
+    raise ConfigError(Problem("[frame] reference", what + '; "space" or a normal [x, y, z] is allowed'))
+
+
+def _fixed(m: Mechanics, normal: Vector, described: str) -> ReferencePlane:
+    """Worked out in the scene's arithmetic, and rounded once."""
+    context = m.scene.context
+    x, y, z = normal
+    one, zero = context.one, context.zero
+    level = x == 0 and y == 0
+    first = [one, zero, zero] if level else [one - x * x / (1 + z), -x * y / (1 + z), -x]
+    axes = (first, cross(normal, first), normal)
+    first, second, normal = ([as_factor(m.number(a)) for a in axis] for axis in axes)
+    return ReferencePlane(first, second, normal, described)
+
+
+def _moving(normal: list[Symbolic], described: str) -> ReferencePlane:
+    x, y, z = normal
+    inverse = 1.0 / (1.0 + z)
+    cross_term = -(x * y * inverse)
+    first = [1.0 - x * x * inverse, cross_term, -x]
+    second = [cross_term, 1.0 - y * y * inverse, -y]
+    return ReferencePlane(first, second, normal, described)
+
+
+def _flight_normal(m: Mechanics, point: Vector) -> list[Symbolic]:
+    context, scaling = m.scene.context, m.scaling
+    offset = []
+    for x, a in zip(m.carried(m.position), point, strict=True):
+        shift = context.ldexp(a, -scaling.length)
+        offset.append(x - m.number(shift) if shift != 0 else x)
+    found = cross(offset, m.carried(m.velocity))
+    size = hy.sqrt(hy.sum([c * c for c in found]))
+    return [c / size for c in found]
+
+
+def _ecliptic_of_date(m: Mechanics) -> list[Symbolic]:
+    context, epoch = m.scene.context, m.scene.epoch
+    since = seconds(m)
+    if epoch is not None:
+        start = ExactNumber(epoch.since_j2000()).at(context)
+        since = since + m.number(start) if start != 0 else since
+    centuries = since * m.number(context.one / _CENTURY)
+
+    def series(terms: tuple[str, ...]) -> Symbolic:
+        total: Any = constant(0.0)
+        for term in reversed(terms):
+            total = (total + m.number(context.mpf(term) * _ARCSEC.at(context))) * centuries
+        return total
+
+    p, q = series(_P), series(_Q)
+    return [p, -q, hy.sqrt(1.0 - p * p - q * q)]

@@ -1,0 +1,164 @@
+"""Directions of the figure, spin and momentum axes, and their angles against the reference plane."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import xarray as xr
+from support import cases, config, run_text
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.solve.problem import prepare
+from rigidsim.store.variables import parts_in
+
+NAMES = 'record = ["quaternion", "angular_velocity", "obliquity", "node_longitude", "right_ascension"]'
+PRECESSING = "angular_momentum = [0, 0, 2]\neuler_angles = [0.3, 1.1, 0.2]"
+
+
+def exact(dataset: xr.Dataset, name: str, row: int) -> list[mpmath.mpf]:
+    """A sample with all its residuals."""
+    parts = [np.ravel(dataset[part].values[row]) for part in parts_in(dataset, name)]
+    return [mpmath.fsum(map(float, values)) for values in zip(*parts, strict=True)]
+
+
+def turned(q: list[mpmath.mpf], vector: list[mpmath.mpf]) -> mpmath.matrix:
+    """R v of a quaternion that need not be a unit one."""
+    w, x, y, z = q
+    matrix = mpmath.matrix(
+        [
+            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+        ]
+    )
+    return matrix * mpmath.matrix(vector)
+
+
+def crossed(a: mpmath.matrix, b: mpmath.matrix) -> mpmath.matrix:
+    return mpmath.matrix(
+        [a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3] for i in range(3)]
+    )
+
+
+def against(a: mpmath.matrix, n: mpmath.matrix) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """Obliquity and node longitude from their definitions."""
+    n, a = n / mpmath.norm(n), a / mpmath.norm(a)
+    z = mpmath.matrix([0, 0, 1])
+    first = mpmath.matrix([1, 0, 0]) - n[0] * (z + n) / (1 + n[2])
+    node = crossed(n, a)
+    obliquity = mpmath.acos((n.T * a)[0])
+    return obliquity, mpmath.atan2((crossed(n, first).T * node)[0], (first.T * node)[0])
+
+
+def test_80_bits_reach_obliquity_and_longitude(runs: Path) -> None:
+    """Against mpmath, from the recorded quaternion and rates: to 1e-18, and 64 bits with full turns."""
+    moments = [1, 1.25, 2]
+    run = run_text(
+        config(
+            f"principal_moments = {moments}",
+            'angular_velocity = ["0.1", "0.2", 1]\neuler_angles = [0.4, "23.44 deg", 0.1]',
+            (), "end = 20\nsamples = 9", 'precision = "extended"',
+            f'{NAMES}\n[frame]\nreference = ["0.1", "-0.2", 1]',
+        ),
+        runs,
+    )  # fmt: skip
+    dataset = run.dataset
+    with mpmath.workdps(50):
+        normal = mpmath.matrix([mpmath.mpf("0.1"), mpmath.mpf("-0.2"), 1])
+        for row in range(9):
+            q, w = exact(dataset, "quaternion", row), exact(dataset, "angular_velocity", row)
+            momentum = [i * x for i, x in zip(moments, w, strict=True)]
+            axes = [turned(q, v) for v in ([0, 0, 1], w, momentum)]
+            obliquity, longitude = (exact(dataset, n, row) for n in ("obliquity", "node_longitude"))
+            for axis, tilt, node in zip(axes, obliquity, longitude, strict=True):
+                expected = against(axis, normal)
+                assert abs(tilt - expected[0]) < 1e-18
+                turns = mpmath.nint((node - expected[1]) / (2 * mpmath.pi))
+                held = 2.0**-64 * (abs(node) if turns else 0)
+                assert abs(node - expected[1] - 2 * mpmath.pi * turns) < 1e-18 + held
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    cases(
+        ['formulation = "quaternion"', 'formulation = "rotation_matrix"', 'method = "closed_form"',
+         'precision = "extended"', 'precision = "quadruple"'],
+        ['formulation = "quaternion"', 'method = "closed_form"', 'precision = "quadruple"'],
+    ),
+)  # fmt: skip
+def test_turns_between_two_samples_are_those_of_the_motion(integrator: str, runs: Path) -> None:
+    """L lies along Z: the node of the figure axis' equator is the first Euler angle, phi = L t / A."""
+    time = "end = 1000\nsamples = 3"
+    run = run_text(config("principal_moments = [1, 1, 1.5]", PRECESSING, (), time, integrator, NAMES), runs)
+    node = run.dataset["node_longitude"].sel(axis="figure").values
+    np.testing.assert_allclose(node, 0.3 + 2 * run.dataset["time"].values, rtol=0, atol=1e-9)
+    assert np.isnan(run.dataset["node_longitude"].sel(axis="momentum").values[0])
+    right_ascension = run.dataset["right_ascension"].sel(axis="figure").values
+    np.testing.assert_allclose(right_ascension, node - np.pi / 2, rtol=0, atol=1e-9)
+    assert not run.summary["warnings"]
+
+
+def test_dense_and_sparse_samples_agree_against_a_moving_orbit(runs: Path) -> None:
+    load = (
+        'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+        'orbit = {semi_major_axis = 10, inclination = "5 deg", ascending_node = 0.4, node_rate = -0.01}'
+    )
+    start = 'angular_velocity = [0.1, 0, 1]\neuler_angles = [0.3, "23 deg", 0]'
+    output = f'{NAMES}\n[frame]\nreference = "orbit"'
+    few, many = (
+        run_text(config("principal_moments = [1, 1, 2]", start, load, f"end = 2000\nsamples = {count}",
+                        'hold_invariants = false', output), runs, f'name="samples_{count}"').dataset
+        for count in (5, 8001)
+    )  # fmt: skip
+    for name in ("node_longitude", "right_ascension", "obliquity"):
+        np.testing.assert_array_equal(few[name].values, many[name].values[::2000])
+    assert np.ptp(few["right_ascension"].values[:, 0]) > 1  # it has moved on
+    # the orbit's normal, by hand
+    node, tilt = 0.4 - 0.01 * few["time"].values[-1], np.radians(5)
+    normal = np.array([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)])
+    q = [mpmath.mpf(float(x)) for x in few["quaternion"].values[-1]]
+    expected = against(turned(q, [0, 0, 1]), mpmath.matrix(normal.tolist()))
+    assert few["obliquity"].values[-1, 0] == pytest.approx(float(expected[0]), abs=1e-12)
+    difference = few["node_longitude"].values[-1, 0] - float(expected[1])
+    assert abs(difference - 2 * np.pi * np.rint(difference / (2 * np.pi))) < 1e-12
+
+
+def test_the_figure_axis_and_the_equator_of_an_ecliptic_scene(runs: Path) -> None:
+    """A pole at the ecliptic's own: right ascension 270 deg, declination 66.56 deg."""
+    names = 'record = ["right_ascension", "declination", "figure_axis"]'
+    frame = '[frame]\naxes = "ecliptic J2000"\nfigure_axis = "z"'
+    body, start = "principal_moments = [3, 1, 2]", "angular_velocity = [0, 0, 1]"
+    run = run_text(config(body, start, (), "end = 1\nsamples = 2", "", names, frame), runs)
+    tilt = np.radians(84381.406 / 3600)
+    assert run.dataset["right_ascension"].values[0] == pytest.approx([-np.pi / 2] * 3)
+    assert run.dataset["declination"].values[0] == pytest.approx([np.pi / 2 - tilt] * 3)
+    assert run.dataset["figure_axis"].values[-1] == pytest.approx([0, 0, 1])
+    assert "body axis z" in run.dataset["figure_axis"].attrs["figure_axis"]
+    chosen = prepare(rigidsim.parse(config("principal_moments = [3, 1, 2]"))).scene.figure
+    assert [float(x) for x in chosen.pole] == [1, 0, 0]
+    assert [float(x) for x in chosen.first] == [0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("body", "frame", "where", "what"),
+    [
+        ("[1, 2, 3]", 'figure_axis = "symmetry"', "[frame] figure_axis", "no two principal moments"),
+        ("[1, 2, 2]", 'figure_axis = "largest"', "[frame] figure_axis", 'or "symmetry" is allowed'),
+        ("[1, 2, 3]", 'reference = "orbit"', "[frame] reference", "no load of the scene has an orbit"),
+        ("[1, 2, 3]", "reference = [0, 0, 0]", "[frame] reference", "zero vector"),
+        ("[1, 2, 3]", 'reference = "ecliptic"', "[frame] reference", "space, orbit"),
+        ("[1, 2, 3]", "reference = 3", "[frame] reference", "a normal"),
+    ],
+)
+def test_axes_and_planes_that_a_scene_has_not_are_refused(
+    body: str, frame: str, where: str, what: str
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        prepare(rigidsim.parse(config(f"principal_moments = {body}", output=f"[frame]\n{frame}")))
+    (problem,) = refused.value.problems
+    assert problem.where == where
+    assert what in problem.what
