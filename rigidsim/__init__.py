@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
-    from rigidsim.store.run import Run, open_run
+    from rigidsim.store.memory import MemoryRun
+    from rigidsim.store.run import Run, SavedRun, open_run
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
     from rigidsim.workflows.resume import resume
@@ -27,7 +28,9 @@ _PLACES = {
     "Experiment": "rigidsim.workflows.read",
     "load": "rigidsim.workflows.read",
     "parse": "rigidsim.workflows.read",
+    "MemoryRun": "rigidsim.store.memory",
     "Run": "rigidsim.store.run",
+    "SavedRun": "rigidsim.store.run",
     "open_run": "rigidsim.store.run",
     "run": "rigidsim.workflows.run",
     "resume": "rigidsim.workflows.resume",
@@ -38,9 +41,11 @@ _PLACES = {
 __all__ = [
     "ConfigError",
     "Experiment",
+    "MemoryRun",
     "RigidsimError",
     "Run",
     "RunFolderError",
+    "SavedRun",
     "load",
     "open_run",
     "parse",
@@ -57,3 +62,8 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(_PLACES[name]), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    """Everything that can be asked for, loaded or not: what tab completion shows."""
+    return sorted({*globals(), *__all__})

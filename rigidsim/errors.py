@@ -3,16 +3,40 @@
 from __future__ import annotations
 
 import errno
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 _MOST_SHOWN = 30
+_COMMAND, _PYTHON, _END = "\x02", "\x03", "\x04"  # none is ever shown
+_EITHER = re.compile(f"{_COMMAND}([^{_PYTHON}]*){_PYTHON}([^{_END}]*){_END}")
+
+
+def either(command_line: str, python: str) -> str:
+    """A remedy in two wordings: errors that are printed by a command give the first, in Python the second."""
+    return f"{_COMMAND}{command_line}{_PYTHON}{python}{_END}"
+
+
+FORCE = either("--force", "force=True")
+OUT = either("--out", "out")
+RESUME = either("rigidsim resume", "rigidsim.resume(...)")
+VIEW = either("rigidsim view", "run.view()")
 
 
 class RigidsimError(Exception):
-    """Base of all errors that rigidsim raises on purpose; its text is meant for the user."""
+    """Base of all errors that rigidsim raises on purpose; its text is meant for the user.
+
+    What to do about it is said in Python's words; ``for_command_line`` says it in options and commands.
+    """
 
     exit_code = 2
+
+    def __str__(self) -> str:
+        return _EITHER.sub(r"\2", super().__str__())
+
+    def for_command_line(self) -> str:
+        """The text with commands and their options."""
+        return _EITHER.sub(r"\1", super().__str__())
 
 
 @dataclass(frozen=True)

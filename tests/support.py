@@ -46,7 +46,7 @@ EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadru
 
 def run_text(
     text: str, out: Path, *overrides: str, timeline: bool = False, tuning: Tuning | None = None
-) -> rigidsim.Run:
+) -> rigidsim.SavedRun:
     """Run a config text, without drawing unless asked for."""
     settings = [f"output.timeline={str(timeline).lower()}", *overrides]
     return rigidsim.run(rigidsim.parse(text, overrides=settings), out=out, force=True, tuning=tuning)

@@ -35,7 +35,7 @@ def print_run(result: Run, as_json: bool) -> int:
     if as_json:
         print(json.dumps(result.summary))
     else:
-        tables.print_summary(result.outcome, str(result.folder.path))
+        tables.print_summary(result.outcome, result.place)
     code = result.outcome.exit_code
     if code:
         print(f"rigidsim: {result.outcome.message}", file=sys.stderr)
@@ -65,7 +65,7 @@ def user_errors(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(*args, **kwargs)
         except RigidsimError as error:
-            print(f"rigidsim: {error}", file=sys.stderr)
+            print(f"rigidsim: {error.for_command_line()}", file=sys.stderr)
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             print("rigidsim: interrupted", file=sys.stderr)

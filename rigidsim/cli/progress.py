@@ -54,7 +54,7 @@ class TerminalObserver(Observer):
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def started(self, prepared: InitialValueProblem, folder: Path) -> None:
+    def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
         """See ``Observer``."""
         self._begin = time.perf_counter()
         last = float(prepared.scene.samples.last) - float(prepared.scene.start)
@@ -115,13 +115,13 @@ class LineObserver(Observer):
     def __exit__(self, *_: object) -> None:
         return None
 
-    def started(self, prepared: InitialValueProblem, folder: Path) -> None:
+    def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
         """See ``Observer``."""
         self._begin = self._latest = time.perf_counter()
         self._name = prepared.scene.name
         self._start = float(prepared.scene.start)
         self._last = float(prepared.scene.samples.last) - self._start
-        print(f"{self._name}: integrating into {folder}", file=sys.stderr, flush=True)
+        self._say("integrating in memory" if folder is None else f"integrating into {folder}")
 
     def progressed(self, progress: Progress) -> None:
         """See ``Observer``."""

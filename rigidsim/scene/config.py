@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from dataclasses import replace as exchanged
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.frame_table import PLANE_OR_NORMAL
-from rigidsim.scene.overrides import apply_overrides, written
+from rigidsim.scene.overrides import FLAG, apply_overrides, written
+from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import POINT_OR_NAME, Config, config_model
 from rigidsim.scene.toml_text import long_integers, parse_toml
 
+Overrides = Sequence[str] | Mapping[str, Any]
+"""Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""
 _LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
 _EARLIER_MARK = "#:set "
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Experiment:
-    """A config as given, and its meaning.
+    """A config as given, and its meaning; made by ``load``, ``parse`` or ``from_dict``.
 
     Attributes:
         text: the TOML text of what is run: each key has one value, where it stands in plain sight.
@@ -51,23 +57,71 @@ class Experiment:
             ConfigError: with every problem found.
         """
         other = parse(self.text, source=self.source, overrides=overrides)
-        return replace(other, given=self.given, settings=self.settings)
+        return exchanged(other, given=self.given, settings=self.settings)
+
+    @classmethod
+    def from_dict(cls, tables: Mapping[str, Any], *, source: str = "config") -> Experiment:
+        """An experiment written in Python: the tables of a config as nested dictionaries.
+
+        Floats count as the decimal that they print as (``0.1`` is one tenth); Decimals, Fractions, numbers of
+        mpmath, and strings such as ``"1/3"`` or ``"430 day"`` count exactly.
+
+        Args:
+            tables: ``{"name": .., "body": {..}, "loads": [{..}], ..}``; None counts as not given.
+            source: its name in messages.
+
+        Raises:
+            ConfigError: with every problem found.
+        """
+        return parse(toml_text(tables), source=source)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The tables as nested dictionaries; numbers that aren't whole are Decimals with all digits."""
+        return parse_toml(self.text, self.source)
+
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> Experiment:
+        """The same with other values, such as ``replace({"time.end": 10})`` or ``replace(time={"end": 10})``.
+
+        Args:
+            changes: dotted keys with optional [index], ``"initial.angular_velocity[0]"``, to values as of
+                ``from_dict``.
+            tables: tables with the keys to change, or ``name`` and ``description``.
+
+        Raises:
+            ConfigError: with every problem found.
+        """
+        other = parse(self.text, source=self.source, overrides={**(changes or {}), **tables})
+        return exchanged(other, given=self.given, settings=(*self.settings, *other.settings))
+
+    def __repr__(self) -> str:
+        loads = ", ".join(load.kind for load in self.config.loads) or "no load"  # type: ignore[attr-defined]
+        end = self.config.time.end
+        until = "" if end is None else f", to t = {float(end):g} s"
+        precision = self.config.integrator.precision
+        return f"<Experiment {self.config.name!r} ({self.source}): {loads}{until}, {precision}>"
+
+    def _repr_html_(self) -> str:
+        return f"<b>{html.escape(self.config.name)}</b><pre>{html.escape(self.text)}</pre>"
 
 
-def parse(text: str, *, source: str = "config", overrides: Sequence[str] = ()) -> Experiment:
+def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Experiment:
     """Read a TOML text.
 
     Args:
         text: the config.
         source: its name in messages.
-        overrides: ``KEY=VALUE`` texts that replace values, in order.
+        overrides: ``KEY=VALUE`` texts that replace values, in order; or a dictionary as of
+            ``Experiment.replace``.
 
     Raises:
         ConfigError: with every problem found.
     """
     table = parse_toml(text, source)
+    what = FLAG
+    if isinstance(overrides, Mapping):
+        what, overrides = "replacing", assignments_of(overrides)
     try:
-        apply_overrides(table, overrides)
+        apply_overrides(table, overrides, what)
     except ConfigError as error:
         raise error.at(source) from None
     problems = long_integers(table)
@@ -83,11 +137,11 @@ def parse(text: str, *, source: str = "config", overrides: Sequence[str] = ()) -
         problems += [problem for problem in found if problem.where not in named]
     if problems:
         raise ConfigError(problems, source)
-    run = written(text, overrides, table, source) if overrides else text
+    run = written(text, overrides, table, source, what) if overrides else text
     return Experiment(run, config, source, text, tuple(line.strip() for line in overrides))
 
 
-def load(path: str | Path, *, overrides: Sequence[str] = ()) -> Experiment:
+def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
     """Read a config file; see ``parse``.
 
     Raises:
@@ -110,7 +164,7 @@ def load(path: str | Path, *, overrides: Sequence[str] = ()) -> Experiment:
     return parse(text, source=str(path), overrides=overrides)
 
 
-def parse_earlier(text: str, *, source: str, overrides: Sequence[str] = ()) -> Experiment:
+def parse_earlier(text: str, *, source: str, overrides: Overrides = ()) -> Experiment:
     """Read a text that the first version wrote into a run's files; see ``parse``.
 
     Those kept what ``--set`` had replaced in ``#:set KEY=VALUE`` comments at the end. Anywhere else, and in
@@ -120,6 +174,8 @@ def parse_earlier(text: str, *, source: str, overrides: Sequence[str] = ()) -> E
         ConfigError: with every problem found.
     """
     body, kept = _split_earlier(text)
+    if isinstance(overrides, Mapping):
+        overrides = assignments_of(overrides)
     return parse(body, source=source, overrides=[*kept, *overrides])
 
 

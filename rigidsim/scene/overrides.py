@@ -12,35 +12,40 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.toml_text import DEEP_KEY, DEEPEST_KEY, decimal, parse_toml
 
 _MOST_OVERRIDES = 1000
+FLAG = "--set"
+"""What overrides are called where they come from the command line."""
 
 
-def apply_overrides(table: dict[str, Any], overrides: Sequence[str]) -> None:
+def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str = FLAG) -> None:
     """Replace values of a config's tables, in order.
 
     Args:
         overrides: each a dotted key with optional [index], an equals sign and a TOML value (what is none,
             such as a bare word or a number with its unit, is a string).
+        what: they are called in messages.
 
     Raises:
         ConfigError: one can't be applied.
     """
     if len(overrides) > _MOST_OVERRIDES:
-        what = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
-        raise ConfigError(Problem("--set", what))
+        many = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
+        raise ConfigError(Problem(what, many))
     for assignment in overrides:
-        key, value_text = _parts(assignment)
+        where = f"{what} {assignment[:60]}"
+        key, value_text = _parts(assignment, where)
         try:
             value = tomllib.loads(f"value = {value_text}", parse_float=decimal)["value"]
         except (ValueError, RecursionError):
             value = value_text
-        _assign(table, key, value, assignment)
+        _assign(table, key, value, where)
 
 
-def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str) -> str:
+def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str, what: str = FLAG) -> str:
     """A config's text with values replaced where they stand, in the digits given; comments and order stay.
 
     Args:
         meant: the tables that the result must have.
+        what: the values are called in messages.
 
     Raises:
         ConfigError: it can't be written so.
@@ -51,20 +56,20 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
     try:
         document = tomlkit.parse(text)
         for assignment in overrides:
-            key, value_text = _parts(assignment)
+            key, value_text = _parts(assignment, what)
             try:
                 value: Any = tomlkit.parse(f"value = {value_text}\n").item("value")
                 value.trivia.comment = value.trivia.comment_ws = ""
             except (ValueError, RecursionError):
                 value = tomlkit.string(value_text)
-            _assign(document, key, value, assignment)
+            _assign(document, key, value, what)
         result = document.as_string()
         if parse_toml(result, source) == meant:
             return result
     except (TOMLKitError, ConfigError, ValueError, TypeError, RecursionError):
         pass  # a text that the other reader takes and this one doesn't: none is known
-    what = "can't be written into this text; edit the file instead"
-    raise ConfigError(Problem(f"--set {overrides[-1][:60]}", what), source)
+    why = "can't be written into this text; edit the file instead"
+    raise ConfigError(Problem(f"{what} {overrides[-1][:60]}", why), source)
 
 
 def assignments(text: str, keys: Sequence[str]) -> list[str]:
@@ -80,9 +85,8 @@ def assignments(text: str, keys: Sequence[str]) -> list[str]:
     return found
 
 
-def _parts(assignment: str) -> tuple[str, str]:
+def _parts(assignment: str, where: str) -> tuple[str, str]:
     key, equals, value_text = assignment.partition("=")
-    where = f"--set {assignment[:60]}"
     if not equals or not key.strip() or "\n" in assignment:
         raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
     if DEEP_KEY.search(assignment):
@@ -90,8 +94,7 @@ def _parts(assignment: str) -> tuple[str, str]:
     return key.strip(), value_text.strip()
 
 
-def _assign(table: dict[str, Any], key: str, value: Any, assignment: str) -> None:
-    where = f"--set {assignment[:60]}"
+def _assign(table: dict[str, Any], key: str, value: Any, where: str) -> None:
     steps: list[str | int] = []
     for part in key.split("."):
         match = re.fullmatch(r"([^\[\]]+)((?:\[\d{1,9}\])*)", part.strip())

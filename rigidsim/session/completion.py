@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rigidsim.errors import StoppedWritingError
+from rigidsim.errors import VIEW, StoppedWritingError
 from rigidsim.scene.schema import Output
 from rigidsim.session.attributes import of_complete
 from rigidsim.session.guards import Observer
@@ -118,7 +118,7 @@ def with_timeline(summary: Summary, folder: RunFolder, output: Output, observer:
     except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
         why = error.strerror if isinstance(error, OSError) else None
         raise StoppedWritingError(
-            f"{path}: can't be written: {why or error}; the dataset is complete, and rigidsim view draws "
+            f"{path}: can't be written: {why or error}; the dataset is complete, and {VIEW} draws "
             "the timeline once that is possible"
         ) from None
     return summary.having(timeline_sha256=provenance.file_sha256(path))

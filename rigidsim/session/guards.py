@@ -19,8 +19,8 @@ from rigidsim.solve.status import Status
 class Observer:
     """Is told how a run goes; the command line draws a progress bar with it. Does nothing by itself."""
 
-    def started(self, prepared: InitialValueProblem, folder: Path) -> None:
-        """The equations are compiled; integration begins."""
+    def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
+        """The equations are compiled; integration begins, into a folder or into memory."""
 
     def progressed(self, progress: Progress) -> None:
         """Called between chunks, at most some tens of times per second."""

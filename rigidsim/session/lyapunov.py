@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
+from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.session.guards import Interruption
 from rigidsim.solve.lyapunov import Convergence, LyapunovSpectrum, lyapunov_spectrum
 from rigidsim.solve.problem import InitialValueProblem, double_twin
@@ -17,7 +17,7 @@ from rigidsim.store.variables import SCHEMA_VERSION, Extra
 
 def spectrum_of(
     prepared: InitialValueProblem,
-    folder: RunFolder,
+    folder: RunFolder | None,
     run_id: str,
     interruption: Interruption,
     save_seconds: float,
@@ -25,6 +25,7 @@ def spectrum_of(
     """Integrate the variational equations, or what is left of them.
 
     Args:
+        folder: of the run; None for one in memory, of which nothing is saved.
         save_seconds: between saving what is known.
 
     Returns:
@@ -35,19 +36,19 @@ def spectrum_of(
     """
     clock = prepared.clock
     system = double_twin(prepared)
-    path = folder.segments / "lyapunov.h5"
+    path = None if folder is None else folder.segments / "lyapunov.h5"
     saved = time.monotonic()
 
     def go_on(done: Convergence) -> bool:
         nonlocal saved
         stop = interruption.requested
-        if stop or time.monotonic() - saved >= save_seconds:
+        if path is not None and (stop or time.monotonic() - saved >= save_seconds):
             _save(path, done, run_id)
             saved = time.monotonic()
         return not stop
 
     start, end = float(clock.start), float(clock.at(clock.count - 1))
-    return lyapunov_spectrum(system, start, end, go_on, _saved(path, run_id))
+    return lyapunov_spectrum(system, start, end, go_on, None if path is None else _saved(path, run_id))
 
 
 def _save(path: Path, done: Convergence, run_id: str) -> None:
@@ -58,7 +59,7 @@ def _save(path: Path, done: Convergence, run_id: str) -> None:
     except OSError as error:
         raise StoppedWritingError(
             f"{path}: can't be written: {error.strerror or error}; all samples are saved as segments, and "
-            f"{once_mended(error)}, rigidsim resume continues with the exponents"
+            f"{once_mended(error)}, {RESUME} continues with the exponents"
         ) from None
 
 

@@ -20,6 +20,7 @@ from rigidsim.solve.projection import put_back_by_invariant
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.trail import Trail
+from rigidsim.store.memory import MemoryWriter
 from rigidsim.store.segments import SegmentWriter
 
 Arrays = dict[str, np.ndarray]
@@ -40,7 +41,7 @@ class Recorder(SampleReceiver):
         self,
         prepared: InitialValueProblem,
         evaluator: Evaluator,
-        writer: SegmentWriter,
+        writer: SegmentWriter | MemoryWriter,
         log: EventLog,
         effort: Effort,
     ) -> None:

@@ -6,7 +6,7 @@ import secrets
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from rigidsim.session.attributes import root_attributes
+from rigidsim.session.attributes import of_complete, root_attributes
 from rigidsim.session.completion import Completion
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.event_variables import event_counts, event_times, event_variables
@@ -22,7 +22,8 @@ from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.status import Status
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.run import Run
+from rigidsim.store.memory import MemoryRun, MemoryWriter
+from rigidsim.store.run import Run, SavedRun
 from rigidsim.store.segments import Chain, SegmentWriter
 from rigidsim.store.summary import Caution
 
@@ -51,10 +52,13 @@ class Session:
             self.observer, effort=self.effort, phases=self.phases.begin_again(), tuning=self.tuning
         )
 
-    def execute(self, prepared: InitialValueProblem, folder: RunFolder, chain: Chain | None = None) -> Run:
+    def execute(
+        self, prepared: InitialValueProblem, folder: RunFolder | None, chain: Chain | None = None
+    ) -> Run:
         """Integrate to the end, or to whatever ends it, and complete the files.
 
         Args:
+            folder: of the run; None for a run in memory.
             chain: segments to resume from, with the arrays of the last one's checkpoint.
 
         Raises:
@@ -68,11 +72,13 @@ class Session:
         attributes = root_attributes(prepared, stepper, run_id, self.mixed)
         limits = self.tuning.segments
         variables = dataset_variables(prepared)
-        writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
+        writer: SegmentWriter | MemoryWriter = MemoryWriter()
+        if folder is not None:
+            writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
         recorder = Recorder(prepared, evaluator, writer, log, self.effort)
         interruption = Interruption()
         clock.next("build")
-        self.observer.started(prepared, folder.path)
+        self.observer.started(prepared, None if folder is None else folder.path)
         self.observer.phase("integrate")
         start = None if resumed is None else resumed.position
         guards = Guards(prepared, recorder.statistics, interruption, self.observer)
@@ -124,12 +130,17 @@ class Session:
             event_times=event_times(prepared, log, last),
             chart_changes=chart_changes(prepared, corrected),
         )
+        extras = event_variables(prepared, log, evaluator, last) + lyapunov_variables(spectrum)
+        if isinstance(writer, MemoryWriter):
+            wrapped_from = recorder.statistics.angles_wrapped_from
+            ended = of_complete(attributes, summary, self.effort, wrapped_from)
+            return MemoryRun(summary, variables, writer.blocks, extras, ended.as_dict())
+        assert folder is not None
         if progress.status.final:
-            extras = event_variables(prepared, log, evaluator, last) + lyapunov_variables(spectrum)
             summary = Completion(
                 prepared, folder, writer, recorder, loop, attributes, extras, clock, self.effort,
                 self.observer, summary,
             ).complete()  # fmt: skip
         summary = summary.having(cost=cost_so_far(prepared, progress, clock, self.effort))
         folder.write_summary(summary)
-        return Run(folder, summary)
+        return SavedRun(folder, summary)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,8 +45,8 @@ class Storage:
         return (
             f"takes about {_size(self.needed)} of space until it is complete ({_size(self.segments)} of "
             f"segments, {_size(self.dataset)} of dataset.h5), and {_size(self.free)} are free there; take "
-            "fewer [time] samples, record less ([output] record), choose another --out, or, where a part of "
-            'it will do, say in [limits] when it may stop, such as wall_time = "1 h"'
+            "fewer [time] samples, record less ([output] record), choose a folder on another disk, or, where "
+            'a part of it will do, say in [limits] when it may stop, such as wall_time = "1 h"'
         )
 
 
@@ -81,6 +82,22 @@ def refuse_too_large(prepared: InitialValueProblem, place: Path) -> None:
     problem = storage(prepared, place).problem
     if problem is not None:
         raise RunFolderError(f"{place}: the run {problem}")
+
+
+def refuse_too_large_for_memory(prepared: InitialValueProblem) -> None:
+    """Before a run in memory takes all there is.
+
+    Raises:
+        RunFolderError: what it is predicted to take doesn't fit.
+    """
+    row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
+    needed = 2 * row * prepared.clock.count  # the blocks, and the dataset made of them
+    there = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    if needed > there:
+        raise RunFolderError(
+            f"{prepared.scene.name}: takes about {_size(needed)} of memory, and the machine has "
+            f"{_size(there)}; give a folder as out, take fewer samples, or record less ([output] record)"
+        )
 
 
 def _size(count: float) -> str:

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
+from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
 
@@ -90,12 +90,12 @@ class RunFolder:
         ours = files + folders
         try:
             if self.path.exists() and not self.path.is_dir():
-                raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
+                raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
             present = list(self.path.iterdir()) if self.path.exists() else []
             foreign = [p.name for p in present if p not in ours and not p.name.startswith(".")]
             if foreign:
                 raise RunFolderError(
-                    f"{self.path}: holds {foreign[0]}, which no run writes; choose another --out or name"
+                    f"{self.path}: holds {foreign[0]}, which no run writes; choose another {OUT} or name"
                 )
             for path in present:
                 if path.is_symlink():
@@ -104,7 +104,7 @@ class RunFolder:
             if held and not force:
                 what = "a finished run" if self.dataset.exists() else "an unfinished run"
                 raise RunFolderError(
-                    f"{self.path}: holds {what}; --force replaces it, --out DIR puts this one elsewhere"
+                    f"{self.path}: holds {what}; {FORCE} replaces it, another {OUT} puts this one elsewhere"
                 )
             self.remove_torn()
             for path in files:  # the segments last: as long as they are there, the run isn't finished
@@ -125,7 +125,7 @@ class RunFolder:
         """
         try:
             if self.path.exists() and not self.path.is_dir():
-                raise RunFolderError(f"{self.path}: is no folder; choose another --out or name")
+                raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
             self.path.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(self.path, os.O_RDONLY)  # the folder itself: no file is left behind
         except OSError as error:
@@ -135,7 +135,7 @@ class RunFolder:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise RunFolderError(
-                    f"{self.path}: another process is at work there; wait for it, or choose another --out or "
+                    f"{self.path}: another process is at work there; wait for it, or choose another {OUT} or "
                     "name"
                 ) from None
             try:
@@ -143,15 +143,15 @@ class RunFolder:
             except OSError as error:
                 raise StoppedWritingError(
                     f"{self.path}: can't be read or written: {error.filename or 'a file'}: "
-                    f"{error.strerror or error}; what was saved stays, and {once_mended(error)}, rigidsim "
-                    "resume continues from there"
+                    f"{error.strerror or error}; what was saved stays, and {once_mended(error)}, {RESUME} "
+                    "continues from there"
                 ) from error
         finally:
             os.close(descriptor)
 
     def _unwritable(self, error: OSError) -> RunFolderError:
         return RunFolderError(
-            f"{self.path}: can't be written: {error.strerror or error}; choose another --out"
+            f"{self.path}: can't be written: {error.strerror or error}; choose another {OUT}"
         )
 
     @property

@@ -1,18 +1,20 @@
-"""Runs on disk, finished or partial, opened for reading."""
+"""Runs, and those on disk, finished or partial, opened for reading."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import html
+from abc import abstractmethod
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import FORCE, RESUME, RunFolderError
 from rigidsim.store import provenance, segments
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.joined_segments import join_segments
 from rigidsim.store.seal import check_whole, read_seal
-from rigidsim.store.summary import Brief
+from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.validated_open import open_dataset
 from rigidsim.store.variables import SCHEMA_VERSION
 
@@ -20,16 +22,13 @@ if TYPE_CHECKING:
     import xarray
 
 
-@dataclass(frozen=True)
 class Run:
-    """A run on disk, finished or partial.
+    """What a run came to, wherever its numbers are kept.
 
     Attributes:
-        folder: its files.
-        outcome: what ``summary.json`` says; a ``Summary`` where the run ended.
+        outcome: what its summary says; a ``Summary`` where the run ended.
     """
 
-    folder: RunFolder
     outcome: Brief
 
     @cached_property
@@ -41,6 +40,50 @@ class Run:
     def status(self) -> str:
         """How it ended; ``"finished"`` is the only complete one."""
         return self.outcome.status
+
+    @property
+    @abstractmethod
+    def place(self) -> str:
+        """Where it is kept, in words."""
+
+    @property
+    @abstractmethod
+    def dataset(self) -> xarray.Dataset:
+        """Its labelled numbers."""
+
+    @abstractmethod
+    def concluded(self, outcome: Brief) -> Self:
+        """The same run with what is known of it now, kept where the run is."""
+
+    def __repr__(self) -> str:
+        return f"<Run {self.outcome.name!r} ({self.place}): {self.status}>"
+
+    def _repr_html_(self) -> str:
+        title = f"{html.escape(self.outcome.name)}: {html.escape(self.status)}"
+        return f"<b>{title}</b> ({html.escape(self.place)}){_table(self.outcome)}"
+
+
+@dataclass(frozen=True, repr=False)
+class SavedRun(Run):
+    """A run on disk, finished or partial.
+
+    Attributes:
+        folder: its files.
+        outcome: what ``summary.json`` says; a ``Summary`` where the run ended.
+    """
+
+    folder: RunFolder
+    outcome: Brief
+
+    @property
+    def place(self) -> str:
+        """Its folder."""
+        return str(self.folder.path)
+
+    def concluded(self, outcome: Brief) -> Self:
+        """The same run with another summary, which is written."""
+        self.folder.write_summary(outcome)
+        return replace(self, outcome=outcome)
 
     @property
     def saved(self) -> bool:
@@ -68,10 +111,10 @@ class Run:
             return open_dataset(_whole(self.folder.dataset, claimed), indexed=indexed)
         chain = segments.read_chain(self.folder.segments)
         if chain.damage is not None:
-            raise RunFolderError(f"{chain.damage}; rigidsim resume sets it aside and resumes before it")
+            raise RunFolderError(f"{chain.damage}; {RESUME} sets it aside and resumes before it")
         if not chain.paths:
             lost = self.outcome.dataset_digest is not None
-            what = "its dataset.h5 is missing; run it again with --force" if lost else "nothing was saved"
+            what = f"its dataset.h5 is missing; run it again with {FORCE}" if lost else "nothing was saved"
             raise RunFolderError(f"{self.folder.path}: {what}")
         return join_segments(chain.paths, status=self.status, indexed=indexed)
 
@@ -106,11 +149,36 @@ def _whole(path: Path, expected: str | None) -> Path:
     return path
 
 
-def open_run(path: str | Path) -> Run:
+def open_run(path: str | Path) -> SavedRun:
     """Open a run folder, or the dataset in one, finished or partial.
 
     Raises:
         RunFolderError: no run there, or a damaged summary.
     """
     folder = find_run(path)
-    return Run(folder, folder.read_summary())
+    return SavedRun(folder, folder.read_summary())
+
+
+def _table(outcome: Brief) -> str:
+    """Warnings, the attitude's error and the invariants of a summary, for a notebook."""
+    if not isinstance(outcome, Summary):
+        return f"<p>{html.escape(outcome.message)}</p>"
+    lines = [f"warning: {html.escape(text)}" for text in outcome.warnings]
+    accuracy = outcome.accuracy
+    error, how = accuracy.estimated_attitude_error, "estimated"
+    if accuracy.certified is not None:
+        error, how = accuracy.certified, "certified"
+    if error is not None:
+        lines.append(f"attitude at the end: {how} error {error:.2g} rad")
+    lines.append(f"{outcome.cost.steps} steps, {outcome.samples} samples, {outcome.precision} precision")
+    rows = "".join(
+        f"<tr><td>{html.escape(name)}</td><td>{_short(kept.largest_drift)}</td>"
+        f"<td>{_short(kept.final_drift)}</td><td>{_short(kept.bound)}</td></tr>"
+        for name, kept in outcome.invariants.items()
+    )
+    heads = "".join(f"<th>{text}</th>" for text in ("invariant", "largest drift", "final", "bound"))
+    return f"<p>{'<br>'.join(lines)}</p><table><tr>{heads}</tr>{rows}</table>"
+
+
+def _short(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}"

@@ -19,7 +19,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rigidsim.errors import RunFolderError, StoppedWritingError, once_mended
+from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.store import atomic, netcdf
 from rigidsim.store.hdf5_sink import sink
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
@@ -156,11 +156,11 @@ class SegmentWriter:
             raise StoppedWritingError(
                 f"{self._folder.parent}: can't be written: {error.strerror or error}; "
                 f"{self.saved_rows} samples are saved in {self._folder.name}/; "
-                f"{once_mended(error)}, rigidsim resume continues from there"
+                f"{once_mended(error)}, {RESUME} continues from there"
             ) from error
 
     def _collected(self) -> netcdf.Block:
-        return _Joined(self._blocks, self._variables)
+        return JoinedBlocks(self._blocks, self._variables)
 
     def complete(
         self,
@@ -208,7 +208,7 @@ class SegmentWriter:
         return rows
 
 
-class _Joined(Mapping[str, Sequence[np.ndarray]]):
+class JoinedBlocks(Mapping[str, Sequence[np.ndarray]]):
     """Blocks one after the other; only the variable that is asked for is in memory twice."""
 
     def __init__(self, blocks: Sequence[netcdf.Block], variables: Sequence[Variable]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from rigidsim.accuracy.certificate import certify, verdict
 from rigidsim.accuracy.choice import Choice, wanted
@@ -13,14 +13,16 @@ from rigidsim.solve.status import Status
 from rigidsim.store.run import Run
 from rigidsim.store.summary import Caution, Summary, WarningCode
 
+AnyRun = TypeVar("AnyRun", bound=Run)
+
 
 def certified(
-    result: Run,
+    result: AnyRun,
     experiment: Experiment,
     choice: Choice | None,
     session: Session,
     loads: Sequence[Any] = (),
-) -> tuple[Run, bool]:
+) -> tuple[AnyRun, bool]:
     """A finished run's certificate, put into its summary, where ``accuracy`` asks for one.
 
     Args:
@@ -70,5 +72,4 @@ def certified(
         wall_seconds=effort.wall,
     )
     summary = summary.warned(cautions).having(accuracy=summary.accuracy.having(**known), cost=cost)
-    result.folder.write_summary(summary)
-    return Run(result.folder, summary), doubt is None
+    return result.concluded(summary), doubt is None

@@ -16,11 +16,11 @@ from rigidsim.store import atomic
 if TYPE_CHECKING:
     import xarray
 
-    from rigidsim.store.run import Run
+    from rigidsim.store.run import SavedRun
 
 
 def export(
-    run: Run,
+    run: SavedRun,
     file_format: str,
     out: str | Path | None = None,
     *,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from rigidsim.accuracy.choice import chosen
 from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
-from rigidsim.scene.config import Experiment
 from rigidsim.session.storage import storage
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.session.variables import dataset_variables
@@ -24,6 +23,7 @@ from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
+from rigidsim.workflows.read import Given, as_experiment
 
 _PILOT_SECONDS = 0.5
 _LARGEST_CHUNK = 1024  # of steps: calls cost next to nothing
@@ -34,8 +34,9 @@ _EVALUATED = {True: 4096, False: 16}  # samples, in precisions with cheap arithm
 
 
 def plan(
-    experiment: Experiment,
+    experiment: Given,
     *,
+    changes: Mapping[str, Any] | None = None,
     loads: Sequence[Load] = (),
     out: str | Path = "runs",
     pilot_seconds: float = _PILOT_SECONDS,
@@ -43,7 +44,7 @@ def plan(
     """Explain and predict a run; integrates for about half a second and writes nothing.
 
     Args:
-        loads: loads of one's own, as of ``rigidsim.run``.
+        experiment, changes, loads: as of ``rigidsim.run``.
         out: folder of the run folders, on whose disk there is room or not.
         pilot_seconds: CPU seconds to integrate, at most; some thousands of steps tell the mean.
 
@@ -53,7 +54,7 @@ def plan(
     Raises:
         ConfigError: the config can't be run.
     """
-    experiment, choice = chosen(experiment, loads=loads)
+    experiment, choice = chosen(as_experiment(experiment, changes), loads=loads)
     prepared = prepare(experiment, loads=loads)
     closed, why_not = closed_form_if_any(prepared.scene, driven=bool(loads))
     started = time.perf_counter()

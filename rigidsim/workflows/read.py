@@ -2,9 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 import rigidsim.model.loads
 import rigidsim.model.partial_invariants  # noqa: F401  (both enter what they define into rigidsim.scene.registry)
 from rigidsim.scene.config import Experiment, load, parse
 from rigidsim.scene.schema import config_model
 
-__all__ = ["Experiment", "config_model", "load", "parse"]
+__all__ = ["Experiment", "Given", "as_experiment", "config_model", "load", "parse"]
+
+Given = Experiment | str | Path | Mapping[str, Any]
+"""An experiment, the path of its config, or its tables as a dictionary."""
+
+
+def as_experiment(given: Given, changes: Mapping[str, Any] | None = None) -> Experiment:
+    """What is given as an experiment, with some values replaced.
+
+    Raises:
+        ConfigError: with every problem found.
+    """
+    if isinstance(given, Mapping):
+        given = Experiment.from_dict(given)
+    if not isinstance(given, Experiment):
+        return load(given, overrides=changes or {})
+    return given.replace(changes) if changes else given

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.errors import RunFolderError
-from rigidsim.scene.config import Experiment, has_earlier_settings, parse, parse_earlier
+from rigidsim.errors import FORCE, RunFolderError, either
+from rigidsim.scene.config import Experiment, Overrides, has_earlier_settings, parse, parse_earlier
 from rigidsim.scene.overrides import assignments
+from rigidsim.scene.python_values import assignments_of
 from rigidsim.session.attributes import root_attributes as attributes_now
 from rigidsim.session.completion import with_timeline
 from rigidsim.session.guards import Observer
@@ -23,7 +25,7 @@ from rigidsim.solve.steppers import stepper_of
 from rigidsim.store import atomic, netcdf
 from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
-from rigidsim.store.run import Run, open_run
+from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain, root_attributes
 from rigidsim.store.summary import Caution, Summary, WarningCode
@@ -35,23 +37,26 @@ if TYPE_CHECKING:
     from rigidsim.model.load import Load
 
 _ROWS_AT_ONCE = 65536
+_UNTIL = either("--until", "until")
+_SET = either("--set", "overrides")
 
 
 def resume(
     path: str | Path,
     *,
-    until: str | None = None,
-    overrides: Sequence[str] = (),
+    until: str | float | Decimal | None = None,
+    overrides: Overrides = (),
     observer: Observer | None = None,
     loads: Sequence[Load] = (),
     tuning: Tuning | None = None,
-) -> Run:
+) -> SavedRun:
     """Resume a run from its last checkpoint.
 
     Args:
         path: run folder.
         until: a later end, as in ``[time] end``; a finished run is prolonged to it.
-        overrides: ``limits.KEY=VALUE``: guards of this session in place of the config's.
+        overrides: ``limits.KEY=VALUE`` texts, or ``{"limits.KEY": value}``: guards of this session in place
+            of the config's.
         observer: is told how it goes.
         loads: those that the run was begun with.
         tuning: as of ``rigidsim.run``.
@@ -65,6 +70,9 @@ def resume(
             changed.
         ConfigError: a bad ``until`` or override.
     """
+    if isinstance(overrides, Mapping):
+        overrides = assignments_of(overrides)
+    until = until if until is None else str(until)
     folder = find_run(path)
     session = Session(observer or Observer(), tuning=tuning or Tuning())
     with folder.locked():
@@ -82,7 +90,7 @@ def resume(
         folder.refuse_read_only()
         lost = not folder.dataset.exists() and not folder.segments.exists()
         if lost and folder.read_summary().dataset_digest is not None:
-            raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with --force")
+            raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with {FORCE}")
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
         if chain.paths:
             experiment = _continued(experiment, chain.paths[-1])
@@ -100,10 +108,11 @@ def resume(
             text = "nothing had been saved, so the run began anew"
             session.remarks.append(Caution(WarningCode.BEGUN_ANEW, text))
         run = session.execute(prepared, folder, chain if chain.paths else None)
+        assert isinstance(run, SavedRun)
         return certified(run, prepared.experiment, None, session, loads)[0]
 
 
-def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads: Sequence[Load]) -> Run:
+def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads: Sequence[Load]) -> SavedRun:
     """A run whose dataset is complete; what a Ctrl-C left out after that is made up for.
 
     Raises:
@@ -121,7 +130,7 @@ def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads
             exit_code=Status(found.status).exit_code,
         )
         folder.write_summary(summary)
-        return certified(Run(folder, summary), experiment, None, session, loads)[0]
+        return certified(SavedRun(folder, summary), experiment, None, session, loads)[0]
     session.observer.nothing_left(done.outcome.message or done.status)
     return done
 
@@ -139,7 +148,7 @@ def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
     foreign = [o for o in overrides if not o.strip().startswith("limits.")]
     if foreign:
         raise RunFolderError(
-            f"--set {foreign[0]}: would change the experiment; only limits.KEY=VALUE is allowed here"
+            f"{_SET} {foreign[0]}: would change the experiment; only limits.KEY=VALUE is allowed here"
         )
     try:
         text = folder.config.read_text(encoding="utf-8")
@@ -155,7 +164,7 @@ def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
         raise RunFolderError(
             f"{folder.config}: ends with #:set comments, in which an earlier version kept what --set had "
             "replaced, and nothing was saved that says so; write the values into their tables, remove the "
-            "comments, and run it again with --force"
+            f"comments, and run it again with {FORCE}"
         )
     return (parse_earlier if earlier else parse)(text, source=str(folder.config))
 
@@ -174,19 +183,19 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
 
     before = build_scene(experiment).samples
     if before.times is not None:
-        raise RunFolderError("--until: this run has a list of sample times, which no later end prolongs")
+        raise RunFolderError(f"{_UNTIL}: this run has a list of sample times, which no later end prolongs")
     later = experiment.having([f"time.end={until}"])
     if later.config.time.every is None:
         intervals = (build_scene(later).samples.exact_last - before.begin) / before.step
         if intervals.denominator != 1:
             raise RunFolderError(
-                f"--until {until}: lies between two samples of the grid; give a whole number of intervals "
+                f"{_UNTIL} {until}: lies between two samples of the grid; give a whole number of intervals "
                 "of (end - start) / (samples - 1)"
             )
         later = experiment.having([f"time.end={until}", f"time.samples={intervals.numerator + 1}"])
     after = build_scene(later).samples
     if after.count <= before.count:
-        raise RunFolderError(f"--until {until}: no later than the run's end, or before its next sample")
+        raise RunFolderError(f"{_UNTIL} {until}: no later than the run's end, or before its next sample")
     return later
 
 
@@ -293,7 +302,7 @@ def _same_times(prepared: InitialValueProblem, chain: Chain) -> None:
                 times = np.asarray(saved[start : start + _ROWS_AT_ONCE])
                 if not np.array_equal(prepared.clock.labels(first, first + len(times)), times):
                     raise RunFolderError(
-                        "--until: the longer grid's first sample times differ from those saved by a "
+                        f"{_UNTIL}: the longer grid's first sample times differ from those saved by a "
                         "rounding; choose an end that is a multiple of the old one, or [time] every"
                     )
                 first += len(times)

@@ -2,41 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, overload
 
 from rigidsim.accuracy.choice import chosen, leaves_choice
 from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import ConfigError
 from rigidsim.session.guards import Observer
 from rigidsim.session.session import Session
-from rigidsim.session.storage import refuse_too_large
+from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.problem import prepare
+from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.run import Run
+from rigidsim.store.memory import MemoryRun
+from rigidsim.store.run import Run, SavedRun
 from rigidsim.workflows.certify import certified
-from rigidsim.workflows.read import Experiment, load
+from rigidsim.workflows.read import Given, as_experiment
 
 if TYPE_CHECKING:
     from rigidsim.model.load import Load
 
 
+@overload
 def run(
-    experiment: Experiment | str | Path,
+    experiment: Given,
     *,
-    out: str | Path = "runs",
+    changes: Mapping[str, Any] | None = ...,
+    out: str | Path = ...,
+    force: bool = ...,
+    observer: Observer | None = ...,
+    loads: Sequence[Load] = ...,
+    tuning: Tuning | None = ...,
+) -> SavedRun: ...
+
+
+@overload
+def run(
+    experiment: Given,
+    *,
+    changes: Mapping[str, Any] | None = ...,
+    out: None,
+    observer: Observer | None = ...,
+    loads: Sequence[Load] = ...,
+    tuning: Tuning | None = ...,
+) -> MemoryRun: ...
+
+
+def run(
+    experiment: Given,
+    *,
+    changes: Mapping[str, Any] | None = None,
+    out: str | Path | None = "runs",
     force: bool = False,
     observer: Observer | None = None,
     loads: Sequence[Load] = (),
     tuning: Tuning | None = None,
 ) -> Run:
-    """Run an experiment and save it in ``out/<name>/``.
+    """Run an experiment and save it in ``out/<name>/``, or keep it in memory.
 
     Args:
-        experiment: from ``load``, or the path of a config.
-        out: folder of the run folders.
+        experiment: from ``load`` or ``Experiment.from_dict``, the path of a config, or a dictionary.
+        changes: values to replace, ``{"time.end": 10}``, as of ``Experiment.replace``.
+        out: folder of the run folders; None: nothing is written, and the run's ``dataset`` is in memory.
         force: replace a run of the same name.
         observer: is told how it goes.
         loads: loads of one's own, beside those of the config, which alone can't reproduce the run then.
@@ -47,10 +76,10 @@ def run(
 
     Raises:
         ConfigError: the config can't be run; nothing was written.
-        RunFolderError: the run folder is in use or can't be written, or the run doesn't fit on its disk.
+        RunFolderError: the run folder is in use or can't be written, or the run doesn't fit on its disk or in
+            memory.
     """
-    if not isinstance(experiment, Experiment):
-        experiment = load(experiment)
+    experiment = as_experiment(experiment, changes)
     observer = observer or Observer()
     session = Session(observer, tuning=tuning or Tuning())
     beyond: Setting | None = None
@@ -67,13 +96,26 @@ def run(
         if choice is not None:
             session.phases.next("choose")
         prepared = prepare(setting, loads=loads)
-        folder = RunFolder(Path(out) / prepared.scene.name)
-        refuse_too_large(prepared, folder.path)
-        with folder.locked():
-            folder.begin(setting.text, force=force or beyond is not None)
+        with _place(prepared, out, setting.text, force=force or beyond is not None) as folder:
             result = session.execute(prepared, folder)
             result, kept = certified(result, setting, choice, session, loads)
         if kept or choice is None:
             return result
         beyond = choice.setting
         session = session.another()
+
+
+@contextmanager
+def _place(
+    prepared: InitialValueProblem, out: str | Path | None, config: str, *, force: bool
+) -> Iterator[RunFolder | None]:
+    """The run's folder, locked and begun; None in memory."""
+    if out is None:
+        refuse_too_large_for_memory(prepared)
+        yield None
+        return
+    folder = RunFolder(Path(out) / prepared.scene.name)
+    refuse_too_large(prepared, folder.path)
+    with folder.locked():
+        folder.begin(config, force=force)
+        yield folder

@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.config import Experiment, parse, parse_earlier
 from rigidsim.session.guards import Observer
 from rigidsim.store import netcdf, provenance
@@ -164,7 +164,7 @@ def _dataset(path: Path) -> tuple[Path, RunFolder | None]:
         return path, None
     folder = find_run(path)
     if not folder.dataset.exists():
-        raise RunFolderError(f"{path}: holds no finished dataset; rigidsim resume completes it")
+        raise RunFolderError(f"{path}: holds no finished dataset; {RESUME} completes it")
     alone = path.is_file() and not folder.config.exists()
     return folder.dataset, None if alone else folder
 
@@ -176,7 +176,7 @@ def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
         if read_seal(dataset) is not None or root_attributes(dataset).get("schema_version", 1) > 1:
             check_seal(dataset)
     except RunFolderError as error:
-        problems.append(str(error))
+        problems.append(error.for_command_line())
     if folder is None:
         return problems
     opened: Run = open_run(folder.path)

@@ -117,7 +117,7 @@ def test_a_damaged_segment(kind: str, originals: dict[str, rigidsim.Run], tmp_pa
     good = NUMBER + 1 if kind == "edited" else NUMBER
     assert f"{good:08d}.h5" in chain.damage
     assert chain.paths == before[:good]
-    with pytest.raises(RunFolderError, match="rigidsim resume sets it aside"):
+    with pytest.raises(RunFolderError, match=r"rigidsim\.resume\(\.\.\.\) sets it aside"):
         _ = rigidsim.open_run(folder).dataset
 
     if kind == "edited":  # what follows is made again; what was forged well enough only verify finds
@@ -162,7 +162,7 @@ def test_a_damaged_file_is_not_prolonged(
 def test_a_lost_dataset_is_said(originals: dict[str, rigidsim.Run], tmp_path: Path) -> None:
     folder = shutil.copytree(originals["whole"].folder.path, tmp_path / "d")
     (folder / "dataset.h5").unlink()
-    with pytest.raises(RunFolderError, match=r"its dataset\.h5 is missing; run it again with --force"):
+    with pytest.raises(RunFolderError, match=r"its dataset\.h5 is missing; run it again with force=True"):
         _ = rigidsim.open_run(folder).dataset
-    with pytest.raises(RunFolderError, match=r"its dataset\.h5 is missing; run it again with --force"):
+    with pytest.raises(RunFolderError, match=r"its dataset\.h5 is missing; run it again with force=True"):
         rigidsim.resume(folder)

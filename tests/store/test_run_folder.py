@@ -48,8 +48,8 @@ def test_a_finished_run_is_not_overwritten(finished: rigidsim.Run, free_body: Ca
     text = str(caught.value)
     assert str(folder) in text
     assert "holds a finished run" in text
-    assert "--force replaces it" in text
-    assert "--out DIR" in text
+    assert "force=True replaces it" in text
+    assert "another out puts" in text
     assert {p.name: (p.read_bytes(), p.stat().st_mtime_ns) for p in folder.iterdir()} == before
 
 
@@ -79,7 +79,7 @@ def test_an_unfinished_run_is_not_overwritten(tmp_path: Path, free_body: Callabl
     stopped = partial(tmp_path, free_body)
     assert stopped.status == "stopped: max_steps"
     assert stopped.folder.segments.is_dir()
-    with pytest.raises(RunFolderError, match="holds an unfinished run; --force replaces it"):
+    with pytest.raises(RunFolderError, match="holds an unfinished run; force=True replaces it"):
         rigidsim.run(rigidsim.parse(free_body()), out=tmp_path)
     again = rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, force=True)
     assert again.status == "finished"
@@ -91,7 +91,7 @@ def test_foreign_files_are_left_alone(force: bool, tmp_path: Path, free_body: Ca
     (tmp_path / "free").mkdir()
     thesis = tmp_path / "free" / "thesis.tex"
     thesis.write_text("years of work")
-    with pytest.raises(RunFolderError, match=r"holds thesis\.tex, which no run writes; choose another --out"):
+    with pytest.raises(RunFolderError, match=r"holds thesis\.tex, which no run writes; choose another out"):
         rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, force=force)
     assert [p.name for p in (tmp_path / "free").iterdir()] == ["thesis.tex"]
     assert thesis.read_text() == "years of work"
@@ -106,7 +106,7 @@ def test_hidden_files_are_no_obstacle(tmp_path: Path, free_body: Callable[..., s
 
 def test_a_file_in_the_place_of_the_folder(tmp_path: Path, free_body: Callable[..., str]) -> None:
     (tmp_path / "free").write_text("a file")
-    with pytest.raises(RunFolderError, match="is no folder; choose another --out or name"):
+    with pytest.raises(RunFolderError, match="is no folder; choose another out or name"):
         rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, force=True)
     assert (tmp_path / "free").read_text() == "a file"
 
@@ -116,7 +116,7 @@ def test_a_place_that_cannot_be_written(where: str, tmp_path: Path, free_body: C
     """/proc refuses even root."""
     out = Path("/proc/rigidsim-test") if where == "/proc" else tmp_path / "file" / "runs"
     (tmp_path / "file").touch()
-    with pytest.raises(RunFolderError, match=r"can't be written: .+; choose another --out"):
+    with pytest.raises(RunFolderError, match=r"can't be written: .+; choose another out"):
         rigidsim.run(rigidsim.parse(free_body()), out=out)
 
 

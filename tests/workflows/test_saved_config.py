@@ -119,7 +119,7 @@ def test_a_changed_comment_of_the_first_version_is_refused(earlier: rigidsim.Run
 def test_without_anything_saved_no_comment_is_believed(earlier: rigidsim.Run) -> None:
     for path in earlier.folder.segments.iterdir():
         path.unlink()
-    with pytest.raises(RunFolderError, match=r"config\.toml: ends with #:set comments, .* --force"):
+    with pytest.raises(RunFolderError, match=r"config\.toml: ends with #:set comments, .* force=True"):
         rigidsim.resume(earlier.folder.path)
 
 

@@ -1,0 +1,159 @@
+"""Python values as TOML text: what a config says where it is written in code instead of a file."""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.exact import fraction_of
+from rigidsim.scene.validation_messages import shown
+
+_DEEPEST = 50
+_ALLOWED = (
+    "numbers (int, float, Decimal, Fraction, mpf, numpy's), strings, booleans, lists, arrays and "
+    "dictionaries are allowed"
+)
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """A config of nested dictionaries as the text of a TOML file.
+
+    Args:
+        tables: as a TOML file has them. Floats, numpy's too, count as the shortest decimal that denotes them,
+            which is how they print: ``0.1`` is one tenth. Decimals, fractions and mpmath's numbers count
+            exactly. A value that is None counts as not given.
+
+    Raises:
+        ConfigError: something that a config can't hold.
+    """
+    import tomlkit
+
+    document = tomlkit.document()
+    for key, value in tables.items():
+        if value is not None:
+            document[_key(key)] = _item(value, str(key))
+    return document.as_string()
+
+
+def assignments_of(changes: Mapping[str, Any]) -> list[str]:
+    """``KEY=VALUE`` texts of values to replace.
+
+    Args:
+        changes: dotted keys with optional [index] to values as of ``toml_text``; a dictionary as a value
+            changes those keys in its table that it has.
+
+    Raises:
+        ConfigError: something that a config can't hold, or None.
+    """
+    found = []
+    for key, value in changes.items():
+        if isinstance(value, Mapping):
+            found += assignments_of({f"{key}.{_key(inner)}": given for inner, given in value.items()})
+        else:
+            found.append(f"{_key(key)}={_inline(value, str(key))}")
+    return found
+
+
+def _item(value: Any, where: str) -> Any:
+    """A tomlkit item: tables and lists of tables in blocks, everything else on its line."""
+    import tomlkit
+
+    if isinstance(value, Mapping):
+        table = tomlkit.table()
+        for key, inner in value.items():
+            if inner is not None:
+                table[_key(key)] = tomlkit.value(_inline(inner, f"{where}.{key}"))
+        return table
+    plain = _plain(value)
+    if isinstance(plain, list) and plain and all(isinstance(entry, Mapping) for entry in plain):
+        tables = tomlkit.aot()
+        for number, entry in enumerate(plain):
+            tables.append(_item(entry, f"{where}[{number}]"))
+        return tables
+    return tomlkit.value(_inline(value, where))
+
+
+def _inline(value: Any, where: str, depth: int = 0) -> str:
+    """One value on one line."""
+    plain = _plain(value)
+    if depth > _DEEPEST:
+        raise ConfigError(Problem(where, "nested too deeply"))
+    if isinstance(plain, str):
+        return _quoted(plain)
+    if isinstance(plain, bool):
+        return "true" if plain else "false"
+    if isinstance(plain, int):
+        return str(plain)
+    if isinstance(plain, Decimal):
+        return _number(plain, where)
+    if isinstance(plain, Mapping):
+        inner = (f"{_quoted(_key(k))} = {_inline(v, f'{where}.{k}', depth + 1)}" for k, v in plain.items())
+        return "{" + ", ".join(inner) + "}"
+    if isinstance(plain, list):
+        entries = (_inline(entry, f"{where}[{n}]", depth + 1) for n, entry in enumerate(plain))
+        return "[" + ", ".join(entries) + "]"
+    raise ConfigError(Problem(where, f"given {shown(value)} of type {type(value).__name__}; {_ALLOWED}"))
+
+
+def _plain(value: Any) -> Any:
+    """A value of Python's own, or one of its kin, as bool, int, Decimal, str, list or mapping."""
+    if isinstance(value, bool | str | int | Decimal | Mapping):
+        return value
+    kind = value.dtype.kind if hasattr(value, "dtype") else ""
+    if kind and value.shape:  # an array; its elements keep their kind
+        return list(value)
+    if kind == "b":
+        return bool(value)
+    if isinstance(value, Fraction):
+        return f"{value.numerator}/{value.denominator}" if value.denominator != 1 else value.numerator
+    if hasattr(value, "_mpf_"):
+        return _terminating(fraction_of(value)) if _is_finite(value) else value
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real) or kind == "f":
+        return Decimal(_shortest(value))
+    if hasattr(value, "magnitude") and hasattr(value, "units"):  # a quantity of pint
+        return f"{_shortest(value.magnitude)} {value.units:~C}"
+    if isinstance(value, Sequence):
+        return list(value)
+    return value
+
+
+def _is_finite(value: Any) -> bool:
+    _, mantissa, exponent, _ = value._mpf_
+    return bool(mantissa) or not exponent
+
+
+def _shortest(value: Any) -> str:
+    """The shortest decimal that denotes a number, without what numpy prints around it."""
+    text = str(value)
+    return text[text.find("(") + 1 : text.find(")")].strip("'") if "(" in text else text
+
+
+def _terminating(value: Fraction) -> Decimal:
+    """A fraction of a power of two, exactly."""
+    power = value.denominator.bit_length() - 1
+    return Decimal(f"{value.numerator * 5**power}e{-power}")
+
+
+def _number(value: Decimal, where: str) -> str:
+    if not value.is_finite():
+        raise ConfigError(Problem(where, f"given {value}; finite numbers are allowed"))
+    text = str(value).lower().replace("e+", "e")
+    return text if "." in text or "e" in text else f"{text}.0"
+
+
+def _quoted(text: str) -> str:
+    import tomlkit
+
+    return tomlkit.string(text).as_string()
+
+
+def _key(key: Any) -> str:
+    if not isinstance(key, str) or not key:
+        raise ConfigError(Problem("config", f'given the key {shown(key)}; a key is a text, such as "end"'))
+    return key

@@ -1,0 +1,152 @@
+"""rigidsim from Python: experiments from values, runs in memory, what is shown, and how errors speak."""
+
+from __future__ import annotations
+
+import html
+import re
+import subprocess
+import sys
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rigidsim
+from rigidsim.errors import FORCE, RigidsimError
+from rigidsim.scene.config import Experiment
+
+TOP: dict[str, Any] = {
+    "name": "top",
+    "body": {"principal_moments": [1, 2, 2.5]},
+    "initial": {"angular_velocity": [0.1, 1, 0.05]},
+    "time": {"end": 4, "samples": 41},
+}
+EVENT = {"name": "half_turn", "expression": "wy", "direction": "any"}
+ROOT = Path(__file__).parents[2]
+THEIRS = ("run_id", "started_at", "finished_at", "wall_seconds", "cpu_seconds")
+
+
+def _numbers(experiment: Experiment) -> list[Any]:
+    rates = experiment.config.initial.angular_velocity
+    assert rates is not None
+    return [rate.rational for rate in rates]
+
+
+def test_values_count_as_they_are_written() -> None:
+    rates = [0.1, np.float32(0.3), Fraction(1, 3)]
+    experiment = Experiment.from_dict({**TOP, "initial": {"angular_velocity": rates}})
+    assert _numbers(experiment) == [Fraction(1, 10), Fraction(3, 10), Fraction(1, 3)]
+    binary = [mpmath.mpf(0.1), np.longdouble("0.1"), Decimal("1e-30")]
+    experiment = Experiment.from_dict(
+        {**TOP, "initial": {"angular_velocity": np.array(binary, dtype=object)}}
+    )
+    assert _numbers(experiment) == [Fraction(0.1), Fraction(1, 10), Fraction(1, 10**30)]
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=3))
+def test_any_double_survives_the_way_through_the_text(rates: list[float]) -> None:
+    experiment = rigidsim.parse(Experiment.from_dict({**TOP, "initial": {"angular_velocity": rates}}).text)
+    assert [float(rate) for rate in _numbers(experiment)] == rates
+
+
+def test_tables_and_experiment_are_the_same_thing() -> None:
+    loads = [{"kind": "torque", "components": ["0", "0", 'k*sin(t) # "']}]
+    given_tables = {**TOP, "parameters": {"k": "1/7"}, "loads": loads[:0], "events": [EVENT], "frame": None}
+    experiment = Experiment.from_dict(given_tables)
+    assert Experiment.from_dict(experiment.to_dict()).config == experiment.config
+    assert experiment.to_dict()["body"]["principal_moments"][2] == Decimal("2.5")
+    with pytest.raises(rigidsim.ConfigError, match=r"body.mass: given <object .* numbers"):
+        Experiment.from_dict({**TOP, "body": {"principal_moments": [1, 2, 2], "mass": object()}})
+    with pytest.raises(rigidsim.ConfigError, match="finite numbers are allowed"):
+        Experiment.from_dict({**TOP, "time": {"end": float("inf")}})
+
+
+def test_replaced_values_keep_the_rest() -> None:
+    experiment = rigidsim.parse(Experiment.from_dict(TOP).text + "# a remark\n")
+    other = experiment.replace({"initial.angular_velocity[0]": 0.3}, time={"end": "1 min"}, name="other")
+    assert _numbers(other) == [Fraction(3, 10), 1, Fraction(1, 20)]
+    assert float(other.config.time.end or 0) == 60
+    assert other.config.time.samples == 41
+    assert "# a remark" in other.text
+    assert other.given == experiment.text
+    assert other.settings == ("initial.angular_velocity[0]=0.3", 'time.end="1 min"', 'name="other"')
+    assert experiment.config.name == "top"
+
+
+def test_a_run_in_memory_is_the_saved_one(tmp_path: Path) -> None:
+    tables = {
+        **TOP,
+        "events": [EVENT],
+        "integrator": {"precision": "extended"},
+        "output": {"timeline": False},
+    }
+    saved = rigidsim.run(tables, out=tmp_path)
+    kept = rigidsim.run(Experiment.from_dict(tables), out=None)
+    assert kept.status == saved.status == "finished"
+    there, here = saved.dataset.load(), kept.dataset
+    for dataset in (there, here):
+        dataset.attrs = {key: value for key, value in dataset.attrs.items() if key not in THEIRS}
+    assert here.identical(there)
+    for run in (saved.summary, kept.summary):
+        for name in ("cost", "dataset_sha256", "provenance"):
+            run.pop(name, None)
+    assert kept.summary == saved.summary
+    assert [path.name for path in tmp_path.iterdir()] == ["top"]
+
+
+def test_a_run_in_memory_stops_as_any_other() -> None:
+    run = rigidsim.run(TOP, changes={"limits.max_steps": 5, "time.end": 400}, out=None)
+    assert run.status == "stopped: max_steps"
+    assert 0 < run.dataset.sizes["time"] < 41
+    with pytest.raises(rigidsim.RunFolderError, match="of memory, and the machine has"):
+        rigidsim.run(TOP, changes={"time.samples": 10**12}, out=None)
+
+
+def test_what_a_notebook_shows() -> None:
+    run = rigidsim.run({**TOP, "name": "a", "description": "<b>"}, out=None)
+    assert repr(run) == "<Run 'a' (memory): finished>"
+    shown = run._repr_html_()
+    assert "angular_momentum" in shown
+    assert "estimated error" in shown
+    experiment = Experiment.from_dict({**TOP, "description": "<b>"})
+    assert repr(experiment) == "<Experiment 'top' (config): no load, to t = 4 s, double>"
+    assert html.escape("<b>") in experiment._repr_html_()
+    assert '<b>"' not in experiment._repr_html_()
+
+
+def test_errors_speak_the_language_of_who_reads_them(tmp_path: Path) -> None:
+    changes = {"output.timeline": False}
+    rigidsim.run(TOP, changes=changes, out=tmp_path)
+    with pytest.raises(rigidsim.RunFolderError) as caught:
+        rigidsim.run(TOP, changes=changes, out=tmp_path)
+    assert "force=True replaces it, another out puts this one elsewhere" in str(caught.value)
+    assert "--force replaces it, another --out" in caught.value.for_command_line()
+    with pytest.raises(rigidsim.ConfigError, match=r"replacing time\.end\.x=1: there is nothing at"):
+        rigidsim.load(ROOT / "configs" / "intermediate_axis.toml", overrides={"time.end.x": 1})
+    assert str(RigidsimError(f"give {FORCE}")) == "give force=True"
+
+
+def test_the_package_tells_what_it_has() -> None:
+    assert set(rigidsim.__all__) <= set(dir(rigidsim))
+    assert (Path(rigidsim.__file__).parent / "py.typed").exists()
+    code = "import rigidsim, sys; dir(rigidsim); print({'heyoka', 'xarray', 'rerun'} & set(sys.modules))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "set()"
+
+
+def test_the_readmes_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(ROOT)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    found = re.search(r"<!-- test: from Python -->\n```python\n(.*?)```", text, re.S)
+    assert found is not None
+    exec(compile(found[1], "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "<Run 'intermediate_axis' (memory): finished>" in printed
+    assert "<Run 'spinning_top' (memory): finished>" in printed
