@@ -72,6 +72,13 @@ class ExactNumber:
         return (self.rational > 0) - (self.rational < 0)
 
 
+@dataclass(frozen=True)
+class Quantity(ExactNumber):
+    """A number, in SI, with the unit that was written behind it."""
+
+    unit: str = ""
+
+
 ZERO = ExactNumber(Fraction(0))
 
 
@@ -158,6 +165,35 @@ def _from_text(text: str, unit: str) -> ExactNumber:
     except units.UnitError as error:
         raise ValueError(f"given {shown(text)}: {error}; write for instance {example(unit)}") from None
     return ExactNumber(rational * factor, pi_power + turns)
+
+
+def parse_quantity(value: Any) -> ExactNumber:
+    """A TOML value as a number in SI: a ``Quantity`` where it has a unit, whatever that is.
+
+    Raises:
+        ValueError: see ``parse_number``.
+    """
+    short = isinstance(value, str) and len(value) <= _LONGEST_TEXT
+    match = _NUMBER_AND_UNIT.fullmatch(value) if short else None
+    if match is None or match["unit"] is None:
+        return parse_number(value, "1")
+    return with_unit(parse_number(match["number"], "1"), match["unit"].strip(), value)
+
+
+def with_unit(number: ExactNumber, unit: str, text: str) -> Quantity:
+    """A number of some unit, in SI.
+
+    Args:
+        text: as it was written, for messages.
+
+    Raises:
+        ValueError: no such unit.
+    """
+    try:
+        factor, turns = units.to_si(unit)
+    except units.UnitError as error:
+        raise ValueError(f"given {shown(text)}: {error}") from None
+    return Quantity(number.rational * factor, number.pi_power + turns, unit=unit)
 
 
 def _assumed(unit: str) -> str:

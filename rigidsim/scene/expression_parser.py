@@ -6,21 +6,26 @@ Text is read by the parser below and by nothing else: Python never sees it.
     product  = signed {("*" | "/") signed}
     signed   = ("+" | "-") signed | power
     power    = primary [("^" | "**") signed]          right-associative: -x^2 is -(x^2), 2^3^2 is 2^9
-    primary  = number | name | function "(" sum {"," sum} ")" | "(" sum ")"
+    primary  = number [unit] | name | function "(" sum {"," sum} ")" | "(" sum ")"
+    unit     = name ["^" integer] {["*" | "/"] name ["^" integer]}    as far as these are names of units
 
-Numbers, parameters and what sums, products, quotients and whole powers make of them stay exact.
+Numbers, parameters and what sums, products, quotients and whole powers make of them stay exact. Where units
+are written dimensions are checked.
 """
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
+from rigidsim.scene import dimensions, units
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.dimensions import ANY, DimensionError, Measure, end_of_unit
+from rigidsim.scene.exact import ExactNumber, parse_number, with_unit
 from rigidsim.scene.expressions import (
     FUNCTIONS,
     LARGEST_POWER,
@@ -39,6 +44,7 @@ from rigidsim.scene.expressions import (
 from rigidsim.scene.piecewise import power, written_out
 from rigidsim.scene.validation_messages import nearest
 
+T = TypeVar("T")
 LONGEST_TEXT = 2000
 DEEPEST_NESTING = 64
 MOST_NODES = 5000
@@ -55,13 +61,29 @@ _HINTS = {
     "=": "an expression is one value, without assignments; write only what stands right of the =",
     ".": "a point is part of a number only; names have no attributes",
     "_": "names begin with a letter",
+    "°": "write deg, as in 90 deg",
     **dict.fromkeys("<>!", _COMPARISON),
 }
 _NUMBER = r"(?:[0-9]+(?:_[0-9]+)*\.?(?:[0-9]+(?:_[0-9]+)*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _TOKEN = re.compile(
     rf"(?P<number>{_NUMBER})|(?P<name>[A-Za-z][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/^(),])|(?P<end>\Z)"
 )
+_PARENTHESES = 'a number with a unit stands in parentheses beside "/" and "^"'
 _CHECKING = context_for("quadruple")
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What was read of an expression.
+
+    Attributes:
+        measure: its dimension, as far as it is known.
+        bare: whether it is a number with a unit, without parentheses.
+    """
+
+    node: Node
+    measure: Measure = ANY
+    bare: bool = False
 
 
 def parse_expression(
@@ -70,6 +92,7 @@ def parse_expression(
     *,
     parameters: Mapping[str, ExactNumber] | None = None,
     jumps: bool = True,
+    unit: str | None = None,
 ) -> Expression:
     """Read an expression.
 
@@ -78,6 +101,7 @@ def parse_expression(
         names: of time and the state, as far as they are allowed here.
         parameters: named constants; they enter as exact numbers.
         jumps: whether functions that are constant but for jumps are allowed.
+        unit: in SI, of what the value is; None for any.
 
     Raises:
         ExpressionError: with what was given, what is allowed, and a caret under the place. Constant parts
@@ -93,8 +117,14 @@ def parse_expression(
         raise ExpressionError(f"an expression of {len(text)} characters; at most {LONGEST_TEXT} are allowed")
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
-    expression = Expression(text, _Parser(text, names, parameters, jumps).all())
+    whole = _Parser(text, names, parameters, jumps).all()
+    expression = Expression(text, whole.node)
     constant_value(expression, _CHECKING)
+    if unit is not None:
+        try:
+            dimensions.check_unit(whole.measure, unit)
+        except DimensionError as error:
+            raise ExpressionError(str(error)) from None
     return expression
 
 
@@ -104,7 +134,7 @@ class _Parser:
     def __init__(
         self, text: str, names: Collection[str], parameters: Mapping[str, ExactNumber], jumps: bool
     ) -> None:
-        self.text, self.names, self.jumps = text, names, jumps
+        self.text, self.names, self.parameters, self.jumps = text, names, parameters, jumps
         self.constants = {**parameters, "pi": ExactNumber(Fraction(1), 1)}
         self.known = [*names, *self.constants, "e"]
         self.depth = self.start = self.end = 0
@@ -125,7 +155,10 @@ class _Parser:
         self.kind, self.token = match.lastgroup or "", match[0]
         run = re.match(r"[\w.]*", rest)
         if self.kind == "number" and run and run.end() > match.end():
-            self.fail(f'"{run[0]}" is no number, such as 2, 0.5 or 1e-3; a product has its *, as in 2*t')
+            unit, hint = run[0][match.end() :], "; a product has its *, as in 2*t"
+            if unit not in self.known and units.is_unit(unit):
+                hint = f'; a unit stands apart, as in "{match[0]} {unit}"'
+            self.fail(f'"{run[0]}" is no number, such as 2, 0.5 or 1e-3{hint}')
         return passed
 
     def unknown_character(self, rest: str) -> NoReturn:
@@ -141,7 +174,14 @@ class _Parser:
     def at(self, *signs: str) -> bool:
         return self.kind == "sign" and self.token in signs
 
-    def deeper(self, weakest: int) -> Node:
+    def measured(self, position: int, of: Callable[[], T]) -> T:
+        """What dimensions give; where they don't agree the error has its place."""
+        try:
+            return of()
+        except DimensionError as error:
+            self.fail(str(error), position)
+
+    def deeper(self, weakest: int) -> _Part:
         """An expression one level down."""
         self.depth += 1
         if self.depth > DEEPEST_NESTING:
@@ -150,59 +190,80 @@ class _Parser:
         self.depth -= 1
         return node
 
-    def all(self) -> Node:
+    def all(self) -> _Part:
         root = self.binary(0)
         if self.at(")"):
             self.fail('a ")" without its "("; leave it out')
         if self.at(","):
             self.fail("a comma stands only between the arguments of a function; the decimal sign is a point")
         if self.kind != "end":
-            self.fail(f'an operator is missing before "{self.token}"; a product has its *, as in 2*t')
+            hint = self.about_units(self.token) if self.kind == "name" else ""
+            self.fail(f'an operator is missing before "{self.token}"; a product has its *, as in 2*t{hint}')
         return root
 
-    def binary(self, weakest: int) -> Node:
+    def about_units(self, name: str) -> str:
+        """Why a name that could be meant as a unit isn't one here."""
+        if name in self.known:
+            return f' ("{name}" is no unit here, but a name of this scene)' if units.is_unit(name) else ""
+        if units.is_unit(name):
+            return f"; a unit stands behind a number, as in 2 {name}"
+        return f'; no unit is called "{name}"'
+
+    def binary(self, weakest: int) -> _Part:
         """Operands and the signs that bind more strongly than ``weakest``."""
         start = self.start
         if self.at("+", "-"):
             sign, left = self.advance(), self.deeper(_SIGN_BINDS)
-            left = operation("negative", (left,), (start, self.end)) if sign == "-" else left
+            if sign == "-":
+                node = operation("negative", (left.node,), (start, self.end))
+                left = _Part(node, left.measure, left.bare)
         else:
             left = self.primary()
         while self.at(*_BINDS) and _BINDS[self.token] > weakest:
-            sign = self.advance()
+            sign, at = self.token, self.start
+            self.advance()
             if sign in ("^", "**"):
+                if left.bare:
+                    self.fail(f"{_PARENTHESES}: (2 s)^3", at)
                 exponent = self.exponent()
-                left = self.bounded(power(left, exponent, (start, self.end)), start)
+                value = exponent.value if isinstance(exponent, Constant) else None
+                node = self.bounded(power(left.node, exponent, (start, self.end)), start)
+                left = _Part(node, left.measure.power(value))
                 continue
-            right = self.binary(_BINDS[sign])
-            right = operation("negative", (right,), right.span) if sign == "-" else right
-            if sign == "/" and self.constant(right) == 0:
-                raise Expression(self.text, right).error("division by the zero", right)
-            left = operation(_OPERATORS[sign], (left, right), (start, self.end))
+            right, first = self.binary(_BINDS[sign]), left
+            node, span = right.node, (start, self.end)
+            if sign in ("+", "-"):
+                node = operation("negative", (node,), node.span) if sign == "-" else node
+                measure = self.measured(at, lambda a=first, b=right: a.measure.with_other(b.measure))  # type: ignore
+            else:
+                measure = first.measure.times(right.measure, -1 if sign == "/" else 1)
+            if sign == "/" and right.bare:
+                self.fail(f"{_PARENTHESES}: 1/(2 s) or (1/2)*(1 s)", at)
+            if sign == "/" and self.constant(node) == 0:
+                raise Expression(self.text, node).error("division by the zero", node)
+            left = _Part(operation(_OPERATORS[sign], (left.node, node), span), measure)
         return left
 
     def exponent(self) -> Node:
         start, exponent = self.start, self.deeper(_SIGN_BINDS)
-        value = self.constant(exponent)
+        if exponent.bare or (exponent.measure.powers and exponent.measure.written):
+            self.fail(f"{_PARENTHESES}, and an exponent has none: (2 s)^3", start)
+        value = self.constant(exponent.node)
         if value is None:
             self.fail("an exponent must be constant; write exp(y*log(x)) for x^y", start)
         if abs(value) > LARGEST_POWER:
             self.fail(
                 f'the exponent "{self.text[start : self.end]}" is beyond 64; -64 to 64 are allowed', start
             )
-        return exponent
+        return exponent.node
 
-    def primary(self) -> Node:
+    def primary(self) -> _Part:
         start = self.start
         if self.at("("):
-            return self.arguments()[0]
+            inside = self.arguments()[0]
+            return _Part(inside.node, inside.measure)
         if self.kind == "number":
-            try:
-                value = parse_number(self.token, "1")
-            except ValueError as error:
-                self.fail(str(error))
-            self.advance()
-            return Constant(value, (start, self.end))
+            return self.quantity(start)
         if self.kind != "name":
             self.fail(f'a number, a name or "(" is missing before {self.token or "the end"}')
         name = self.advance()
@@ -210,15 +271,38 @@ class _Parser:
             return self.call(name, start)
         span = (start, self.end)
         if name in self.names:
-            return Name(name, span)
+            return _Part(Name(name, span), dimensions.of_name(name))
         if name in self.constants:
-            return Constant(self.constants[name], span)
+            number = self.constants[name]
+            value = ExactNumber(number.rational, number.pi_power)
+            return _Part(Constant(value, span), dimensions.of_number(number))
         if name == "e":
-            return Operation("exp", (Constant(ONE, span),), span)
+            return _Part(Operation("exp", (Constant(ONE, span),), span))
         near = nearest(name, self.known) or nearest(name.lower(), self.known)
+        near = self.about_units(name) if units.is_unit(name) else near
         self.fail(f'unknown name "{name}"{near}; allowed: {", ".join(self.known)}', start)
 
-    def call(self, name: str, start: int) -> Node:
+    def quantity(self, start: int) -> _Part:
+        """A number, and the unit behind it."""
+        try:
+            value = parse_number(self.token, "1")
+        except ValueError as error:
+            self.fail(str(error))
+        self.advance()
+        end = self.measured(start, lambda: end_of_unit(self.text, self.end, self.names, self.parameters))
+        unit = self.text[self.start : end]
+        if self.kind != "name" or not unit:
+            return _Part(Constant(value, (start, self.end)))
+        try:
+            number = with_unit(value, unit, self.text[start : self.start + len(unit)])
+        except ValueError as error:
+            self.fail(str(error), start)
+        self.token, self.kind = unit, "unit"
+        self.advance()
+        value = ExactNumber(number.rational, number.pi_power)
+        return _Part(Constant(value, (start, self.end)), dimensions.of_unit(unit), bare=True)
+
+    def call(self, name: str, start: int) -> _Part:
         if name in self.known:
             self.fail(f'"{name}" is no function; a product has its *, as in {name}*(...)', start)
         if name not in _FUNCTIONS:
@@ -230,7 +314,10 @@ class _Parser:
         if not self.at("("):
             self.fail(f'the function "{name}" has its arguments in parentheses; {usage}', start)
         arguments = self.arguments(_FUNCTIONS[name], f'"{name}" takes {_FUNCTIONS[name]}; {usage}')
-        return self.bounded(written_out(name, arguments, (start, self.end)), start)
+        measures = [argument.measure for argument in arguments]
+        measure = self.measured(start, lambda: dimensions.of_function(name, measures))
+        nodes = [argument.node for argument in arguments]
+        return _Part(self.bounded(written_out(name, nodes, (start, self.end)), start), measure)
 
     def bounded(self, node: Node, start: int) -> Node:
         """A node that isn't too large: arguments of piecewise functions are written out several times."""
@@ -243,7 +330,7 @@ class _Parser:
                 self.fail("too many piecewise functions within one another; write fewer", start)
         return node
 
-    def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[Node]:
+    def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[_Part]:
         """What stands in parentheses."""
         opened = self.start
         self.advance()
@@ -252,7 +339,8 @@ class _Parser:
             self.advance()
             found.append(self.deeper(0))
         if not self.at(")"):
-            self.fail(f'a ")" is missing for the "(" in column {opened + 1}')
+            hint = self.about_units(self.token) if self.kind == "name" else ""
+            self.fail(f'a ")" is missing for the "(" in column {opened + 1}{hint}')
         if len(found) != count:
             self.fail(f"given {len(found)} arguments; {usage}", opened)
         self.advance()

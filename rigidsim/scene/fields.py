@@ -8,7 +8,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidat
 from pydantic_core import PydanticCustomError
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
-from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
 from rigidsim.scene.validation_messages import shown
 
 
@@ -73,6 +73,23 @@ else:
     Acceleration = quantity("m/s^2")
     GravitationalParameter = quantity("m^3/s^2")
     Damping = quantity("kg m^2/s")
+
+
+def _any_quantity(value: Any) -> ExactNumber:
+    try:
+        return parse_quantity(value)
+    except ValueError as error:
+        raise refuse(str(error)) from None
+
+
+AnyQuantity = Annotated[
+    ExactNumber,
+    PlainValidator(_any_quantity),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number"}, {"type": "string"}], "description": "number, in SI or with any unit"}
+    ),
+]
+"""A number with whatever unit is written behind it."""
 
 
 def _instant(value: Any) -> Epoch:

@@ -26,6 +26,7 @@ from rigidsim.scene.exact import ZERO, parse_number
 from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
 from rigidsim.scene.fields import (
     Angle,
+    AnyQuantity,
     ConfigTable,
     Dimensionless,
     Four,
@@ -286,7 +287,7 @@ class Config(ConfigTable):
 
     name: StrictStr
     description: StrictStr = ""
-    parameters: dict[StrictStr, Dimensionless] = Field(default_factory=dict)
+    parameters: dict[StrictStr, AnyQuantity] = Field(default_factory=dict)
     body: Body
     initial: Initial
     loads: list[LoadFields] = Field(default_factory=list)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 _DEFINITIONS = """
 yocto- = 1e-24 = y-
@@ -111,6 +111,57 @@ def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
     if pi_power.denominator != 1:
         raise UnitError(f'"{text}" takes a root of an angle')
     return Fraction(quantity.magnitude), int(pi_power), powers
+
+
+Powers: TypeAlias = tuple[tuple[str, Fraction], ...]
+"""A dimension: exponents of base units, sorted by their names."""
+_SHORT = {"meter": "m", "kilogram": "kg", "second": "s", "ampere": "A"}
+_FAMILIAR = ("N m", "N", "N m s", "N/m", "N s", "W", "T", "A m^2", "V", "C")
+
+
+def powers(text: str) -> Powers:
+    """The dimension of a unit; that of angles is empty.
+
+    Raises:
+        UnitError: it is none.
+    """
+    return tuple(sorted(_to_si(text)[2].items()))
+
+
+def to_si(text: str) -> tuple[Fraction, int]:
+    """Exact factor from a unit to SI, as ``rational * pi**power``.
+
+    Raises:
+        UnitError: it is none.
+    """
+    return _to_si(text)[:2]
+
+
+def is_unit(text: str) -> bool:
+    """Whether it is one."""
+    try:
+        _to_si(text)
+    except UnitError:
+        return False
+    return True
+
+
+def unit_text(dimension: Powers) -> str:
+    """The SI unit of a dimension, as people write it: ``N m``, ``m/s``, ``kg m^2``."""
+    for name in _FAMILIAR:
+        if powers(name) == dimension:
+            return name
+    over, under = (
+        " ".join(
+            _SHORT.get(base, base) + ("" if abs(power) == 1 else f"^{abs(power)}")
+            for base, power in dimension
+            if (power > 0) is above
+        )
+        for above in (True, False)
+    )
+    if not under:
+        return over
+    return f"{over or '1'}/{under if ' ' not in under else f'({under})'}"
 
 
 def known_units() -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import PlainValidator, WithJsonSchema
 
@@ -68,6 +68,7 @@ class Applied(Load):
     """A torque or a force given by expressions; its work is integrated, since it need have no potential.
 
     Attributes:
+        unit: of the components in SI.
         components: of the torque (N m) or force (N).
         frame: "body" or "space", of the components.
         arm: from the reference point to where a force acts, body axes, m (mpf).
@@ -75,6 +76,7 @@ class Applied(Load):
         number: place in the config, for messages.
     """
 
+    unit: ClassVar[str]
     components: tuple[Expression, Expression, Expression]
     frame: str
     arm: Vector
@@ -88,7 +90,7 @@ class Applied(Load):
         components = []
         for i, text in enumerate(fields.components):
             try:
-                components.append(parse_expression(text, names, parameters=around.parameters))
+                components.append(parse_expression(text, names, parameters=around.parameters, unit=cls.unit))
             except ExpressionError as error:
                 raise around.fault(f"components[{i}]", str(error)) from None
         point = getattr(fields, "point", None)
@@ -183,6 +185,7 @@ class Torque(Applied):
 
     Fields = TorqueFields
     title = "torque"
+    unit = "N m"
 
     def torque(self, m: Kinematics) -> list[Term]:
         """See ``Load``."""
@@ -196,6 +199,7 @@ class Force(Applied):
 
     Fields = ForceFields
     title = "force"
+    unit = "N"
 
     def torque(self, m: Kinematics) -> list[Term]:
         """arm x force."""

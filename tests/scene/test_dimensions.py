@@ -1,0 +1,204 @@
+"""Units in expressions: what they mean, exactly, and what is refused for its dimension."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene import units
+from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.config import parse
+from rigidsim.scene.exact import ExactNumber, parse_quantity
+from rigidsim.scene.expression_parser import parse_expression
+from rigidsim.scene.expressions import FUNCTIONS, PIECEWISE, Constant, Expression, ExpressionError, evaluate
+from rigidsim.scene.scene import build_scene
+
+PAGE = Path(__file__).parents[2] / "docs" / "expressions.md"
+NAMES = [
+    "t",
+    "wx",
+    "wy",
+    "wz",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "phi",
+    "theta",
+    "psi",
+    "x",
+    "y",
+    "z",
+    "vx",
+    "vy",
+    "vz",
+]
+GIVEN = {
+    "k": "0.25", "c": "2e-4 N m s", "tau": "0.1 N m", "w0": "30 deg/s", "m": "2", "l": "10 cm", "T": "3 T",
+}  # fmt: skip
+PARAMETERS = {name: parse_quantity(value) for name, value in GIVEN.items()}
+CONTEXT = context_for(50)
+
+
+def read(text: str, unit: str | None = None) -> Expression:
+    return parse_expression(text, NAMES, parameters=PARAMETERS, unit=unit)
+
+
+def refused(text: str, unit: str | None = None) -> str:
+    with pytest.raises(ExpressionError) as caught:
+        read(text, unit)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "rational", "pi_power"),
+    [
+        ("90 deg", Fraction(1, 2), 1),
+        ("-90 deg", Fraction(-1, 2), 1),
+        ("0.1 N m", Fraction(1, 10), 0),  # though m is a parameter: products have their sign
+        ("5 mN m", Fraction(5, 1000), 0),
+        ("9.81 m/s^2", Fraction(981, 100), 0),
+        ("(9.81 m/s^2)*m", Fraction(1962, 100), 0),
+        ("3 kg m^2/s^2", Fraction(3), 0),
+        ("3 s^-1", Fraction(3), 0),
+        ("3 s**2", Fraction(3), 0),
+        ("5 min", Fraction(300), 0),
+        ("1/(2 min)", Fraction(1, 120), 0),
+        ("(2 min)^2", Fraction(14400), 0),
+        ("2 * 3 km", Fraction(6000), 0),
+        ("1 deg/h", Fraction(1, 180 * 3600), 1),
+        ("1 h - 1 s", Fraction(3599), 0),
+        ("l", Fraction(1, 10), 0),
+        ("w0/(1 deg/s)", Fraction(30), 0),
+    ],
+)
+def test_a_quantity_is_exact(text: str, rational: Fraction, pi_power: int) -> None:
+    root = read(text).root
+    assert isinstance(root, Constant)
+    assert root.value == ExactNumber(rational, pi_power)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("theta - 90 deg", None),
+        ("wz - 5 rpm", None),
+        ("x - 3 km", None),
+        ("-c*wz", "N m"),
+        ("tau*sin(w0*t)^2", "N m"),
+        ("tau*pulse(t, 5 s, 10 s)", "N m"),
+        ("tau*exp(-((t - 3 s)/(10 ms))^2)", "N m"),
+        ("tau*min(1, t/(5 s)) - c*abs(wz)", "N m"),
+        ("5 N*l", "N m"),
+        ("sqrt(4 N^2 m^2) + atan2(wx, wy)*(1 J)", "N m"),
+        ("-tau*sign(wz - 1 rad/s)", "N m"),
+        ("k*sin(t)^2 + tau", "N m"),  # nothing is known of what is multiplied by a bare number
+        ("tau*sin(t)", "N m"),  # of t in seconds, where no unit is written
+        ("m*(9.81 m/s^2)", "N"),
+        ("0.3*wz*t", "N m"),  # no unit, no check
+        ("0", "N"),
+    ],
+)
+def test_what_fits_is_taken(text: str, unit: str | None) -> None:
+    read(text, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("t - 90 deg", None, 'column 3: a value in "s" and a number or an angle can\'t be added or compared'),
+        ("x + 5 s", None, 'a value in "m" and a value in "s"'),
+        ("max(wz, 2 s)", None, 'a value in "1/s" and a value in "s"'),
+        ("pulse(t, 5 m, 10 s)", None, '("m" is no unit here, but a name of this scene)'),
+        ("pulse(t, 5 km, 10 s)", None, "can't be added or compared"),
+        ("sin(t - 5 s)", None, '"sin" takes a number or an angle, given a value in "s"; divide by "(1 s)"'),
+        ("tau*wz", "N m", 'the expression is a value in "W", where "N m" is needed'),
+        ("tau", "N", 'the expression is a value in "N m", where "N" is needed'),
+        ("90 deg", "N m", 'the expression is a number or an angle, where "N m" is needed'),
+        ("c*c", "N m", 'a value in "kg^2 m^4/s^2"'),
+        ("1/2 s", None, 'column 2: a number with a unit stands in parentheses beside "/" and "^"'),
+        ("2^3 s", None, "an exponent has none: (2 s)^3"),
+        ("2^3 deg", None, "an exponent has none: (2 s)^3"),
+        ("2 s^k", None, "column 4: a number with a unit stands in parentheses"),
+        ("2 t", None, '("t" is no unit here, but a name of this scene)'),  # no tonne
+        ("2 m", None, '("m" is no unit here, but a name of this scene)'),
+        ("5 N*m", None, 'column 1: "m" is a parameter here, and a unit as well'),
+        ("5 s*T", None, '"T" is a parameter here, and a unit as well; write the unit without "*"'),
+        ("90*deg", None, 'unknown name "deg"; a unit stands behind a number, as in 2 deg'),
+        ("90deg", None, 'a unit stands apart, as in "90 deg"'),
+        ("0.1 Nm", None, 'no unit is called "Nm"'),
+        ("90°", None, "write deg, as in 90 deg"),
+    ],
+)
+def test_what_does_not_fit_is_refused(text: str, unit: str | None, message: str) -> None:
+    assert message in refused(text, unit)
+
+
+def test_expressions_without_units_need_no_library_of_units() -> None:
+    units._registry.cache_clear()
+    units._to_si.cache_clear()
+    parse_expression("k*sin(2*t)^2 + wz - 3*x", NAMES, parameters={"k": PARAMETERS["k"]}, unit="N m")
+    assert units._registry.cache_info().currsize == 0
+
+
+def config(parameters: str, component: str, event: str) -> str:
+    return f"""
+name = "units"
+[parameters]
+{parameters}
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0, 0, 1]
+[[loads]]
+kind = "torque"
+components = ["0", "0", "{component}"]
+[[events]]
+name = "turned"
+expression = "{event}"
+[time]
+end = 1
+"""
+
+
+def test_a_config_with_units_is_the_one_without() -> None:
+    one = build_scene(parse(config('c = "200 mN m s"', "-c*wz", "phi - 90 deg")))
+    other = build_scene(parse(config("c = 0.2", "-c*wz", "phi - pi/2")))
+    values = {name: CONTEXT.mpf(n + 1) / 7 for n, name in enumerate(NAMES)}
+    for first, second in (
+        (one.loads[0].components[2], other.loads[0].components[2]),  # type: ignore[attr-defined]
+        (one.events[0].expression, other.events[0].expression),
+    ):
+        assert first.root == second.root
+        assert evaluate(first, values, CONTEXT) == evaluate(second, values, CONTEXT)
+    with pytest.raises(ConfigError, match=re.escape('where "N m" is needed')):
+        build_scene(parse(config('c = "0.2 N m"', "-c*wz", "phi - 1")))
+    with pytest.raises(ConfigError, match=r'\[parameters\] c: given "0.2 Nm": unknown unit "Nm"'):
+        parse(config('c = "0.2 Nm"', "-c*wz", "phi - 1"))
+
+
+# ---- the documentation -----------------------------------------------------------------------------------
+
+_ROW = re.compile(r"^\| `(\w+)\([^|]*\| [^|]* \| `([^|]+)` \| ([-\d.]+) \|$", re.MULTILINE)
+STATE = {"t": 2, "wx": 0.5, "wy": -1, "wz": 2, "phi": 0.5, "theta": 1, "psi": 20, "x": 3, "y": -4}
+ROWS = _ROW.findall(PAGE.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(("name", "example", "shown"), ROWS, ids=[row[0] for row in ROWS])
+def test_every_example_of_the_page_has_the_value_shown(name: str, example: str, shown: str) -> None:
+    assert f"{name}(" in example
+    values = {key: CONTEXT.mpf(value) for key, value in STATE.items()}
+    found = evaluate(read(example), values, CONTEXT)
+    digits = len(shown.lstrip("-0.").replace(".", ""))
+    allowed = abs(found) * CONTEXT.mpf(10) ** -digits if digits > 4 else CONTEXT.mpf(10) ** -40
+    assert abs(found - CONTEXT.mpf(shown)) <= 5 * allowed
+
+
+def test_every_function_has_its_example() -> None:
+    assert sorted(row[0] for row in ROWS) == sorted([*FUNCTIONS, *PIECEWISE])
+    text = PAGE.read_text(encoding="utf-8")
+    assert all(f"`{key} = {value}`" in text for key, value in STATE.items())
