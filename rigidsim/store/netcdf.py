@@ -13,6 +13,7 @@ import numpy as np
 from h5py import h5d, h5ds
 
 from rigidsim.errors import RunFolderError
+from rigidsim.store.chunks import ChunkedVariable
 from rigidsim.store.netcdf_file import NetcdfFile, write_rows, writing
 from rigidsim.store.variables import LABELS, Extra, Variable
 
@@ -57,11 +58,18 @@ def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
         write_rows(file.variable(extra.name, extra.dims, extra.attributes), 0, extra.values)
 
 
-def fill(created: Created, variables: Sequence[Variable], block: Block, first: int) -> None:
-    """Write one block of rows."""
+def fill(created: Created, variables: Sequence[Variable], block: Block) -> None:
+    """Write all rows of variables that aren't compressed."""
     for variable in variables:
         for name, values in zip(variable.part_names(), block[variable.name], strict=True):
-            write_rows(created[name], first, values)
+            write_rows(created[name], 0, values)
+
+
+def add(chunks: Mapping[str, ChunkedVariable], variables: Sequence[Variable], block: Block) -> None:
+    """Write one block of rows after those before."""
+    for variable in variables:
+        for name, values in zip(variable.part_names(), block[variable.name], strict=True):
+            chunks[name].add(values)
 
 
 def image(
@@ -76,7 +84,7 @@ def image(
     with writing(buffer) as file:
         created = declare(file, variables, rows, attributes, compressed=False)
         if rows:
-            fill(created, variables, block, 0)
+            fill(created, variables, block)
         for name, arrays in groups.items():
             file.group(name, arrays)
     return buffer

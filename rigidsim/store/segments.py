@@ -21,13 +21,14 @@ import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.store import atomic, netcdf
+from rigidsim.store.chunks import ChunkedVariable, chunked
 from rigidsim.store.hdf5_sink import sink
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
 from rigidsim.store.variables import Extra, Variable
 
 REMOVED = ".segments.removed"
 """Where segments go before they are deleted."""
-_CHUNKS_AT_ONCE = 16
+_ROWS_AT_ONCE = 16 * netcdf.CHUNK_ROWS
 Arrays = Mapping[str, np.ndarray]
 
 
@@ -190,12 +191,12 @@ class SegmentWriter:
         with self._writing(), atomic.replacing(target) as temporary:
             with sink(temporary) as target_file, netcdf.writing(target_file) as file:
                 created = netcdf.declare(file, self._variables, rows, attributes, compressed=True)
-                first = 0
-                for path in paths:
-                    target_file.check()
-                    first += _copy(path, created, first)
-                if self._blocks:
-                    netcdf.fill(created, self._variables, self._collected(), first)
+                with chunked(created) as chunks:
+                    for path in paths:
+                        target_file.check()
+                        _copy(path, chunks)
+                    for block in self._blocks:
+                        netcdf.add(chunks, self._variables, block)
                 netcdf.add_extras(file, extras)
             content_seal, self.dataset_sha256 = seal(temporary)
         with self._writing():
@@ -307,19 +308,16 @@ def root_attributes(path: Path) -> dict[str, Any]:
         raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
 
 
-def _copy(path: Path, created: netcdf.Created, first: int) -> int:
-    """Copy one segment piece by piece, along the target's chunks so that none is compressed twice."""
+def _copy(path: Path, chunks: Mapping[str, ChunkedVariable]) -> None:
+    """Take one segment piece by piece; chunks of a finished dataset that is prolonged as they are."""
     with netcdf.reading(path) as segment:
-        saved = {name: segment[name] for name in created}
+        saved = {name: segment[name] for name in chunks}
         rows = len(saved["time"])
-        start = 0
-        while start < rows:
-            to_boundary = netcdf.CHUNK_ROWS - (first + start) % netcdf.CHUNK_ROWS
-            stop = min(rows, start + to_boundary + (_CHUNKS_AT_ONCE - 1) * netcdf.CHUNK_ROWS)
-            for name, target in created.items():
-                netcdf.write_rows(target, first + start, saved[name][start:stop])
-            start = stop
-    return rows
+        done = {name: chunks[name].add_chunks_of(data) for name, data in saved.items()}
+        for start in range(min(done.values()), rows, _ROWS_AT_ONCE):
+            for name, data in saved.items():
+                piece = slice(max(start, done[name]), start + _ROWS_AT_ONCE)
+                chunks[name].add(data[piece])
 
 
 def remove(folder: Path) -> None:
