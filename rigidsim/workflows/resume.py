@@ -19,6 +19,7 @@ from rigidsim.session.completion import with_timeline
 from rigidsim.session.guards import Observer
 from rigidsim.session.session import Session
 from rigidsim.session.tuning import Tuning
+from rigidsim.session.watching import watched
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
 from rigidsim.solve.steppers import stepper_of
@@ -47,6 +48,7 @@ def resume(
     until: str | float | Decimal | None = None,
     overrides: Overrides = (),
     observer: Observer | None = None,
+    progress: bool | None = None,
     loads: Sequence[Load] = (),
     tuning: Tuning | None = None,
 ) -> SavedRun:
@@ -57,7 +59,7 @@ def resume(
         until: a later end, as in ``[time] end``; a finished run is prolonged to it.
         overrides: ``limits.KEY=VALUE`` texts, or ``{"limits.KEY": value}``: guards of this session in place
             of the config's.
-        observer: is told how it goes.
+        observer, progress: as of ``rigidsim.run``.
         loads: those that the run was begun with.
         tuning: as of ``rigidsim.run``.
 
@@ -74,8 +76,8 @@ def resume(
         overrides = assignments_of(overrides)
     until = until if until is None else str(until)
     folder = find_run(path)
-    session = Session(observer or Observer(), tuning=tuning or Tuning())
-    with folder.locked():
+    with watched(observer, progress) as watching, folder.locked():
+        session = Session(watching, tuning=tuning or Tuning())
         _refuse_links(folder)
         if folder.read_only is None:
             folder.remove_torn()

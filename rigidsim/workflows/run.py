@@ -14,12 +14,13 @@ from rigidsim.session.guards import Observer
 from rigidsim.session.session import Session
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
 from rigidsim.session.tuning import Tuning
+from rigidsim.session.watching import watched
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.run import Run, SavedRun
 from rigidsim.workflows.certify import certified
-from rigidsim.workflows.read import Given, as_experiment
+from rigidsim.workflows.read import Experiment, Given, as_experiment
 
 if TYPE_CHECKING:
     from rigidsim.model.load import Load
@@ -33,6 +34,7 @@ def run(
     out: str | Path = ...,
     force: bool = ...,
     observer: Observer | None = ...,
+    progress: bool | None = ...,
     loads: Sequence[Load] = ...,
     tuning: Tuning | None = ...,
 ) -> SavedRun: ...
@@ -45,6 +47,7 @@ def run(
     changes: Mapping[str, Any] | None = ...,
     out: None,
     observer: Observer | None = ...,
+    progress: bool | None = ...,
     loads: Sequence[Load] = ...,
     tuning: Tuning | None = ...,
 ) -> MemoryRun: ...
@@ -57,6 +60,7 @@ def run(
     out: str | Path | None = "runs",
     force: bool = False,
     observer: Observer | None = None,
+    progress: bool | None = None,
     loads: Sequence[Load] = (),
     tuning: Tuning | None = None,
 ) -> Run:
@@ -68,6 +72,7 @@ def run(
         out: folder of the run folders; None: nothing is written, and the run's ``dataset`` is in memory.
         force: replace a run of the same name.
         observer: is told how it goes.
+        progress: whether a bar shows how it goes; None: in notebooks.
         loads: loads of one's own, beside those of the config, which alone can't reproduce the run then.
         tuning: how often to look up and save; no bit depends on it.
 
@@ -80,8 +85,20 @@ def run(
             memory.
     """
     experiment = as_experiment(experiment, changes)
-    observer = observer or Observer()
-    session = Session(observer, tuning=tuning or Tuning())
+    with watched(observer, progress) as watching:
+        return _run(experiment, out, watching, force=force, loads=loads, tuning=tuning or Tuning())
+
+
+def _run(
+    experiment: Experiment,
+    out: str | Path | None,
+    observer: Observer,
+    *,
+    force: bool,
+    loads: Sequence[Load],
+    tuning: Tuning,
+) -> Run:
+    session = Session(observer, tuning=tuning)
     beyond: Setting | None = None
     result: Run | None = None
     while True:

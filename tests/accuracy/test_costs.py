@@ -16,8 +16,8 @@ from rigidsim.accuracy.certificate import Certificate, certify
 from rigidsim.accuracy.choice import choose
 from rigidsim.accuracy.setting import Setting
 from rigidsim.cli import tables as report
-from rigidsim.cli.progress import LineObserver, TerminalObserver
 from rigidsim.session.guards import Observer
+from rigidsim.session.progress import LineObserver, TerminalObserver
 from rigidsim.session.timings import NOT_KEPT, Phases
 from rigidsim.solve.loop import Progress
 

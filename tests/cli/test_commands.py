@@ -516,7 +516,7 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
     """Name, bar, percentage, rate and time left, none of them cut."""
     from rich.console import Console
 
-    from rigidsim.cli.progress import TerminalObserver
+    from rigidsim.session.progress import TerminalObserver
     from rigidsim.solve.loop import Progress
     from rigidsim.solve.problem import prepare
 
@@ -545,7 +545,7 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
 
 
 def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[str]) -> None:
-    from rigidsim.cli.progress import LineObserver
+    from rigidsim.session.progress import LineObserver
     from rigidsim.solve.loop import Progress
     from rigidsim.solve.problem import prepare
 

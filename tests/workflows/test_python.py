@@ -150,3 +150,10 @@ def test_the_readmes_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     printed = capsys.readouterr().out
     assert "<Run 'intermediate_axis' (memory): finished>" in printed
     assert "<Run 'spinning_top' (memory): finished>" in printed
+
+
+def test_progress_is_shown_where_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    rigidsim.run(TOP, out=None)
+    assert capsys.readouterr().err == ""
+    rigidsim.run(TOP, out=None, progress=True)
+    assert "top: integrating in memory" in capsys.readouterr().err

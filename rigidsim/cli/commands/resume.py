@@ -28,7 +28,7 @@ def resume(
 
     Example: rigidsim resume runs/intermediate_axis
     """
-    from rigidsim.cli import progress
+    from rigidsim.session import progress
     from rigidsim.workflows.resume import resume as go_on
 
     with progress.observer() as observer:

@@ -29,9 +29,9 @@ def run(
 
     Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
     """
-    from rigidsim.cli import progress
     from rigidsim.scene.config import has_earlier_settings
     from rigidsim.scene.suspicions import suspicious_angles
+    from rigidsim.session import progress
     from rigidsim.workflows.read import load
     from rigidsim.workflows.run import run as run_experiment
 

@@ -14,7 +14,8 @@ def verify(run_path: RunPath, as_json: JsonOption = False) -> None:
 
     Example: rigidsim verify runs/intermediate_axis
     """
-    from rigidsim.cli import progress, tables
+    from rigidsim.cli import tables
+    from rigidsim.session import progress
     from rigidsim.workflows.verify import verify as compare
 
     with progress.observer() as observer:

@@ -1,9 +1,10 @@
-"""Progress on stderr: a bar with rate and ETA on a terminal, plain lines when piped."""
+"""Progress: a bar with rate and ETA on a terminal and in notebooks, plain lines where none can be drawn."""
 
 from __future__ import annotations
 
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 from rich.console import Console
@@ -168,8 +169,11 @@ class LineObserver(Observer):
         print(f"{self._name}: {text}", file=sys.stderr, flush=True)
 
 
-def observer() -> TerminalObserver | LineObserver:
-    """The one that suits stderr; use it in a ``with``."""
+def observer(*, notebook: bool = False) -> TerminalObserver | LineObserver:
+    """The one that suits stderr, or a notebook; use it in a ``with``."""
+    if notebook:  # the bar is a widget there
+        widgets = find_spec("ipywidgets") is not None
+        return TerminalObserver(Console(force_jupyter=True)) if widgets else LineObserver()
     return TerminalObserver() if sys.stderr.isatty() else LineObserver()
 
 
