@@ -175,10 +175,10 @@ def same_bits(one: xarray.Dataset | rigidsim.Run, other: xarray.Dataset | rigids
 
 
 def bits(values: Any) -> np.ndarray:
-    """float64 numbers as whole ones with the same bits; others as they are."""
+    """float64 numbers and dates as whole ones with the same bits; others as they are."""
     found = np.asarray(values)
     return (
         np.ascontiguousarray(found).view(np.int64).reshape(found.shape)
-        if found.dtype == np.float64
+        if found.dtype == np.float64 or found.dtype.kind == "M"
         else found
     )

@@ -7,11 +7,16 @@ reads it as float64 (which rounds numbers beyond double to the nearest one); ``d
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 from rigidsim.formats.decimals import texts
+from rigidsim.formats.naming import named_epoch
 from rigidsim.formats.registry import Format, Source
-from rigidsim.formats.tables import Table
+from rigidsim.formats.tables import Column, Table
+from rigidsim.scene.epochs import DIGITS, Epoch
 
 
 def write_csv(table: Table, path: Path, source: Source) -> None:
@@ -22,20 +27,58 @@ def write_csv(table: Table, path: Path, source: Source) -> None:
         path: the file; replaced.
         source: the run, for the comment at the top and for the digits.
     """
-    wide = any(len(column.parts) > 1 for column in table.columns)
+    columns = [column for column in table.columns if not column.is_date]
+    dates = _dates(table, source)
+    wide = any(len(column.parts) > 1 for column in columns if "significant_bits" not in column.attributes)
     head = [
         f"# {_plain(source.title)}: {table.rows} rows along {table.dim}",
         'read with pandas.read_csv(path, comment="#", float_precision="round_trip")',
-        "units: " + ", ".join(f"{column.name} [{column.units}]" for column in table.columns),
+        "units: " + ", ".join(f"{column.name} [{column.units}]" for column in columns),
     ]
     if wide:
         head.insert(2, f"numbers have {source.bits} bits; dtype=str keeps the digits that float64 can't hold")
+    names = [column.name for column in columns]
+    if dates is not None:
+        head.append(f"time 0 is {dates.epoch}; dates are {dates.epoch.scale}, to 1e-{DIGITS} s")
+        names.insert(1, f"{dates.times.variable.removesuffix('time')}date")
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write("\n# ".join(head) + "\n")
-        file.write(",".join(column.name for column in table.columns) + "\n")
-        for block in table.blocks():
-            columns = [texts(parts, source.bits) for parts in block]
-            file.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+        file.write(",".join(names) + "\n")
+        for block in table.blocks(columns):
+            shown = [texts(parts, c.bits(source.bits)) for c, parts in zip(columns, block, strict=True)]
+            if dates is not None:
+                shown.insert(1, [dates.text(time) for time in shown[columns.index(dates.times)]])
+            file.writelines(",".join(row) + "\n" for row in zip(*shown, strict=True))
+
+
+@dataclass(frozen=True)
+class _Dates:
+    """Dates of a table's rows.
+
+    Attributes:
+        times: the column that they are of.
+    """
+
+    epoch: Epoch
+    times: Column
+
+    def text(self, seconds: str) -> str:
+        """Of a time of the scene, s."""
+        return self.epoch.after(Decimal(seconds)).calendar()
+
+
+def _dates(table: Table, source: Source) -> _Dates | None:
+    """Where time 0 is known and the calendar reaches from the first row to the last."""
+    times = next((c for c in table.columns if re.fullmatch(r"(.*_)?time", c.variable)), None)
+    if times is None or not table.rows or not (source.naming.epoch or source.attributes.get("epoch")):
+        return None
+    found = _Dates(named_epoch(source.naming, source.attributes), times)
+    try:
+        for row in (0, -1):
+            found.text(repr(float(table.dataset[times.variable][row])))
+    except (ValueError, ArithmeticError):
+        return None
+    return found
 
 
 def _plain(text: str) -> str:

@@ -114,7 +114,7 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
     Raises:
         RigidsimError: neither says one of them, they contradict each other, or an option is malformed.
     """
-    epoch = _epoch(naming.epoch, str(attributes.get("epoch", "")))
+    epoch = named_epoch(naming, attributes)
     axes = _axes(naming.axes, str(attributes.get("axes", "")))
     if axes != ECLIPTIC:
         return Labels(epoch, axes)
@@ -124,7 +124,13 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
     return Labels(epoch, EQUATOR, turn)
 
 
-def _epoch(given: str, known: str) -> Epoch:
+def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
+    """What time 0 is, by the run or by an option.
+
+    Raises:
+        RigidsimError: neither says it, they contradict each other, or the option is malformed.
+    """
+    given, known = naming.epoch, str(attributes.get("epoch", ""))
     try:
         epoch = parse_epoch(given) if given else None
     except ValueError as error:

@@ -29,7 +29,8 @@ def write_parquet(table: Table, path: Path, source: Source) -> None:
                 told["exact_value"] = " + ".join(
                     column.part_name(n) for n in reversed(range(len(column.parts)))
                 )
-            fields.append(pa.field(column.part_name(part), pa.float64(), nullable=False, metadata=told))
+            kind = pa.timestamp("ns") if column.is_date else pa.float64()
+            fields.append(pa.field(column.part_name(part), kind, nullable=column.is_date, metadata=told))
     schema = pa.schema(fields, metadata={str(key): str(value) for key, value in source.attributes.items()})
     with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=False) as writer:
         for block in table.blocks(rows=8 * BLOCK_ROWS):

@@ -31,6 +31,7 @@ class Column:
         index: of the component, beside the row.
         parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
         attributes: units, long_name, ... of the variable.
+        is_date: whether it holds datetime64 instead of float64.
     """
 
     variable: str
@@ -38,6 +39,7 @@ class Column:
     index: tuple[int, ...]
     parts: tuple[str, ...]
     attributes: dict[str, Any]
+    is_date: bool = False
 
     @property
     def name(self) -> str:
@@ -48,6 +50,10 @@ class Column:
     def units(self) -> str:
         """As in the dataset."""
         return str(self.attributes.get("units", "1"))
+
+    def bits(self, of_run: int) -> int:
+        """Of the significand that its digits are to show."""
+        return int(self.attributes.get("significant_bits", of_run))
 
     def part_name(self, part: int) -> str:
         """Name of a residual's column: ``angular_velocity_lo_x``."""
@@ -98,8 +104,8 @@ def _column(values: np.ndarray, index: tuple[int, ...]) -> np.ndarray:
 def tables_of(dataset: xarray.Dataset) -> list[Table]:
     """The table along time, then those along other dimensions."""
     variables = dataset.variables
-    names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind == "f"]
-    names.sort(key=lambda name: name != "time")
+    names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind in "fM"]
+    names.sort(key=lambda name: (name != "time", name not in dataset.coords))
     columns: dict[str, list[Column]] = {}
     for name in names:
         columns.setdefault(str(variables[name].dims[0]), []).extend(_columns(dataset, name))
@@ -117,5 +123,5 @@ def _columns(dataset: xarray.Dataset, name: str) -> list[Column]:
     found = []
     for index in product(*(range(len(names)) for names in labels)):
         suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True))
-        found.append(Column(name, suffix, index, parts, dict(variable.attrs)))
+        found.append(Column(name, suffix, index, parts, dict(variable.attrs), variable.dtype.kind == "M"))
     return found

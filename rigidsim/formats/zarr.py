@@ -42,7 +42,8 @@ def _plain(dataset: xarray.Dataset) -> xarray.Dataset:
     """In memory, without the HDF5 file's own encodings."""
     loaded = dataset.load().copy()
     for name in loaded.variables:
-        loaded[name].encoding = {}
+        kept = ("units", "calendar", "dtype") if loaded[name].dtype.kind == "M" else ()
+        loaded[name].encoding = {key: loaded[name].encoding[key] for key in kept}
         loaded[name].attrs = {key: _json(value) for key, value in loaded[name].attrs.items()}
     loaded.encoding = {}
     return loaded

@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
+from rigidsim.scene.units import UnitError, time_unit
 from rigidsim.scene.validation_messages import shown
 
 
@@ -103,6 +104,20 @@ def _instant(value: Any) -> Epoch:
 
 Instant = Annotated[Epoch, PlainValidator(_instant), WithJsonSchema({"type": "string"})]
 """A date and time with its scale."""
+
+
+def _time_unit(value: Any) -> str:
+    if not isinstance(value, str):
+        raise refuse(f'given {shown(value)}; the name of a unit of time such as "day" is allowed')
+    try:
+        time_unit(value)
+    except UnitError as error:
+        raise refuse(f'given {shown(value)}: {error}; a unit of time is allowed, such as "day"') from None
+    return value
+
+
+TimeUnitName = Annotated[str, PlainValidator(_time_unit), WithJsonSchema({"type": "string"})]
+"""A unit of time, by its name."""
 
 
 class ConfigTable(BaseModel):

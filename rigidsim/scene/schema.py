@@ -38,6 +38,7 @@ from rigidsim.scene.fields import (
     Rate,
     Second,
     Speed,
+    TimeUnitName,
     Triple,
     refuse,
 )
@@ -158,7 +159,9 @@ class Initial(ConfigTable):
 
 
 class Time(ConfigTable):
-    """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``; what time 0 is."""
+    """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``; what time 0 is, and
+    the unit that times are shown in.
+    """
 
     start: Second = ZERO
     end: Second | None = None
@@ -166,6 +169,10 @@ class Time(ConfigTable):
     every: Second | None = None
     times: list[Second] | None = None
     epoch: Instant | None = Field(default=None, description="what time 0 is; scales TDB, TT and UTC")
+    unit: TimeUnitName | None = Field(
+        default=None,
+        description="what times are shown in, such as day, yr or kyr; bare numbers stay seconds",
+    )
 
 
 class Integrator(ConfigTable):

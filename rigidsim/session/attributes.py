@@ -34,7 +34,6 @@ def root_attributes(
         "states": system.state_exponents,
     }
     return RootAttributes(
-        Conventions="CF-1.11",
         title=scene.name,
         comment=scene.description,
         source="rigidsim",
@@ -69,6 +68,7 @@ def root_attributes(
         drawing=json.dumps(scene.body.drawing),
         axes=scene.axes,
         epoch=None if scene.epoch is None else str(scene.epoch),
+        time_unit=scene.config.time.unit,
         python_loads=" ".join(type(load).__name__ for load in prepared.python_loads),
         cpu_model=provenance.cpu_model(),
         started_at=provenance.now(),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
-from rigidsim.session.variables import recorded_variables
+from rigidsim.session.variables import dates_of, recorded_variables
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
 from rigidsim.solve.problem import InitialValueProblem
@@ -15,13 +17,15 @@ from rigidsim.store.variables import Extra, Variable
 def event_variables(
     prepared: InitialValueProblem, log: EventLog, evaluator: Evaluator, last: float
 ) -> list[Extra]:
-    """``NAME_time`` and ``NAME_<variable>`` along a dimension ``NAME``, with residuals beyond double.
+    """``NAME_time``, dates and ``NAME_<variable>`` along a dimension ``NAME``, with residuals beyond double.
 
     Args:
         last: time of the run's last sample, internal units; steps, and crossings, go past it.
     """
     extras: list[Extra] = []
-    variables = recorded_variables(prepared)
+    variables, dates = recorded_variables(prepared), dates_of(prepared)
+    if dates is not None:
+        variables[1:1] = dates.variables
     for index, crossing in enumerate(prepared.system.crossings):
         found = log.occurrences(index, last)
         count = len(found)
@@ -34,12 +38,18 @@ def event_variables(
         values["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]
         while len(values["time"]) < prepared.clock.part_count:  # found by the engine: no label to be off
             values["time"].append(np.zeros(len(times)))
+        if dates is not None:
+            values |= dates.of_times([_exactly(row) for row in zip(*values["time"], strict=True)])
         for variable in variables:
             empty = [np.zeros((0, int(np.prod(variable.shape))))] * variable.parts
             wrapped = evaluator.sparse and variable.name == "euler_angles"
             more = {"turns": "within one turn"} if wrapped else {}
             extras += _extras(crossing.name, variable, values.get(variable.name, empty), count, more)
     return extras
+
+
+def _exactly(parts: tuple[np.ndarray, ...]) -> Fraction:
+    return sum((Fraction(float(part)) for part in parts), Fraction(0))
 
 
 def _extras(

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.timings import Effort
-from rigidsim.session.variables import drift_name, put_back_name
+from rigidsim.session.variables import dates_of, drift_name, put_back_name
 from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
 from rigidsim.solve.checkpoint_arrays import pack_checkpoint, pack_events
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
@@ -50,6 +50,7 @@ class Recorder(SampleReceiver):
         self._writer = writer
         self._log = log
         self._effort = effort
+        self._dates = dates_of(prepared)
         self._events_saved = len(log.found)
         guard = prepared.scene.config.limits.max_drift
         self._max_drift = None if guard is None else float(guard)
@@ -73,6 +74,8 @@ class Recorder(SampleReceiver):
             recorded = self._evaluator.evaluate(block)
         self.trail.take(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)
+        if self._dates is not None:
+            recorded |= self._dates.of_samples(block.first, len(block))
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[drift_name(invariant.name)][0][:, 0])
         for name, values in put_back_by_invariant(self._prepared.projected_scalars, block.put_back).items():

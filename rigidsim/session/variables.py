@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from rigidsim.model.outputs import Invariant
+from rigidsim.session.dates import Dates
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.variables import Variable, time_variable
 
@@ -21,15 +23,28 @@ def put_back_name(invariant: str) -> str:
 
 
 def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
-    """Time first, then what is recorded, then each invariant's drift, and what was put back of those
-    projected.
+    """Time first, then dates where they are known, what is recorded, each invariant's drift, and what was put
+    back of those projected.
     """
     system, projected = prepared.system, prepared.projected_scalars
-    return [
-        *recorded_variables(prepared),
+    time, *recorded = recorded_variables(prepared)
+    found = [
+        *recorded,
         *(_drift(invariant) for invariant in system.invariants),
         *(_put_back(invariant, projected) for invariant in system.invariants if invariant.name in projected),
     ]
+    dates = dates_of(prepared)
+    if dates is None:
+        return [time, *found]
+    beside = " ".join(name for variable in dates.variables for name in variable.part_names())
+    dated = [replace(v, attributes={**v.attributes, "coordinates": beside}) for v in found]
+    return [time, *dates.variables, *dated]
+
+
+def dates_of(prepared: InitialValueProblem) -> Dates | None:
+    """The dates of samples; None where nobody knows what time 0 is."""
+    scene = prepared.scene
+    return None if scene.epoch is None else Dates(scene.epoch, scene.samples)
 
 
 def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:

@@ -38,6 +38,7 @@ class RootAttributes(BaseModel):
         python_loads: names of classes.
         axes: what the space axes are, where that is known.
         epoch: time 0, where that is known: date, time and scale.
+        time_unit: the unit that times are to be shown in, where the config asks for one.
         started_at, finished_at: UTC.
         mixed_provenance: where the run was resumed with other versions or on another machine, what changed.
         warnings: one a line.
@@ -48,7 +49,7 @@ class RootAttributes(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, defer_build=True)
 
-    Conventions: str
+    Conventions: str | None = None
     title: str
     comment: str
     source: str
@@ -81,6 +82,7 @@ class RootAttributes(BaseModel):
     drawing: str
     axes: str | None = None
     epoch: str | None = None
+    time_unit: str | None = None
     python_loads: str = ""
     cpu_model: Annotated[str, Use.REPEATED]
     started_at: Annotated[str, Use.REPEATED]

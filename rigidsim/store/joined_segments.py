@@ -42,7 +42,8 @@ def join_segments(paths: Sequence[Path], *, status: str, indexed: bool = True) -
             elif name in LABELS:
                 joined[str(name)] = variable.load()
         attributes = dict(first.attrs, status=status)
-    coordinates = {name: joined.pop(name) for name in ("time", *LABELS) if name in joined}
+        known = [name for name in map(str, first.coords) if name in joined]
+    coordinates = {name: joined.pop(name) for name in known}
     if not indexed:
         bare = xarray.Coordinates(coordinates, indexes={})
         return xarray.Dataset(joined, coords=bare, attrs=attributes)
@@ -58,7 +59,7 @@ def _joined(paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.V
         """One variable along all segments."""
 
         shape = (int(starts[-1]), *like.shape[1:])
-        dtype = like.dtype
+        dtype = like.dtype if like.dtype.kind != "M" else np.dtype(np.float64)
 
         def __getitem__(self, key: Any) -> Any:
             basic = indexing.IndexingSupport.BASIC
@@ -71,7 +72,12 @@ def _joined(paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.V
                 return np.asarray(_rows(paths, starts, name, range(row, row + 1), rest)[0])
             return _rows(paths, starts, name, range(*wanted.indices(self.shape[0])), rest)
 
-    return xarray.Variable(like.dims, indexing.LazilyIndexedArray(Column()), like.attrs)
+    if like.dtype.kind != "M":
+        return xarray.Variable(like.dims, indexing.LazilyIndexedArray(Column()), like.attrs)
+    stored = dict(like.attrs, **{key: like.encoding[key] for key in ("units", "calendar")})
+    numbers = xarray.Variable(like.dims, indexing.LazilyIndexedArray(Column()), stored)
+    dates: xarray.Variable = xarray.conventions.decode_cf_variable(name, numbers)
+    return dates
 
 
 def _rows(paths: Sequence[Path], starts: np.ndarray, name: str, rows: range, rest: tuple[Any, ...]) -> Any:

@@ -24,9 +24,10 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates beside time, with their labels."""
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """1: without seals. 2: files end with the SHA-256 of their content; checkpoints. 3: what was put back of held
-invariants along time (runs that hold none have the same variables as before)."""
+invariants along time (runs that hold none have the same variables as before). 4: dates along time (runs
+without an epoch have the same variables as before)."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def time_variable(parts: int) -> Variable:
     return Variable(
         "time",
         (),
-        {"units": "s", "long_name": "time of the scene", "axis": "T"},
+        {"units": "s", "long_name": "time of the scene"},
         parts,
     )
 

@@ -275,6 +275,7 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
     last = chain.paths[-1]
     saved = read_attributes(last)
     version, oldest = saved.schema_version, 3 if prepared.holds_invariants else 2
+    oldest = oldest if prepared.scene.epoch is None else 4
     if not oldest <= version <= SCHEMA_VERSION:
         raise RunFolderError(
             f"{last}: has schema version {version}; only runs of versions {oldest} to {SCHEMA_VERSION} can "

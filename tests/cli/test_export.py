@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from decimal import Decimal, localcontext
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray
 from scipy.spatial.transform import Rotation
 
 import rigidsim
@@ -82,8 +84,6 @@ def test_parquet_holds_values_and_residuals(exported: Callable[..., Path]) -> No
 
 def test_zarr_is_the_dataset(exported: Callable[..., Path]) -> None:
     pytest.importorskip("zarr")
-    import xarray
-
     path = exported("zarr", 'precision = "extended"')
     with xarray.open_zarr(path) as store, rigidsim.open_run("runs/throw").dataset as dataset:
         assert set(store.variables) == set(dataset.variables)
@@ -170,6 +170,81 @@ def test_the_config_says_epoch_and_axes_and_the_ecliptic_is_turned_to_the_equato
     np.testing.assert_allclose(states(orbit), expected, rtol=0, atol=1e-17)
     found = Rotation.from_quat(attitudes(attitude)).as_matrix()
     np.testing.assert_allclose(found, turn @ matrices, rtol=0, atol=2e-15)  # a few roundings of each
+
+
+EVENTFUL = '[[events]]\nname = "half"\nexpression = "t - 0.125"\n'
+
+
+@pytest.fixture
+def sky(config: Config, rigidsim_command: Command) -> xarray.Dataset:
+    """A flight with an epoch, axes and an event, exported to all formats; its dataset."""
+    text = config("sky", time=TIMED, rest=SKY.replace("ecliptic J2000", "EME2000") + EVENTFUL, **FLIGHT)
+    assert rigidsim_command("run", text).exit_code == 0
+    for file_format in ("csv", "parquet", "zarr", "aem", "oem"):
+        assert rigidsim_command("export", "runs/sky", "--format", file_format).exit_code == 0
+    with rigidsim.open_run("runs/sky").dataset as dataset:
+        return dataset.load()
+
+
+@pytest.mark.compact
+def test_tables_have_dates(sky: xarray.Dataset) -> None:
+    lines = Path("sky.csv").read_text().splitlines()
+    assert "# time 0 is 2029-04-13T21:46:00 TDB; dates are TDB, to 1e-14 s" in lines
+    lines = [line for line in lines if not line.startswith("#")]
+    assert lines[0].startswith("time,date,year,julian_date,")
+    assert lines[2].startswith("0.25,2029-04-13T21:46:00.25,2029.28")
+    row = lines[2].split(",")
+    zero = Fraction(2462240) + Fraction((9 * 60 + 46) * 60, 86400)
+    assert abs(Fraction(row[3]) - zero - Fraction(1, 4 * 86400)) <= zero / 2**104
+    event = [line for line in Path("sky.half.csv").read_text().splitlines() if not line.startswith("#")]
+    assert event[0].startswith("half_time,half_date,half_year,half_julian_date,")
+    assert event[1].startswith("0.125,2029-04-13T21:46:00.125,")
+    zarr, parquet = pytest.importorskip("zarr"), pytest.importorskip("pyarrow.parquet")
+    assert zarr
+    with xarray.open_zarr("sky.zarr") as store:
+        np.testing.assert_array_equal(store.date.values, sky.date.values, strict=True)
+        assert {"year", "julian_date", "date"} <= set(store.coords)
+    dates = parquet.read_table("sky.parquet")["date"].to_numpy()
+    np.testing.assert_array_equal(dates, sky.date.values)
+
+
+@pytest.mark.compact
+def test_independent_readers_read_orbit_messages(sky: xarray.Dataset) -> None:
+    """Epochs, frames and numbers as ``oem`` and ``ccsds-ndm`` see them."""
+    moments = [str(moment)[:23] for moment in sky.date.values]
+    state = np.hstack([sky.position.values, sky.velocity.values]) / 1000
+    close = {"rtol": 1e-15, "atol": 1e-18}
+
+    oem = pytest.importorskip("oem").OrbitEphemerisMessage.open("sky.oem")
+    assert (oem.segments[0].metadata["REF_FRAME"], oem.segments[0].metadata["TIME_SYSTEM"]) == (
+        "EME2000",
+        "TDB",
+    )
+    assert [str(s.epoch)[:23] for s in oem.states] == moments
+    assert {s.epoch.scale for s in oem.states} == {"tdb"}
+    found = [[*s.position, *s.velocity] for s in oem.states]
+    np.testing.assert_allclose(found, state, **close)
+
+    segment = pytest.importorskip("ccsds_ndm.ndm_io").NdmIo().from_path("sky.oem").body.segment[0]
+    rows = segment.data.state_vector
+    found = [[getattr(row, k).value for k in ("x", "y", "z", "x_dot", "y_dot", "z_dot")] for row in rows]
+    np.testing.assert_allclose(found, state, **close)
+    assert [row.epoch for row in rows][:2] == ["2029-04-13T21:46:00", "2029-04-13T21:46:00.25"]
+
+
+@pytest.mark.compact
+def test_an_independent_reader_reads_attitude_messages(sky: xarray.Dataset) -> None:
+    """``brahe``; not ``ccsds-ndm`` 3.1, which raises a KeyError on every AEM 2.0 with quaternions (it looks
+    for the field by the name of version 1), and would take the scalar for the first of the four.
+    """
+    brahe = pytest.importorskip("brahe.ccsds")
+    segment = brahe.AEM.from_file("sky.aem").segments[0]
+    frames = (segment.ref_frame_a, segment.ref_frame_b, segment.time_system)
+    assert tuple(map(str, frames)) == ("EME2000", "SC_BODY_1", "TDB")
+    found = [[q.w, q.x, q.y, q.z] for q in (row.quaternion for row in segment.states)]
+    expected = sky.quaternion.values / np.linalg.norm(sky.quaternion.values, axis=1)[:, None]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)  # it normalises
+    assert str(segment.states[1].epoch) == "2029-04-13 21:46:00.250 TDB"
 
 
 def test_no_message_names_what_nobody_said(config: Config, rigidsim_command: Command) -> None:

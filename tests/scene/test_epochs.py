@@ -53,6 +53,36 @@ def test_the_difference_of_tdb_and_tt() -> None:
     assert tdb_minus_tt((2462240.4 - 2451545) * 86400) == pytest.approx(1.621755750e-03, abs=1e-5)
 
 
+def test_scales_and_calendar_are_those_of_erfa() -> None:
+    """Dates, Julian dates and leap seconds exactly; TDB - TT by the whole series of ``dtdb`` to 1e-5 s."""
+    erfa = pytest.importorskip("erfa")
+    for year, month, day in (
+        (1, 1, 1),
+        (1600, 2, 29),
+        (1972, 1, 1),
+        (2000, 1, 1),
+        (2029, 4, 13),
+        (9999, 12, 31),
+    ):
+        epoch = parse_epoch(f"{year:04}-{month:02}-{day:02}T18:00 TT")
+        assert epoch.julian_date() == sum(
+            map(Fraction, map(float, erfa.cal2jd(year, month, day)))
+        ) + Fraction(3, 4)
+    days, offsets, _ = leap_seconds()
+    assert offsets == [int(erfa.dat(*erfa.jd2cal(2400000.5, day - 678576)[:3], 0.0)) for day in days]
+    for day in range(-146000, 73000, 7301):  # 1600 to 2200
+        expected = erfa.dtdb(2451545.0, float(day), 0.0, 0.0, 0.0, 0.0)
+        assert tdb_minus_tt(86400.0 * day) == pytest.approx(float(expected), abs=1.1e-5)
+    utc = parse_epoch("2020-06-01T12:00 UTC")
+    tai = erfa.utctai(*erfa.dtf2d("UTC", 2020, 6, 1, 12, 0, 0.0))
+    tt = erfa.taitt(*tai)
+    assert float(utc.julian_date() - 2451545) == pytest.approx(tt[0] - 2451545 + tt[1], abs=1e-12)
+    assert utc.uniform() == parse_epoch("2020-06-01T12:01:09.184 TT")
+    tdb = erfa.tttdb(*tt, erfa.dtdb(*tt, 0.0, 0.0, 0.0, 0.0))
+    # an ephemeris' argument: TDB since J2000
+    assert float(utc.since_j2000()) == pytest.approx(((tdb[0] - 2451545) + tdb[1]) * 86400, abs=1.1e-5 + 1e-4)
+
+
 @pytest.mark.parametrize(
     ("text", "phrase"),
     [

@@ -117,5 +117,5 @@ def test_a_file_that_is_no_dataset_is_named(tmp_path: Path) -> None:
     path = tmp_path / "dataset.h5"
     with h5py.File(path, "w") as file:
         file["time"] = [0.0]
-    with pytest.raises(RunFolderError, match=r"no dataset of rigidsim \(attribute 'Conventions'"):
+    with pytest.raises(RunFolderError, match=r"no dataset of rigidsim \(attribute 'title'"):
         read_attributes(path)

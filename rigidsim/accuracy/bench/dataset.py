@@ -103,7 +103,6 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             "invariant": ("invariant", np.array(names, dtype=object), {"long_name": "invariant"}),
         },
         attrs={
-            "Conventions": "CF-1.10",
             "title": measured.experiment.config.name,
             "config": measured.experiment.text,
             "config_sha256": measured.experiment.sha256,

@@ -1,0 +1,185 @@
+"""The dates of samples and events where time 0 of the scene is known: year, Julian date, calendar date.
+
+A Julian date is worked out from the exact rational time of a sample and kept in two doubles: right to 2^-104
+of its size, some 1e-20 s. Blocks are cut at multiples of a fixed count of samples, so that bits depend on the
+sample alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from rigidsim.scene.epochs import J2000, Epoch, leap_seconds, parse_epoch
+from rigidsim.scene.sample_times import SampleTimes
+from rigidsim.store.variables import Variable
+
+DAY = 86400
+_YEAR = 365.25
+_BLOCK = 1 << 16
+_SPARE = 17  # bits that products with an index within a block take
+# What xarray turns into datetime64[ns] without the package cftime.
+_FIRST_DATE, _LAST_DATE = parse_epoch("1678-01-01 TT").day, parse_epoch("2262-01-01 TT").day
+
+Columns = dict[str, list[np.ndarray]]
+"""Parts of each variable, (rows,) float64."""
+
+
+@dataclass(frozen=True)
+class Dates:
+    """The coordinates beside ``time`` of a scene whose time 0 is known.
+
+    Attributes:
+        epoch: time 0.
+        samples: where they lie.
+    """
+
+    epoch: Epoch
+    samples: SampleTimes
+
+    @property
+    def scale(self) -> str:
+        """Of years and Julian dates: the epoch's own, TT for UTC, whose days differ in length."""
+        return self.epoch.uniform().scale
+
+    @cached_property
+    def has_dates(self) -> bool:
+        """Whether all samples lie where readers have dates (1678 to 2261) and UTC, if asked for, is known."""
+        ends = [self.samples.begin, self.samples.exact_last]
+        days = [self.epoch.day, *(self.epoch.uniform().day + t / DAY for t in ends)]
+        if not _FIRST_DATE <= min(days) <= max(days) < _LAST_DATE:
+            return False
+        if self.epoch.scale != "UTC":
+            return True
+        known = parse_epoch("1972-01-01 UTC").julian_date(), parse_epoch(_last_day_of_utc()).julian_date()
+        zero = self.epoch.julian_date()
+        return known[0] <= zero + ends[0] / DAY and zero + ends[1] / DAY < known[1]
+
+    @property
+    def variables(self) -> list[Variable]:
+        """``year``, ``julian_date`` and, where all can be said, ``date``."""
+        told = {"time_scale": self.scale}
+        found = [
+            Variable(
+                "year",
+                (),
+                {"units": "julian_year", "long_name": f"Julian year, {self.scale}", **told}
+                | {"definition": "2000 + (julian_date - 2451545) / 365.25"},
+            ),
+            Variable(
+                "julian_date",
+                (),
+                {"units": "d", "long_name": f"Julian date, {self.scale}", **told, "significant_bits": 106},
+                2,
+            ),
+        ]
+        if self.has_dates:
+            attributes = {
+                "units": f"seconds since {self._reference[0]}",
+                "calendar": "proleptic_gregorian",
+                "standard_name": "time",
+                "long_name": f"date, {self.epoch.scale}",
+                "time_scale": self.epoch.scale,
+            }
+            if self.epoch.scale == "UTC":
+                attributes["comment"] = "leap seconds aren't counted; samples within one have no date"
+            found.append(Variable("date", (), attributes))
+        return found
+
+    def of_samples(self, first: int, count: int) -> Columns:
+        """Of samples first ... first+count-1."""
+        times = self.samples.times
+        if times is not None:
+            return self.of_times(times[first : first + count])
+        blocks = range(first // _BLOCK, (first + max(count, 1) - 1) // _BLOCK + 1)
+        pieces = [self._grid(block, first, first + count) for block in blocks]
+        return self._columns(*(np.concatenate([piece[i] for piece in pieces]) for i in range(3)))
+
+    def of_times(self, times: Sequence[Fraction]) -> Columns:
+        """Of any times of the scene, s."""
+        zero = self.epoch.julian_date()
+        dates = [zero + time / DAY for time in times]
+        high = np.array([float(date) for date in dates])
+        low = np.array(
+            [float(date - Fraction(near)) for date, near in zip(dates, high.tolist(), strict=True)]
+        )
+        return self._columns(high, low, np.array([float(time) for time in times]))
+
+    def _grid(self, block: int, first: int, stop: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Julian dates in two doubles and times (s) of the samples of one block that are asked for."""
+        origin = block * _BLOCK
+        index = np.arange(max(first - origin, 0), min(stop - origin, _BLOCK), dtype=np.float64)
+        begin = self.samples.begin + origin * self.samples.step
+        high, low = _line(self.epoch.julian_date() + begin / DAY, self.samples.step / DAY, index)
+        return high, low, np.add(*_line(begin, self.samples.step, index))
+
+    def _columns(self, high: np.ndarray, low: np.ndarray, seconds: np.ndarray) -> Columns:
+        year = 2000 + ((high - float(J2000.julian_date())) + low) / _YEAR
+        found = {"year": [year], "julian_date": [high, low]}
+        if self.has_dates:
+            found["date"] = [self._date(seconds)]
+        return found
+
+    @cached_property
+    def _reference(self) -> tuple[str, float]:
+        """A date and time without fractions to count from, and what time 0 has there, s."""
+        second = 10**14
+        whole = min(self.epoch.ticks // second, DAY - 1)
+        start = Epoch(self.epoch.scale, self.epoch.day, whole * second)
+        return start.calendar().replace("T", " "), float(Fraction(self.epoch.ticks, second) - whole)
+
+    def _date(self, seconds: np.ndarray) -> np.ndarray:
+        """Seconds since the reference, none of them a leap second; not a number within one."""
+        dates = seconds + self._reference[1]
+        if self.epoch.scale != "UTC":
+            return dates
+        days, offsets, _ = leap_seconds()
+        for k in range(1, len(days)):
+            begins = Epoch("UTC", days[k], 0)
+            if begins.day <= self.epoch.day:
+                continue
+            at = float((begins.julian_date() - self.epoch.julian_date()) * DAY)
+            more = offsets[k] - offsets[k - 1]
+            dates[seconds >= at] -= more
+            dates[(seconds >= at - more) & (seconds < at)] = np.nan
+        return dates
+
+
+def _last_day_of_utc() -> str:
+    from datetime import date
+
+    return f"{date.fromordinal(leap_seconds()[2] - 1)} UTC"
+
+
+def _line(base: Fraction, step: Fraction, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """base + index * step in two doubles, to 2^-104 of the larger part; the index has at most 16 bits."""
+    a0, a1, a2 = _parts(base, 0, 0, 0)
+    b0, b1, b2 = _parts(step, _SPARE, _SPARE, 0)  # products of the first two with an index are exact
+    high, rest = _sum(a0, index * b0)
+    middle, rest_of_middle = _sum(a1, index * b1)
+    low, rest_of_low = _sum(rest, middle)
+    return _sum(high, low + ((rest_of_middle + rest_of_low) + (a2 + index * b2)))
+
+
+def _parts(value: Fraction, *spare: int) -> list[float]:
+    """Doubles, each with so many bits to spare, whose sum is close to a value."""
+    parts = []
+    for bits in spare:
+        part = float(value)
+        if bits and part:
+            unit = Fraction(2) ** (int(np.frexp(part)[1]) - 53 + bits)
+            part = float(round(value / unit) * unit)
+        parts.append(part)
+        value -= Fraction(part)
+    return parts
+
+
+def _sum(a: float | np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum as rounded, and what rounding took off it (Knuth 1969, section 4.2.2, theorem B)."""
+    total = a + b
+    of_b = total - a
+    return total, (a - (total - of_b)) + (b - of_b)

@@ -1,0 +1,167 @@
+"""Dates along time: years, Julian dates and calendar dates of samples and events, where time 0 is known."""
+
+from __future__ import annotations
+
+import warnings
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import xarray
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import EAGER, config, run_text
+
+import rigidsim
+from rigidsim.scene.epochs import parse_epoch
+from rigidsim.scene.sample_times import SampleTimes
+from rigidsim.session.dates import Dates
+
+FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
+J2000 = Fraction(2451545)
+
+
+def grid(begin: Fraction, step: Fraction, count: int) -> SampleTimes:
+    return SampleTimes(begin, step, None, count, mpmath.mp)
+
+
+def exact(high: float, low: float) -> Fraction:
+    return Fraction(float(high)) + Fraction(float(low))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    begin=st.fractions(-(10**12), 10**12, max_denominator=10**30),
+    step=st.fractions(Fraction(1, 10**15), 10**7, max_denominator=10**30),
+    first=st.integers(0, 10**9),
+)
+def test_julian_dates_of_a_grid_are_those_of_its_rational_times(
+    begin: Fraction, step: Fraction, first: int
+) -> None:
+    dates = Dates(FLYBY, grid(begin, step, first + 5))
+    high, low = dates.of_samples(first, 5)["julian_date"]
+    zero = FLYBY.julian_date()
+    for i in range(5):
+        wanted = zero + (begin + (first + i) * step) / 86400
+        bound = Fraction(1, 2**104) * max(abs(wanted), abs(zero + begin / 86400))
+        assert abs(exact(high[i], low[i]) - wanted) <= bound
+        assert high[i] + low[i] == high[i]  # the first is the nearest double
+
+
+def test_a_sample_has_the_same_bits_however_blocks_are_cut() -> None:
+    dates = Dates(FLYBY, grid(Fraction(1, 3), Fraction(10, 7), 200_000))
+    whole = dates.of_samples(0, 200_000)
+    for first, count in ((0, 1), (65535, 2), (65536, 3), (131000, 69000)):
+        part = dates.of_samples(first, count)
+        for name, columns in part.items():
+            for column, all_of_it in zip(columns, whole[name], strict=True):
+                np.testing.assert_array_equal(column, all_of_it[first : first + count], strict=True)
+
+
+def test_whole_days_are_exact() -> None:
+    """From J2000: whole days, a year of 365.25 days, and dates of the calendar."""
+    dates = Dates(parse_epoch("J2000"), grid(Fraction(0), Fraction(86400), 36526))
+    found = dates.of_samples(0, 36526)
+    np.testing.assert_array_equal(found["julian_date"][0], 2451545.0 + np.arange(36526))
+    assert not found["julian_date"][1].any()
+    assert found["year"][0][[0, 1461, 36525]].tolist() == [2000, 2004, 2100]
+
+
+@pytest.mark.parametrize(
+    ("epoch", "begin", "end", "known"),
+    [
+        ("J2000", 0, 200 * 31557600, True),
+        ("J2000", 0, 300 * 31557600, False),  # past the year 2262
+        ("J2000", -400 * 31557600, 0, False),
+        ("1600-01-01 TT", 100 * 31557600, 101 * 31557600, False),
+        ("2016-12-31T23:59:30 UTC", 0, 60, True),
+        ("2016-12-31T23:59:30 UTC", 0, 100 * 31557600, False),  # nobody knows UTC so far ahead
+        ("1972-01-02 UTC", -(10**6), 0, False),
+    ],
+)
+def test_dates_are_given_where_all_samples_have_one(epoch: str, begin: int, end: int, known: bool) -> None:
+    dates = Dates(parse_epoch(epoch), grid(Fraction(begin), Fraction(end - begin, 4), 5))
+    assert dates.has_dates == known
+    names = ["year", "julian_date"] + ["date"] * known
+    assert [variable.name for variable in dates.variables] == names
+    assert list(dates.of_samples(0, 5)) == names
+
+
+def as_xarray(dates: Dates, columns: dict[str, list[np.ndarray]]) -> Any:
+    """The dates as a reader sees them."""
+    attributes = dict(dates.variables[-1].attributes)
+    return xarray.decode_cf(xarray.Dataset({"date": ("time", columns["date"][0], attributes)})).date.values
+
+
+def test_a_leap_second_has_no_date() -> None:
+    """UTC from 28 s before the end of 2016, whose last second was the 61st of its minute."""
+    dates = Dates(parse_epoch("2016-12-31T23:59:32.25 UTC"), grid(Fraction(0), Fraction(1, 4), 201))
+    found = as_xarray(dates, dates.of_samples(0, 201))
+    assert np.isnat(found).nonzero()[0].tolist() == [111, 112, 113, 114]
+    assert found[110] == np.datetime64("2016-12-31T23:59:59.75")
+    assert found[115] == np.datetime64("2017-01-01T00:00:00")
+    assert dates.scale == "TT"
+    # TT - UTC was 68.184 s, and 69.184 s after it
+    epoch = parse_epoch("2017-01-01T00:00:41.434 TT").julian_date()
+    assert parse_epoch("2016-12-31T23:59:32.25 UTC").julian_date() == epoch - Fraction(1, 86400)
+
+
+def test_events_and_lists_have_the_dates_of_their_times() -> None:
+    times = [Fraction(1, 3), Fraction(2), Fraction(10**15, 7)]
+    dates = Dates(FLYBY, SampleTimes.listed(Fraction(0), times, mpmath.mp))
+    found = dates.of_samples(1, 2)
+    for i, time in enumerate(times[1:]):
+        wanted = FLYBY.julian_date() + time / 86400
+        assert found["julian_date"][0][i] == float(wanted)
+        assert exact(*(part[i] for part in found["julian_date"])) == pytest.approx(wanted, rel=1e-31)
+    assert found["year"][0][0] == pytest.approx(
+        float(2000 + (FLYBY.julian_date() - J2000) / Fraction("365.25"))
+    )
+
+
+@pytest.mark.compact
+def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> None:
+    text = config(
+        time='end = 60\nsamples = 61\nepoch = "2029-04-13T21:46:00 TDB"\nunit = "min"',
+        more='[[events]]\nname = "flip"\nexpression = "t - 7.5"',
+    )
+    run = run_text(text, tmp_path / "whole")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plain = xarray.open_dataset(run.folder.dataset).load()
+    coordinates = {"year", "julian_date", "julian_date_lo", "date"}
+    assert coordinates <= set(plain.coords)
+    assert coordinates <= set(plain.quaternion.coords)
+    assert plain.time.dtype == np.float64
+    assert plain.date.values[-1] == np.datetime64("2029-04-13T21:47:00")
+    assert plain.attrs["time_unit"] == "min"
+    for i in (0, 17, 60):
+        wanted = FLYBY.julian_date() + Fraction(i, 86400)
+        got = exact(plain.julian_date.values[i], plain.julian_date_lo.values[i])
+        assert abs(got - wanted) <= wanted / 2**104
+    assert plain.flip_date.values.tolist() == [np.datetime64("2029-04-13T21:46:07.5", "ns").astype(int)]
+    assert plain.flip_julian_date.dims == ("flip",)
+    assert plain.swap_dims(time="date").sel(date="2029-04-13T21:46:30").time == 30
+    # what a run that was stopped has saved so far reads the same
+    cut = run_text(text, tmp_path / "cut", "limits.max_steps=40", tuning=EAGER)
+    assert cut.status == "stopped: max_steps"
+    with cut.dataset as part:
+        rows = part.sizes["time"]
+        assert 0 < rows < 61
+        assert coordinates <= set(part.coords)
+        for name in coordinates:
+            np.testing.assert_array_equal(part[name].values, plain[name].values[:rows], strict=True)
+        assert part.date[rows // 2 :].dtype.kind == "M"
+    with cut.opened(indexed=False) as bare:
+        assert not bare.xindexes
+    assert rigidsim.verify(run.folder.path).identical
+
+
+@pytest.mark.compact
+def test_runs_without_an_epoch_have_no_dates(tmp_path: Path) -> None:
+    with run_text(config(), tmp_path).dataset as dataset:
+        assert not {"year", "julian_date", "date"} & set(dataset.variables)
+        assert "coordinates" not in dataset.quaternion.encoding
