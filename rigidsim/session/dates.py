@@ -50,7 +50,7 @@ class Dates:
     def has_dates(self) -> bool:
         """Whether all samples lie where readers have dates (1678 to 2261) and UTC, if asked for, is known."""
         ends = [self.samples.begin, self.samples.exact_last]
-        days = [self.epoch.day, *(self.epoch.uniform().day + t / DAY for t in ends)]
+        days: list[Fraction] = [Fraction(self.epoch.day), *(self.epoch.uniform().day + t / DAY for t in ends)]
         if not _FIRST_DATE <= min(days) <= max(days) < _LAST_DATE:
             return False
         if self.epoch.scale != "UTC":

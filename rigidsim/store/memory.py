@@ -84,7 +84,8 @@ class MemoryRun(Run):
             labels = np.array(LABELS[dim])
             coordinates[dim] = xarray.Variable((dim,), labels, {"long_name": dim.replace("_", " ")})
         coordinates |= {n: found.pop(n) for n in list(found) if found[n].dims == (n,)}
-        return xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))
+        told = xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))
+        return xarray.decode_cf(told)  # dates, and coordinates beside time
 
     def concluded(self, outcome: Brief) -> Self:
         """The same run with another summary."""

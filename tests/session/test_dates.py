@@ -145,6 +145,9 @@ def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> Non
     assert plain.flip_date.values.tolist() == [np.datetime64("2029-04-13T21:46:07.5", "ns").astype(int)]
     assert plain.flip_julian_date.dims == ("flip",)
     assert plain.swap_dims(time="date").sel(date="2029-04-13T21:46:30").time == 30
+    in_memory = rigidsim.run(rigidsim.parse(text), out=None).dataset
+    assert coordinates <= set(in_memory.coords)
+    xarray.testing.assert_equal(in_memory.coords.to_dataset(), plain.coords.to_dataset())
     # what a run that was stopped has saved so far reads the same
     cut = run_text(text, tmp_path / "cut", "limits.max_steps=40", tuning=EAGER)
     assert cut.status == "stopped: max_steps"
