@@ -13,8 +13,8 @@ Importing this package loads nothing heavy.
 | `clock` | seconds to the viewer's integer timelines |
 | `readable_time` | spans in the unit that suits them, instants as dates, the axis of time |
 | `page` | the summary page |
-| `figures` | `save_figure`: dataset to PNG or SVG |
-| `panels` | the single panels of that figure |
+| `figures` | figures of a run by name, dataset to matplotlib, PNG or SVG: a package of its own |
+| `figure_names` | their names, without any import |
 | `work_precision` | the figure of `rigidsim tradeoff`: error against cost |
 | `viewer` | `open_viewer`, `screenshot` |
 | `solids` | triangle meshes of bodies, from the outlines of their shapes |

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidsim.look.figures import STYLE
+from rigidsim.look.figures.style import STYLE
 
 if TYPE_CHECKING:
     import xarray

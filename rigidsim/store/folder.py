@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
+from rigidsim.look.figure_names import FIGURES
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
 
@@ -50,6 +51,10 @@ class RunFolder:
         """Where ``rigidsim plot`` draws unless told otherwise."""
         return self.path / "figure.png"
 
+    def figure_of(self, what: str) -> Path:
+        """Where ``rigidsim plot --what`` draws a figure of that name unless told otherwise."""
+        return self.path / f"figure_{what}.png"
+
     @property
     def checkpoint(self) -> Path:
         """Where a finished run can be prolonged from."""
@@ -86,6 +91,7 @@ class RunFolder:
                 be written.
         """
         files = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
+        files += [self.figure_of(name) for name in FIGURES]
         folders = [self.segments, self.set_aside]
         ours = files + folders
         try:

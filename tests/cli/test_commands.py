@@ -18,6 +18,7 @@ from support import same_bits
 
 import rigidsim
 from rigidsim.look import viewer
+from rigidsim.look.figure_names import FIGURES
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -252,6 +253,33 @@ def test_plot(out: list[str], path: str, begins: bytes, config: Config, rigidsim
     content = Path(path).read_bytes()
     assert content.startswith(begins)
     assert len(content) > 20_000
+
+
+def test_plot_by_name(config: Config, rigidsim_command: Command, tmp_path: Path) -> None:
+    """Each into a file of its own in the run, which --force removes with the run; or into a folder."""
+    rigidsim_command("run", config())
+    result = rigidsim_command("plot", "runs/free", "--what", "rates", "--what", "drift")
+    assert result.stdout.split() == ["runs/free/figure_rates.png", "runs/free/figure_drift.png"]
+    (tmp_path / "all").mkdir()
+    result = rigidsim_command("plot", "runs/free", "--what", "rates", "--what", "drift", "--out", "all")
+    assert result.stdout.split() == ["all/figure_rates.png", "all/figure_drift.png"]
+    for options, message in (
+        (
+            ["--what", "polhodes"],
+            "none of that name; did you mean 'polhode'? Available: overview, polar_motion",
+        ),
+        (["--what", "libration"], "needs roll_pitch_yaw recorded, which this run hasn't; it has overview, "),
+        (["--what", "all", "--out", "x.png"], "x.png: several figures need a folder that is there"),
+    ):
+        result = rigidsim_command("plot", "runs/free", *options)
+        assert result.exit_code == 2
+        no_traceback(result)
+        assert message in " ".join(result.stderr.split())
+    assert rigidsim_command("run", config(), "--force").exit_code == 0
+    assert not Path("runs/free/figure_rates.png").exists()
+    shown = " ".join(rigidsim_command("plot", "--help").stdout.split())
+    for name, summary in FIGURES.items():
+        assert f"{name} {summary}" in shown
 
 
 @pytest.mark.parametrize(

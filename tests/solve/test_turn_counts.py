@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from support import bits, config, loaded, run_text
 
 import rigidsim
-from rigidsim.look.panels import CURVES
+from rigidsim.look.figures import timelines
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.turn_count import Place, TurnCounter, angles_to_join
@@ -113,10 +113,9 @@ def test_turns_that_nobody_knows_are_not_shown(runs: Path) -> None:
     text = config(SYMMETRIC, PRECESSING, (), "end = 1e9\nsamples = 11", 'method = "closed_form"', ANGLES)
     run = run_text(text, runs)
     within_one_turn(run, 0.0)
-    [panel] = [p for p in CURVES if p.draw.__name__ == "_attitude"]
     axes = Figure().add_subplot()
-    panel.draw(axes, run.dataset)
-    assert axes.get_title() == "Euler angles, within one turn"
+    timelines.attitude(axes, run.dataset)
+    assert (axes.get_title("left") or axes.get_title()) == "Euler angles, within one turn"
     assert {line.get_linestyle() for line in axes.get_lines()} == {"None"}
     legend = axes.get_legend()
     assert legend is not None

@@ -1,4 +1,4 @@
-"""``rigidsim plot``: the standard figures."""
+"""``rigidsim plot``: figures of a run."""
 
 from __future__ import annotations
 
@@ -9,32 +9,69 @@ import typer
 
 from rigidsim.cli.options import RunPath
 from rigidsim.errors import RigidsimError
+from rigidsim.look.figure_names import FIGURES, OVERVIEW
+
+ALL = "all"
 
 
 def plot(
     run_path: RunPath,
+    what: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--what", metavar="NAME", help="Figure to draw; repeatable. all: every one the run has."
+        ),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="PNG or SVG; default figure.png in the run.")
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="PNG or SVG, or a folder for several; default figure.png or figure_NAME.png in the run.",
+        ),
     ] = None,
 ) -> None:
-    """Draw the standard figures: rates, angles, drifts, polhode.
-
-    Example: rigidsim plot runs/intermediate_axis --out flip.svg
-    """
-    from rigidsim.look.figures import figure_format, save_figure
+    """Draw the page that suits the scene, or the figures named."""
+    from rigidsim.look.figures import available, check_name, figure_format, save_figure
     from rigidsim.store import atomic
     from rigidsim.store.run import open_run
 
     opened = open_run(run_path)
+    wanted = list(dict.fromkeys(what or [OVERVIEW]))
+    try:
+        for name in wanted:
+            if name != ALL:
+                check_name(name)
+    except ValueError as error:
+        raise RigidsimError(f"--what: {error}, {ALL}") from None
+    several = len(wanted) > 1 or ALL in wanted
+    if several and out is not None and not out.is_dir():
+        raise RigidsimError(f"{out}: several figures need a folder that is there; give one as --out, or none")
     target = out or opened.folder.figure
     with opened.dataset as dataset:
         try:
-            file_format = figure_format(target)
-            with atomic.replacing(target) as new:
-                save_figure(dataset, new, file_format=file_format)
+            if ALL in wanted:
+                wanted = available(dataset)
+            for name in wanted:
+                if several or out is None:
+                    target = opened.folder.figure if name == OVERVIEW else opened.folder.figure_of(name)
+                    target = target if out is None else out / target.name
+                file_format = figure_format(target)
+                with atomic.replacing(target) as new:
+                    save_figure(dataset, new, name, file_format=file_format)
+                print(target)
         except ValueError as error:
             raise RigidsimError(str(error)) from None
         except OSError as error:
             why = error.strerror or error
             raise RigidsimError(f"{target}: can't be written: {why}; choose another --out") from None
-    print(target)
+
+
+plot.__doc__ = f"""{plot.__doc__}
+
+    Example: rigidsim plot runs/intermediate_axis --what polhode --out flip.svg
+
+    \b
+    Figures:
+    {"".join(f"{name:14}{summary}" + chr(10) + "    " for name, summary in FIGURES.items())}
+    """

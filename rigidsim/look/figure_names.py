@@ -1,0 +1,20 @@
+"""The names of all figures and what each shows, in one line: for helps and messages, without any import."""
+
+OVERVIEW = "overview"
+"""The page that suits the scene."""
+
+FIGURES: dict[str, str] = {
+    OVERVIEW: "the page that suits the scene: its leading figures, drifts and a table (the default)",
+    "polar_motion": "the spin axis about the figure axis: circle, period, m1 and m2 over time",
+    "pole_path": "path of the figure axis in space, and about its mean motion where that precesses",
+    "nutation": "nutation ellipse: the pole about its mean motion",
+    "obliquity": "obliquity and longitude of the node, each less its mean or secular part",
+    "libration": "roll, pitch and yaw over time, pitch against roll, phase planes",
+    "tip": "trace of a top's tip seen from above, its tilt and precession over time",
+    "polhode": "polhode on the surfaces of energy and momentum, separatrix, Poinsot's rolling",
+    "herpolhode": "path of the angular velocity on the invariable plane",
+    "path": "path of the centre of mass",
+    "rates": "angular velocity over time",
+    "attitude": "Euler angles, or the body's z axis in space, over time",
+    "drift": "drifts of invariants over the band that rounding explains",
+}

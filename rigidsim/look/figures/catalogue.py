@@ -1,0 +1,197 @@
+"""All figures by name: what each shows, of which datasets, and the one that suits a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidsim.look.figure_names import FIGURES, OVERVIEW
+from rigidsim.look.figures import drift, flight, poles, polhode, signals, timelines
+from rigidsim.look.figures.composing import Panel, compose, has, shown_rows
+from rigidsim.look.roles import drifts
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+Test = Callable[["xarray.Dataset"], bool]
+
+
+def _has_rates_on_surfaces(dataset: xarray.Dataset) -> bool:
+    return polhode.surfaces(dataset) is not None
+
+
+def _has_herpolhode(dataset: xarray.Dataset) -> bool:
+    return polhode.herpolhode(dataset) is not None
+
+
+def _rolls(dataset: xarray.Dataset) -> bool:
+    return _has_rates_on_surfaces(dataset) and _has_herpolhode(dataset)
+
+
+def _has_pole(dataset: xarray.Dataset) -> bool:
+    return bool(poles.pole_paths(dataset)[0])
+
+
+def _has_orientation(dataset: xarray.Dataset) -> bool:
+    return bool(timelines.orientations(dataset))
+
+
+def _precesses(dataset: xarray.Dataset) -> bool:
+    return _has_orientation(dataset) and signals.steady_momentum(dataset) is None
+
+
+def is_top(dataset: xarray.Dataset) -> bool:
+    """Whether it is a body on a fixed point under uniform gravity, or has a top's angles recorded."""
+    fixed = "position" not in dataset and "uniform_gravity" in signals.load_kinds(dataset)
+    return (has("tip")(dataset) and "position" not in dataset) or (
+        fixed and signals.pole(dataset, "figure") is not None
+    )
+
+
+def _has_tip(dataset: xarray.Dataset) -> bool:
+    return has("tip")(dataset) or is_top(dataset)
+
+
+def _has_wobble(dataset: xarray.Dataset) -> bool:
+    return has("nutation_angle")(dataset) or (
+        signals.pole(dataset, "figure") is not None and signals.pole(dataset, "momentum") is not None
+    )
+
+
+def librates(dataset: xarray.Dataset) -> bool:
+    """Whether the body keeps an attitude to its orbit: roll, pitch and yaw stay within a right angle."""
+    table = signals.values(dataset, "roll_pitch_yaw")
+    return table is not None and bool(np.nanmax(np.abs(table)) < np.pi / 2)
+
+
+RATES = Panel(has("angular_velocity"), timelines.rates, begins=True)
+ATTITUDE = Panel(has("euler_angles", "quaternion"), timelines.attitude, begins=True)
+DRIFT = Panel(lambda dataset: bool(drifts(dataset)), drift.drift_panel)
+POLAR_MOTION = Panel(
+    lambda dataset: signals.polar_motion(dataset) is not None, timelines.polar_motion, begins=True
+)
+OBLIQUITY = Panel(_has_orientation, timelines.obliquity)
+LONGITUDE = Panel(_has_orientation, timelines.longitude)
+LIBRATION = Panel(has("roll_pitch_yaw"), timelines.libration)
+TILT = Panel(lambda dataset: has("tilt")(dataset) or is_top(dataset), timelines.tilt, begins=True)
+PRECESSION = Panel(has("precession_angle"), timelines.precession, begins=True)
+WOBBLE = Panel(_has_wobble, timelines.wobble)
+
+CIRCLE = Panel(signals.near_axis, poles.polar_motion_panel)
+PATH = Panel(_has_pole, poles.pole_path_panel)
+NUTATION = Panel(_precesses, poles.nutation_panel)
+TIP = Panel(_has_tip, poles.tip_panel)
+ROLL_PITCH = Panel(has("roll_pitch_yaw"), poles.roll_pitch_panel)
+PHASES = Panel(has("roll_pitch_yaw"), poles.phase_panel)
+POLHODE = Panel(has("angular_velocity"), polhode.polhode_panel)
+HERPOLHODE = Panel(_has_herpolhode, polhode.herpolhode_panel)
+POINSOT = Panel(_rolls, polhode.poinsot_panel)
+FLIGHT = Panel(has("position"), flight.path_panel)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A figure that can be asked for.
+
+    Attributes:
+        needs: what a run must have for it, in words.
+        curves: panels over time.
+        planes: square panels.
+    """
+
+    needs: str
+    curves: Sequence[Panel] = ()
+    planes: Sequence[Panel] = ()
+
+    def shows(self, rows: xarray.Dataset) -> bool:
+        """Whether a dataset (in memory) has what its first plane, or curve, needs."""
+        return [*self.planes, *self.curves][0].shows(rows)
+
+
+_TURNS, _ATTITUDE = "angular_velocity recorded", "an attitude recorded"
+KINDS: dict[str, Kind] = {
+    "polar_motion": Kind("a spin near a principal axis", (POLAR_MOTION,), (CIRCLE,)),
+    "pole_path": Kind(_ATTITUDE, (), (PATH, NUTATION)),
+    "nutation": Kind("a pole that a torque moves", (), (NUTATION,)),
+    "obliquity": Kind(_ATTITUDE, (OBLIQUITY, LONGITUDE)),
+    "libration": Kind("roll_pitch_yaw recorded", (LIBRATION,), (ROLL_PITCH, PHASES)),
+    "tip": Kind("a top: a body on a fixed point under uniform gravity", (TILT, PRECESSION), (TIP,)),
+    "polhode": Kind(_TURNS, (), (POLHODE, POINSOT)),
+    "herpolhode": Kind("an attitude and a momentum that stays put", (), (HERPOLHODE,)),
+    "path": Kind("position recorded", (), (FLIGHT,)),
+    "rates": Kind(_TURNS, (RATES,)),
+    "attitude": Kind(_ATTITUDE, (ATTITUDE,)),
+    "drift": Kind("invariants", (DRIFT,)),
+}
+
+
+def available(dataset: xarray.Dataset) -> list[str]:
+    """The figures that a dataset has something for."""
+    rows = shown_rows(dataset).rows
+    return [OVERVIEW, *(name for name, kind in KINDS.items() if kind.shows(rows))]
+
+
+def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
+    """A figure of a run.
+
+    Args:
+        dataset: of a run; it may be lazy and of any length, of which at most 20,000 rows are drawn.
+        what: a name of `FIGURES`.
+
+    Raises:
+        ValueError: no such figure, none of this dataset, or a dataset without samples.
+    """
+    check_name(what)
+    if what == OVERVIEW:
+        return overview(dataset)
+    kind = KINDS[what]
+    if not kind.shows(shown_rows(dataset).rows):
+        raise ValueError(
+            f"figure {what!r}: needs {kind.needs}, which this run hasn't; "
+            f"it has {', '.join(available(dataset))}"
+        )
+    return compose(dataset, kind.curves, kind.planes)
+
+
+def check_name(what: str) -> None:
+    """Say what figures there are.
+
+    Raises:
+        ValueError: no figure is called so.
+    """
+    if what not in FIGURES:
+        close = get_close_matches(what, FIGURES, 1)
+        hint = f"; did you mean {close[0]!r}?" if close else "."
+        raise ValueError(f"figure {what!r}: there is none of that name{hint} Available: {', '.join(FIGURES)}")
+
+
+def overview(dataset: xarray.Dataset) -> Figure:
+    """The page that suits the scene: its leading figures, drifts of invariants and a table.
+
+    Raises:
+        ValueError: a dataset without samples.
+    """
+    curves, planes = _leading(shown_rows(dataset).rows)
+    return compose(dataset, (*curves, DRIFT), planes, facts=True)
+
+
+def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
+    moving = (FLIGHT,) if FLIGHT.shows(rows) else ()
+    if librates(rows):
+        return (LIBRATION, RATES), (ROLL_PITCH, *moving)
+    if is_top(rows):
+        return (TILT, PRECESSION if PRECESSION.shows(rows) else ATTITUDE), (TIP,)
+    if signals.near_axis(rows):
+        if _precesses(rows) and not moving:
+            return (OBLIQUITY, LONGITUDE, POLAR_MOTION), (NUTATION, PATH)
+        return (POLAR_MOTION,), (CIRCLE, *moving)
+    if moving:
+        return (RATES, ATTITUDE), (*moving, POLHODE)
+    if polhode.surfaces(rows) is not None:
+        return (RATES, ATTITUDE), (POLHODE, HERPOLHODE)
+    return (RATES, ATTITUDE), (POLHODE,)

@@ -1,0 +1,217 @@
+"""Panels to a page: curves over time on the left, planes on the right, facts below."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidsim.look.figures import signals, timelines
+from rigidsim.look.figures.style import GREY, INK, STYLE, blank
+from rigidsim.look.page import largest_drift, read_config
+from rigidsim.look.readable_time import unit_for
+from rigidsim.look.roles import drifts
+from rigidsim.look.thinning import thin
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ROWS = 20_000  # of a dataset that a figure shows at most
+FULL_READ = 2_000_000  # samples up to which all drifts are read for their largest value
+
+_CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
+_CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
+_WIDE, _NARROW = 12.4, 8.2
+_PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
+
+
+@dataclass(frozen=True)
+class Panel:
+    """What a panel needs (`shows`) and how it is drawn on axes (`draw`)."""
+
+    shows: Callable[[xarray.Dataset], bool]
+    draw: Callable[[Any, xarray.Dataset], None]
+    begins: bool = False
+    """Of a panel over time: whether it shows the start alone where the whole would be a solid band."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A dataset's rows as a figure shows them, in memory, and what was found in all of them.
+
+    Attributes:
+        rows: at most `ROWS`, evenly strided.
+        start: the first `ROWS`, every one.
+        largest: magnitude of each invariant's drift.
+        complete: whether every sample was read for it.
+    """
+
+    rows: xarray.Dataset
+    start: xarray.Dataset
+    largest: dict[str, float]
+    complete: bool
+
+
+def shown_rows(dataset: xarray.Dataset) -> Shown:
+    """What a figure needs of a dataset, which may be lazy and of any length.
+
+    Raises:
+        ValueError: no time coordinate, or no samples.
+    """
+    rows = thin(dataset, ROWS).assign_attrs(dataset.attrs)
+    # A figure of few points shouldn't understate the drifts, unless reading them all takes long.
+    complete = dataset.sizes["time"] <= max(FULL_READ, rows.sizes["time"])
+    whole = dataset if complete else rows
+    largest = {name: largest_drift(drift) for name, drift in drifts(whole).items()}
+    start = rows
+    if dataset.sizes["time"] > rows.sizes["time"]:
+        start = thin(dataset.isel(time=slice(0, ROWS)), ROWS).assign_attrs(dataset.attrs)
+    return Shown(rows, start, largest, complete)
+
+
+def beginning(axes: Axes, shown: Shown) -> float:
+    """Seconds that hold `_CYCLES` swings of a panel's curves where the run has many more; 0 where it hasn't.
+
+    Args:
+        axes: of the panel, drawn from `shown.start`.
+    """
+    seconds, whole = signals.seconds(shown.start), signals.seconds(shown.rows)
+    length, span = float(seconds[-1] - seconds[0]), float(whole[-1] - whole[0])
+    most = 0
+    for line in axes.get_lines():
+        values = np.asarray(line.get_ydata(), dtype=np.float64)
+        values = values[np.isfinite(values)]
+        if len(values) < 50 or line.get_linestyle() == "None" or not timelines.moves(values):
+            continue
+        values = values - values.mean()
+        most = max(most, int(np.count_nonzero(np.diff(np.signbit(values)))))
+    if length <= 0 or most / 2 * span / length <= _MANY:
+        return 0.0
+    return 2 * _CYCLES * length / most
+
+
+def compose(
+    dataset: xarray.Dataset,
+    curves: Sequence[Panel] = (),
+    planes: Sequence[Panel] = (),
+    *,
+    facts: bool = False,
+) -> Figure:
+    """A page of those panels that the dataset has something for.
+
+    Args:
+        curves: over a common time, below one another.
+        planes: square, below one another beside curves, else side by side.
+        facts: whether a table of what was run and what was conserved stands below the planes.
+    """
+    from matplotlib import rc_context
+
+    shown = shown_rows(dataset)
+    curves = [panel for panel in curves if panel.shows(shown.rows)]
+    planes = [panel for panel in planes if panel.shows(shown.rows)]
+    table = facts_of(shown) if facts else []
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        figure = _side_by_side(shown.rows, planes) if planes and not curves and not table else None
+        if figure is None:
+            figure = _two_columns(shown, curves, planes, table)
+    return figure
+
+
+def _side_by_side(rows: xarray.Dataset, planes: Sequence[Panel]) -> Figure:
+    figure = blank(rows, max(_PLANES_WIDE * len(planes), 6.4), 5.2)
+    for axes, panel in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
+        panel.draw(axes, rows)
+    return figure
+
+
+def _two_columns(
+    shown: Shown, curves: Sequence[Panel], planes: Sequence[Panel], table: list[tuple[str, str]]
+) -> Figure:
+    rows = shown.rows
+    right = bool(planes or table)
+    below = _FACT * (len(table) + 1) if table else 0.0
+    left_height = _CURVE * len(curves) if len(curves) > 1 else 3.6 * len(curves)
+    height = max(left_height, _PLANE * len(planes) + below, 2.6)
+    figure = blank(rows, _WIDE if right and curves else _NARROW, height)
+    outer = figure.add_gridspec(
+        1, 2 if right and curves else 1, width_ratios=[1.38, 1.0] if right and curves else None
+    )
+    if curves:
+        grid = outer[0].subgridspec(len(curves), 1)
+        drawn = [
+            _curve_panel(figure.add_subplot(grid[row]), panel, shown) for row, panel in enumerate(curves)
+        ]
+        for row, (axes, data, begins) in enumerate(drawn):
+            lowest = row == len(drawn) - 1 or drawn[row + 1][2] != begins
+            timelines.time_axis(axes, data, labelled=lowest, begins=begins)
+    if right:
+        heights = [_PLANE] * len(planes) + ([below] if table else [])
+        spare = height - sum(heights)
+        grid = outer[-1].subgridspec(
+            len(heights) + (spare > 0.1), 1, height_ratios=heights + ([spare] if spare > 0.1 else [])
+        )
+        for row, panel in enumerate(planes):
+            panel.draw(figure.add_subplot(grid[row]), rows)
+        if table:
+            _table(figure.add_subplot(grid[len(planes)]), table)
+    return figure
+
+
+def _curve_panel(axes: Axes, panel: Panel, shown: Shown) -> tuple[Axes, xarray.Dataset, float]:
+    """Draw it; returns its axes, the samples drawn, and the seconds to be shown of the start alone, or 0."""
+    if panel.begins:
+        panel.draw(axes, shown.start)
+        begins = beginning(axes, shown)
+        if begins:
+            axes.clear()
+            start = shown.start
+            if not str(start.attrs.get("time_unit") or ""):
+                start = start.assign_attrs(time_unit=unit_for(begins).symbol)
+            panel.draw(axes, start)
+            return axes, start, begins
+        if shown.start is shown.rows:
+            return axes, shown.rows, 0.0
+        axes.clear()
+    panel.draw(axes, shown.rows)
+    return axes, shown.rows, 0.0
+
+
+def facts_of(shown: Shown) -> list[tuple[str, str]]:
+    """What was run and what was conserved: rows of a table, all of them."""
+    dataset = shown.rows
+    integrator = read_config(dataset).get("integrator", {})
+    status = str(dataset.attrs.get("status", ""))
+    lines = [
+        (name, str(value))
+        for name, value in (
+            ("status", status if status != "finished" else ""),
+            ("formulation", dataset.attrs.get("formulation") or integrator.get("formulation")),
+            ("precision", dataset.attrs.get("precision") or integrator.get("precision")),
+            ("tolerance", integrator.get("tolerance")),
+            ("steps", dataset.attrs.get("steps")),
+        )
+        if value not in (None, "")
+    ]
+    bound = "" if shown.complete else "≥ "  # of the samples that were read
+    for name, drift in shown.largest.items():
+        lines.append(
+            (f"largest drift, {name.replace('_', ' ')}", f"{bound}{drift:.1e}" if drift else f"{bound}0")
+        )
+    return lines
+
+
+def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
+    axes.set_axis_off()
+    for row, (name, value) in enumerate(lines):
+        height = 1.0 - (row + 0.5) / (len(lines) + 1)
+        axes.text(0.04, height, name, color=GREY, fontsize=9, va="center", clip_on=False)
+        axes.text(0.70, height, value, color=INK, fontsize=9, va="center", clip_on=False)
+
+
+def has(*names: str) -> Callable[[xarray.Dataset], bool]:
+    """Whether a dataset has one of the variables."""
+    return lambda dataset: any(signals.values(dataset, name) is not None for name in names)

@@ -1,0 +1,120 @@
+"""Mean rates, secular parts and the leading ellipse of recorded angles: what a label says of a curve.
+
+Quick estimates for labels and for taking trends off; `rigidsim analyse` has the digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_TURN = 2 * np.pi
+_UNIFORM = 0.1  # by which the rates of both halves of a run may differ: swings within a turn do so, too
+
+
+@dataclass(frozen=True)
+class Line:
+    """``at_start + rate * (t - t[0])``, the secular part of an angle."""
+
+    at_start: float
+    rate: float
+    start: float
+
+    def at(self, time: Array) -> Array:
+        """Its values (rows,)."""
+        return np.asarray(self.at_start + self.rate * (time - self.start))
+
+
+def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
+    """Straight line through an angle (rows,), weighted by a Hann window, which whole swings leave alone.
+
+    Args:
+        level: only the mean, without a rate.
+    """
+    finite = np.isfinite(angle)
+    t, y = time[finite], angle[finite]
+    if len(t) < 3 or t[-1] == t[0]:
+        return Line(float(y.mean()) if len(y) else 0.0, 0.0, float(time[0]) if len(time) else 0.0)
+    s = (t - t[0]) / (t[-1] - t[0])
+    weight = np.sin(np.pi * s) ** 2 * np.gradient(s)
+    weight /= weight.sum()
+    middle, mean = float(weight @ s), float(weight @ y)
+    slope = 0.0 if level else float(weight @ ((s - middle) * (y - mean)) / (weight @ (s - middle) ** 2))
+    rate = slope / (t[-1] - t[0])
+    return Line(mean - slope * middle + rate * (time[0] - t[0]), rate, float(time[0]))
+
+
+def circulation(time: Array, plane: Array) -> float | None:
+    """Mean rate, rad/s, at which a point of a plane (rows, 2) goes about the origin; counterclockwise > 0.
+
+    None where it doesn't, does so in less than one turn or ever faster or slower, or was sampled too sparsely
+    to tell.
+    """
+    finite = np.isfinite(plane).all(axis=1)
+    phase = np.arctan2(plane[finite, 1], plane[finite, 0])
+    steps = np.diff(phase)
+    steps -= _TURN * np.round(steps / _TURN)
+    if len(steps) < 4 or np.abs(steps).max() > 0.9 * np.pi:
+        return None
+    angle = np.concatenate([[0.0], np.cumsum(steps)])
+    if abs(angle[-1]) < 0.95 * _TURN:
+        return None
+    half = len(angle) // 2
+    rates = [secular(time[finite][part], angle[part]).rate for part in (slice(half), slice(half, None))]
+    if abs(rates[0] - rates[1]) > _UNIFORM * max(map(abs, rates)):
+        return None
+    return secular(time[finite], angle).rate or None
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """``forward exp(i w t) + backward exp(-i w t)`` about the time origin `start`; `rate` is w > 0, rad/s."""
+
+    forward: complex
+    backward: complex
+    rate: float
+    start: float
+
+    @property
+    def semi_axes(self) -> tuple[float, float]:
+        """The larger and the smaller."""
+        a, b = abs(self.forward), abs(self.backward)
+        return a + b, abs(a - b)
+
+    def curve(self, points: int = 181) -> Array:
+        """Once around it, (points, 2)."""
+        phase = np.exp(1j * np.linspace(0.0, _TURN, points))
+        z = self.forward * phase + self.backward / phase
+        return np.stack([z.real, z.imag], axis=1)
+
+
+def leading_ellipse(time: Array, plane: Array) -> Ellipse | None:
+    """The strongest periodic part of a point's motion in a plane (rows, 2), evenly sampled.
+
+    None where the strongest has less than 1.5 periods in the run, or there is none that stands out.
+    """
+    steps = np.diff(time)
+    if len(time) < 16 or not np.isfinite(plane).all() or np.ptp(steps) > 1e-3 * steps.mean():
+        return None
+    z = plane[:, 0] + 1j * plane[:, 1]
+    z = z - z.mean()
+    window = np.sin(np.pi * (np.arange(len(z)) + 0.5) / len(z)) ** 2
+    padded = 8 * len(z)
+    power = np.abs(np.fft.fft(z * window, padded)) ** 2
+    frequencies = np.fft.fftfreq(padded, steps.mean())
+    both = power[1 : padded // 2] + power[:0:-1][: padded // 2 - 1]
+    k = int(both.argmax()) + 1
+    span = time[-1] - time[0]
+    if abs(frequencies[k]) * span < 1.5 or k >= padded // 2 - 2:
+        return None
+    left, mid, right = np.log(both[k - 2 : k + 1] + 1e-300)
+    bend = left - 2 * mid + right
+    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
+    rate = _TURN * (k + float(np.clip(shift, -0.5, 0.5))) / (padded * steps.mean())
+    wave = np.exp(1j * rate * (time - time[0]))
+    basis = np.stack([np.ones_like(wave), wave, wave.conj()], axis=1)
+    found, *_ = np.linalg.lstsq(basis, z, rcond=None)
+    return Ellipse(complex(found[1]), complex(found[2]), float(rate), float(time[0]))

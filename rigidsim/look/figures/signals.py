@@ -1,0 +1,202 @@
+"""What figures show of a dataset: recorded by name, else worked out from attitude and rates.
+
+All take a dataset in memory and give float64 arrays over its rows, or None where it can't be told.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.page import read_config
+from rigidsim.look.solids import rotation_matrix
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+
+NEAR_AXIS = 0.35
+"""Largest polar motion, rad, that is shown as such: beyond, the body tumbles."""
+_ALIKE = 1e-9  # moments nearer than this are one
+_STEADY = 1e-6  # a momentum that turns by less is fixed
+
+
+def values(dataset: xarray.Dataset, name: str) -> Array | None:
+    """A variable along time, time first; None where it wasn't recorded."""
+    if name not in dataset or "time" not in dataset[name].dims:
+        return None
+    return np.asarray(dataset[name].transpose("time", ...).values, dtype=np.float64)
+
+
+def seconds(dataset: xarray.Dataset) -> Array:
+    """Sample times (rows,), s."""
+    return np.asarray(dataset["time"].values, dtype=np.float64)
+
+
+def moments(dataset: xarray.Dataset) -> Array | None:
+    """Principal moments (3,), kg m^2."""
+    found = _attribute(dataset, "principal_moments")
+    return found if found is not None and found.shape == (3,) and (found > 0).all() else None
+
+
+def principal_axes(dataset: xarray.Dataset) -> Array:
+    """Principal axes as rows (3, 3), in body axes, in the order of the moments; right-handed."""
+    found = _attribute(dataset, "principal_axes")
+    return found if found is not None and found.shape == (3, 3) else np.eye(3)
+
+
+def principal_rates(dataset: xarray.Dataset) -> Array | None:
+    """Angular velocity (rows, 3) along the principal axes, rad/s."""
+    rates = values(dataset, "angular_velocity")
+    return None if rates is None else rates @ principal_axes(dataset).T
+
+
+def axis_names(dataset: xarray.Dataset) -> list[str]:
+    """The principal axes as body axes are called, or 1, 2, 3 where they aren't body axes."""
+    axes = principal_axes(dataset)
+    order = np.abs(axes).argmax(axis=1)
+    along = np.abs(np.abs(axes).max(axis=1) - 1) < 1e-9
+    return ["xyz"[k] for k in order] if along.all() else ["1", "2", "3"]
+
+
+def polar_motion(dataset: xarray.Dataset) -> Array | None:
+    """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None where the spin leaves it.
+
+    Recorded ones as they are. Else components of the rates across the principal axis about which the body
+    spins, over that along it.
+    """
+    recorded = values(dataset, "polar_motion")
+    if recorded is not None and recorded.shape[1:] == (2,) and np.isfinite(recorded).any():
+        return recorded
+    rates = principal_rates(dataset)
+    if rates is None or moments(dataset) is None:
+        return None
+    rates = rates[np.isfinite(rates).all(axis=1)]
+    if not len(rates):
+        return None
+    k = int(np.abs(rates).mean(axis=0).argmax())
+    if not (np.abs(rates[:, k]) > 0).all() or np.ptp(np.sign(rates[:, k])):
+        return None
+    full = principal_rates(dataset)
+    assert full is not None
+    across = full[:, [(k + 1) % 3, (k + 2) % 3]]
+    return across / full[:, [k]]
+
+
+def near_axis(dataset: xarray.Dataset) -> bool:
+    """Whether the body spins about its figure axis but for a little, so that polar motion is what is seen."""
+    motion = polar_motion(dataset)
+    if motion is None:
+        return False
+    size = np.linalg.norm(motion, axis=1)
+    return bool(0 < np.nanmax(size) < NEAR_AXIS)
+
+
+def figure_direction(dataset: xarray.Dataset) -> Array:
+    """Unit vector (3,) of the figure axis in body axes: of symmetry, else of the largest moment."""
+    said = _attribute(dataset, "figure_axis_direction")
+    if said is not None and said.shape == (3,):
+        return said
+    found = moments(dataset)
+    if found is None:
+        return np.array([0.0, 0.0, 1.0])
+    axes = principal_axes(dataset)
+    return np.asarray(axes[figure_index(found)])
+
+
+def figure_index(found: Array) -> int:
+    """Which principal axis is the figure axis."""
+    for k in range(3):
+        a, b = found[(k + 1) % 3], found[(k + 2) % 3]
+        if abs(a - b) <= _ALIKE * max(a, b) and abs(found[k] - a) > _ALIKE * a:
+            return k
+    return int(found.argmax())
+
+
+def body_direction(dataset: xarray.Dataset, direction: Array) -> Array | None:
+    """A direction fixed to the body, (rows, 3) in space."""
+    quaternion = values(dataset, "quaternion")
+    return None if quaternion is None else np.asarray(rotation_matrix(quaternion) @ direction)
+
+
+def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
+    """Unit vectors (rows, 3), space axes, of the axis named figure, spin or momentum."""
+    recorded = values(dataset, f"{axis}_axis")
+    if recorded is not None:
+        return recorded
+    if axis == "figure":
+        return body_direction(dataset, figure_direction(dataset))
+    if axis == "momentum":
+        momentum = values(dataset, "angular_momentum")
+        return None if momentum is None else _unit(momentum)
+    rates, quaternion = values(dataset, "angular_velocity"), values(dataset, "quaternion")
+    if rates is None or quaternion is None:
+        return None
+    return _unit(np.einsum("tij,tj->ti", rotation_matrix(quaternion), rates))
+
+
+def steady_momentum(dataset: xarray.Dataset) -> Array | None:
+    """Direction (3,) of the momentum where it stays put in space, else None."""
+    directions = pole(dataset, "momentum")
+    if directions is None:
+        return None
+    directions = directions[np.isfinite(directions).all(axis=1)]
+    if not len(directions) or np.linalg.norm(directions - directions[0], axis=1).max() > _STEADY:
+        return None
+    return np.asarray(directions.mean(axis=0) / np.linalg.norm(directions.mean(axis=0)))
+
+
+def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | None:
+    """Obliquity and node longitude (rows,) each, rad, of the axis named figure, spin or momentum.
+
+    As recorded; else against the XY plane of space, the longitude of the ascending node made continuous.
+    """
+    obliquity, node = dataset.get("obliquity"), dataset.get("node_longitude")
+    if obliquity is not None and node is not None and "axis" in obliquity.coords:
+        if axis not in obliquity["axis"].values:
+            return None
+        pair = [np.asarray(v.sel(axis=axis).values, dtype=np.float64) for v in (obliquity, node)]
+        return pair[0], pair[1]
+    directions = pole(dataset, axis)
+    if directions is None:
+        return None
+    x, y, z = directions.T
+    tilt = np.arctan2(np.hypot(x, y), z)
+    longitude = np.arctan2(x, -y)
+    finite = np.isfinite(longitude)
+    longitude[finite] = np.unwrap(longitude[finite])
+    return tilt, longitude
+
+
+def load_kinds(dataset: xarray.Dataset) -> list[str]:
+    """The kinds of the scene's loads, from the embedded config."""
+    loads: Any = read_config(dataset).get("loads", [])
+    return [str(load.get("kind")) for load in loads if isinstance(load, dict)]
+
+
+def vertical(dataset: xarray.Dataset) -> Array:
+    """Unit vector (3,) against a uniform gravity; Z where the config names no other direction in numbers."""
+    for load in read_config(dataset).get("loads", []):
+        if isinstance(load, dict) and load.get("kind") == "uniform_gravity" and "acceleration" in load:
+            try:
+                pull = np.array([float(str(x).split()[0]) for x in load["acceleration"]])
+            except (ValueError, IndexError, TypeError):
+                break
+            if np.linalg.norm(pull) > 0:
+                return np.asarray(-pull / np.linalg.norm(pull))
+    return np.array([0.0, 0.0, 1.0])
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _attribute(dataset: xarray.Dataset, name: str) -> Array | None:
+    try:
+        return np.array(json.loads(str(dataset.attrs[name])), dtype=float)
+    except (KeyError, ValueError, TypeError):
+        return None

@@ -1,0 +1,268 @@
+"""How figures look: colours, fonts, the empty page with its heading, and curves with their key.
+
+Imports no matplotlib until a figure is made.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.page import read_config, title_of
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+X, Y, Z = "#d1495b", "#3a9a5b", "#2f6fbf"
+BLUE, ORANGE, VIOLET, TEAL, PINK = "#2f6fbf", "#d9822b", "#8f5bb5", "#17a2b0", "#c2327a"
+INK, GREY, PALE = "#1b2733", "#6b7280", "#c3cbd5"
+START = "#0d0887"
+PALETTE = (BLUE, ORANGE, VIOLET, Y, X, TEAL, "#8c6d46", GREY)
+
+MOST_VECTOR_POINTS = 6000  # of a curve in an SVG; longer ones become pixels there
+IN_PLANE, OVER_TIME = 0.4, 0.8
+"""Radii between neighbours up to which samples are joined by lines: some sixteen and eight samples a turn."""
+_KEY_ROW = 12.4  # height of a row of a key, points
+_KEY_LETTER, _TITLE_LETTER = 4.9, 6.1  # mean widths of a letter, points
+_HEADING = (0.34, 0.26)  # inches of the page's two heading lines
+
+STYLE: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlecolor": INK,
+    "axes.titlepad": 7.0,
+    "axes.labelcolor": "#333333",
+    "axes.edgecolor": "#9aa0a6",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    "grid.color": "#e4e7eb",
+    "grid.linewidth": 0.7,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "lines.solid_capstyle": "round",
+    "mathtext.fontset": "dejavusans",
+    "svg.fonttype": "path",
+    "savefig.facecolor": "white",
+}
+
+
+def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
+    """An empty page with the run's name and description above.
+
+    Args:
+        width: of the page, inches.
+        height: of what stands below the heading, inches.
+    """
+    # The object-oriented interface: no pyplot, no state that outlives the call.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    description = " ".join(str(read_config(dataset).get("description", "")).split())
+    title = title_of(dataset)
+    if description == title:
+        description = ""
+    top = _HEADING[0] + (_HEADING[1] if description else 0.0) + 0.08
+    whole = height + top
+    engine = ConstrainedLayoutEngine(h_pad=0.09, w_pad=0.09, rect=(0.0, 0.0, 1.0, 1.0 - top / whole))
+    figure = Figure(figsize=(width, whole), layout=engine)
+    FigureCanvasAgg(figure)
+    left = 0.14 / width
+    first = figure.text(
+        left, 1 - 0.12 / whole, title, va="top", fontsize=13.5, fontweight="bold", color=INK, gid="heading"
+    )
+    _shorten(figure, first, title, width)
+    if description:
+        second = figure.text(
+            left, 1 - (_HEADING[0] + 0.07) / whole, description, va="top", fontsize=10, color=GREY,
+            gid="heading",
+        )  # fmt: skip
+        _shorten(figure, second, description, width)
+    return figure
+
+
+def _shorten(figure: Figure, text: Any, words: str, width: float) -> None:
+    room = (width - 0.28) * figure.dpi
+    characters = len(words)
+    while characters > 12 and text.get_window_extent().width > room:
+        characters = min(characters - 2, int(characters * room / text.get_window_extent().width) + 1)
+        text.set_text(textwrap.shorten(words, characters, placeholder=" …") or words[:characters] + "…")
+
+
+def titled(axes: Axes, title: str, *, rows: int = 0) -> None:
+    """A panel's title, in as many lines as its width asks for, with room below for a key of so many rows."""
+    text = textwrap.fill(title, max(int(_room(axes) / _TITLE_LETTER), 20))
+    axes.set_title(text, pad=7.0 + (3.0 + rows * _KEY_ROW if rows else 0.0))
+
+
+def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None:
+    """The title, and between it and the panel the key to its curves: nothing is covered, however many.
+
+    Args:
+        handles: of the entries; by default all curves with a label.
+    """
+    found = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
+    labels = [str(handle.get_label()) for handle in found]
+    if not found:
+        titled(axes, title)
+        return
+    widths = [len(re.sub(r"[${}_\\]", "", label)) * _KEY_LETTER + 24.0 for label in labels]
+    fits = len(found) if sum(widths) <= _room(axes) else int(_room(axes) // max(widths))
+    columns = max(1, min(len(found), fits))
+    titled(axes, title, rows=-(-len(found) // columns))
+    legend = axes.legend(
+        handles=found, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1,
+        borderpad=0.15, handlelength=1.2, columnspacing=1.2, handletextpad=0.5, labelspacing=0.25,
+    )  # fmt: skip
+    for line in legend.get_lines():
+        line.set(linewidth=1.8, alpha=1.0)
+
+
+def _room(axes: Axes) -> float:
+    """Width of a panel, about, in points: before the page is laid out."""
+    return float(axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi * 72.0 * 1.1)
+
+
+def joined(values: Array, reach: float = IN_PLANE) -> bool:
+    """Whether samples (rows,) or (rows, n) lie close enough that lines between them show the motion.
+
+    Where a quantity swings faster than it was sampled, lines would draw a pattern that isn't there.
+
+    Args:
+        reach: largest distance of neighbours, in radii of the whole.
+    """
+    if len(values) < 3:
+        return True
+    table = values.reshape(len(values), -1)
+    table = table[np.isfinite(table).all(axis=1)]
+    if len(table) < 3:
+        return True
+    chords = np.linalg.norm(np.diff(table, axis=0), axis=1)
+    radius = float(np.linalg.norm(table - table.mean(axis=0), axis=1).max())
+    return float(np.percentile(chords, 95)) <= reach * radius or radius == 0.0
+
+
+def curve(axes: Axes, x: Array, y: Array, *, in_plane: bool = False, **style: Any) -> None:
+    """A curve where the samples allow one, else its samples as points.
+
+    Long ones are drawn as pixels in an SVG, which otherwise would weigh megabytes.
+
+    Args:
+        in_plane: whether both coordinates move, and neither is the time.
+    """
+    style.setdefault("rasterized", len(x) > MOST_VECTOR_POINTS)
+    whole = joined(np.stack([x, y], axis=1)) if in_plane else joined(y, OVER_TIME)
+    if not whole:
+        size = float(np.clip(9000 / max(len(x), 1), 2.0, 4.0))
+        style |= {"linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0.0}
+    axes.plot(x, y, **style)
+
+
+def trace(axes: Axes, x: Array, y: Array) -> None:
+    """A path in a plane: of many turns about the origin the first stand out, else coloured by time.
+
+    The start is marked. Turns that stand out and the others have a label each.
+    """
+    from matplotlib import colormaps
+    from matplotlib.collections import LineCollection
+
+    points = np.stack([x, y], axis=1)
+    many = len(x) > MOST_VECTOR_POINTS
+    axes.plot(x[0], y[0], "o", color=START, ms=4.5, zorder=5)
+    if not joined(points):
+        size = float(np.clip(9000 / max(len(x), 1), 1.2, 12.0))
+        axes.scatter(
+            x,
+            y,
+            c=np.linspace(0.0, 0.86, len(x)),
+            cmap="plasma",
+            vmin=0,
+            vmax=1,
+            s=size,
+            lw=0,
+            rasterized=many,
+        )
+        return
+    first, label = _first_turns(points)
+    if first:
+        rest = "the rest" if label else None
+        axes.plot(x[:first], y[:first], color=BLUE, lw=1.5, zorder=3, label=label or None)
+        axes.plot(x[first - 1 :], y[first - 1 :], color=PALE, lw=0.8, label=rest, rasterized=many)
+        return
+    # In pieces of one colour: a line per sample would be tens of thousands of objects.
+    pieces = min(200, max(len(x) - 1, 1))
+    edges = np.linspace(0, len(x) - 1, pieces + 1).astype(int)
+    parts = [points[a : b + 1] for a, b in itertools.pairwise(edges)]
+    hues = colormaps["plasma"](np.linspace(0.0, 0.86, pieces))
+    axes.add_collection(LineCollection(parts, colors=hues, linewidths=1.4, rasterized=many))
+
+
+def _first_turns(points: Array) -> tuple[int, str]:
+    """Rows of the first turns about the origin, and what to call them; 0 rows where there are few in all."""
+    if not np.isfinite(points).all():
+        return 0, ""
+    angle = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    turns = abs(angle[-1] - angle[0]) / (2 * np.pi)
+    if turns < 1.6:
+        return 0, ""
+    count = 1 if turns < 15 else 3
+    rows = int(np.flatnonzero(np.abs(angle - angle[0]) > 2 * np.pi * count)[0]) + 1
+    radius = np.hypot(*points.T)
+    if radius[:rows].max() < 0.6 * radius.max():  # it spirals out of the centre
+        return len(points) // 5 + 2, "first fifth"
+    if np.ptp(radius) < 1e-3 * radius.max():  # all turns are one circle
+        return rows, ""
+    return rows, "first turn" if count == 1 else f"first {count} turns"
+
+
+def square(axes: Axes, x: Array, y: Array, *, margin: float = 0.08) -> None:
+    """Equal scales on both axes, about all finite points (x, y)."""
+    from matplotlib.ticker import MaxNLocator
+
+    ends = []
+    for values in (x, y):
+        finite = values[np.isfinite(values)]
+        ends.append((float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0))
+    reach = max(high - low for low, high in ends) / 2
+    middle = [(low + high) / 2 for low, high in ends]
+    size = max(map(abs, middle), default=0.0)
+    reach = max(reach, 1e-12 * size) or 1.0
+    reach *= 1 + 2 * margin
+    axes.set_xlim(middle[0] - reach, middle[0] + reach)
+    axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    axes.set_aspect("equal", adjustable="box")
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
+
+
+def note(axes: Axes, x: float, y: float, text: str, **style: Any) -> Any:
+    """A remark in a panel, at a place given as parts of it, on a ground that keeps it readable."""
+    ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "boxstyle": "round,pad=0.2"}
+    options: dict[str, Any] = {
+        "ha": "center", "va": "center", "fontsize": 9.5, "color": INK, "zorder": 8, "bbox": ground,
+        "transform": axes.transAxes,
+    }  # fmt: skip
+    return axes.text(x, y, text, **(options | style))
