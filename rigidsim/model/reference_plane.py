@@ -94,14 +94,33 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
     if load.orbit is not None:
         orbit = load.orbit
         described = "plane of the source's orbit"
-        sine, cosine = context.sin(orbit.inclination), context.cos(orbit.inclination)
         if orbit.node_rate == 0:
-            node = orbit.ascending_node
-            return _fixed(m, [sine * context.sin(node), -sine * context.cos(node), cosine], described)
+            return _fixed(m, _normal_of(context, orbit.inclination, orbit.ascending_node), described)
         return _moving(m.orbit(orbit).normal, described + ", whose node moves")
     if load.attracting_point is not None:
         return _moving(_flight_normal(m, load.attracting_point), "osculating plane of the body's own orbit")
     return _moving(_ecliptic_of_date(m), "mean ecliptic of date (IAU 2006)")
+
+
+def initial_normal(scene: Scene, loads: Sequence[Any]) -> Vector:
+    """About where the normal points at the start (mpf, space axes), not of unit length."""
+    context = scene.context
+    if scene.reference is not None:
+        return scene.reference
+    load = _source(scene, loads)
+    if load.orbit is not None:
+        orbit = load.orbit
+        node = orbit.ascending_node + orbit.node_rate * scene.start
+        return _normal_of(context, orbit.inclination, node)
+    if load.attracting_point is not None and scene.position is not None and scene.velocity is not None:
+        offset = [x - a for x, a in zip(scene.position, load.attracting_point, strict=True)]
+        return cross(offset, scene.velocity)
+    return [context.zero, context.zero, context.one]
+
+
+def _normal_of(context: Any, inclination: Any, node: Any) -> Vector:
+    sine, cosine = context.sin(inclination), context.cos(inclination)
+    return [sine * context.sin(node), -sine * context.cos(node), cosine]
 
 
 def _source(scene: Scene, loads: Sequence[Any]) -> Any:

@@ -25,25 +25,15 @@ from rigidsim.model.observables.observable import (
     only_when_named,
     same_unit,
 )
+from rigidsim.model.observables.scene_subject import is_planet
+from rigidsim.model.observables.vectors import figure_told, in_body, plane_told, unit
 from rigidsim.model.reference_plane import reference_plane
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.registry import register_observable
 from rigidsim.scene.space_axes import ECLIPTIC, OBLIQUITY
 
 AXIS = ("axis",)
-
-
-def in_body(m: Mechanics, direction: Vector) -> list[Symbolic]:
-    """A fixed direction (mpf, body axes) as expressions."""
-    return [as_factor(m.number(x)) for x in direction]
-
-
-def unit(vector: list[Symbolic]) -> list[Symbolic]:
-    """Divided by its length; NaN for zero."""
-    size = hy.sqrt(hy.sum([x * x for x in vector]))
-    return [x / size for x in vector]
 
 
 def figure_axis(m: Mechanics) -> list[Symbolic]:
@@ -116,17 +106,6 @@ def _declinations(m: Mechanics) -> list[Symbolic]:
 # --- what readers are told ----------------------------------------------------------------------------------
 
 
-def figure_told(m: Mechanics) -> dict[str, str]:
-    """Which axis the figure axis is."""
-    pole = ", ".join(m.scene.context.nstr(x, 17) for x in m.scene.figure.pole)
-    return {"figure_axis": f"{m.scene.figure.described}: [{pole}] in body axes"}
-
-
-def plane_told(m: Mechanics) -> dict[str, str]:
-    """Which plane angles count from."""
-    return {"reference_plane": reference_plane(m).described}
-
-
 def _told(
     convention: str, *, figure: bool = False, plane: bool = False
 ) -> Callable[[Mechanics], Mapping[str, str]]:
@@ -153,7 +132,7 @@ _AT_REST = "unit vector; NaN where the body is at rest"
 _OBSERVABLES: tuple[Observable, ...] = (
     Observable(
         "figure_axis", SPACE, "1", "direction of the figure axis", figure_axis, same_unit(NO_UNIT, 3),
-        "space axes", ("attitude",), by_default=only_when_named,
+        "space axes", ("attitude",), by_default=is_planet,
         attributes=_told("unit vector", figure=True),
     ),
     Observable(
@@ -177,13 +156,13 @@ _OBSERVABLES: tuple[Observable, ...] = (
     ),
     Observable(
         "obliquity", AXIS, "rad", "obliquity of the figure, spin and momentum axes", obliquities,
-        same_unit(NO_UNIT, 3), "space axes", ("attitude", "plane"), by_default=only_when_named,
+        same_unit(NO_UNIT, 3), "space axes", ("attitude", "plane"), by_default=is_planet,
         attributes=_told("angle from the reference plane's normal, 0 to pi", figure=True, plane=True),
     ),
     continuous_angles(
         "node_longitude", AXIS,
         "longitude of the node of the equator of the figure, spin and momentum axes", node_longitudes,
-        frame="space axes", needs=("attitude", "plane"),
+        frame="space axes", needs=("attitude", "plane"), by_default=is_planet,
         attributes=_told(
             "where the equator whose pole is the axis rises through the reference plane, from X turned by "
             "the smallest rotation that takes Z to the normal, in the direct sense; turns counted; NaN where "

@@ -1,0 +1,46 @@
+"""What a scene is about, as far as that decides what is recorded where a config names nothing.
+
+A planet that precesses has directions and their angles; one that turns nearly about its figure axis has polar
+motion, wobble and a rotation angle. Tops and tumbling bodies have neither by default.
+"""
+
+from __future__ import annotations
+
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.scaling import source_rate
+from rigidsim.scene.arithmetic import apply, cross, dot, norm
+
+_AXIAL = 0.1
+"""Angle (rad) between spin and figure axis up to which a body turns nearly about it."""
+_FAST = 10
+"""Times that a planet's spin is faster than its sources: below that it librates or tumbles with them."""
+
+
+def _turns_about_its_figure(m: Mechanics) -> bool:
+    """Whether the body starts nearly about its figure axis: that of largest moment, or of symmetry."""
+    scene, context = m.scene, m.scene.context
+    spin, pole = scene.angular_velocity, scene.figure.pole
+    if all(w == 0 for w in spin):
+        return False
+    aligned, across = abs(dot(spin, pole)), norm(context, cross(pole, spin))
+    turned = apply(scene.body.inertia, pole)
+    principal = norm(context, cross(turned, pole)) <= norm(context, turned) * 1e-12
+    return bool(across <= _AXIAL * aligned) and principal
+
+
+def is_planet(m: Mechanics) -> bool:
+    """Whether a fast spin precesses under the gravity gradient of a body on an orbit, or of an ephemeris."""
+    if m.attitude is None or not m.turning:
+        return False
+    distant = [x for x in m.turning if x.orbit is not None or getattr(x, "ephemeris", None) is not None]
+    fast = norm(m.scene.context, m.scene.angular_velocity) >= _FAST * source_rate(m.scene)
+    return len(distant) == len(m.turning) and bool(fast) and _turns_about_its_figure(m)
+
+
+def is_nearly_axial(m: Mechanics) -> bool:
+    """Whether a body free of torques, or a planet, turns nearly but not just about its figure axis."""
+    if m.torque and not is_planet(m):
+        return False
+    scene, pole = m.scene, m.scene.figure.pole
+    wobbles = norm(scene.context, cross(pole, scene.angular_velocity)) != 0
+    return _turns_about_its_figure(m) and (bool(wobbles) or bool(m.torque))
