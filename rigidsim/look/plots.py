@@ -87,7 +87,7 @@ def plan_plots(dataset: xarray.Dataset) -> list[Plot]:
         elif vector:
             # The name, not the long name: it is short, and what the user meets in the dataset.
             key, place = name, _place(name)
-            lost = name == "euler_angles" and "angles_wrapped_from" in dataset.attrs
+            lost = "angle" in variable.attrs and "angles_wrapped_from" in dataset.attrs
             title = _with_unit(name.replace("_", " ") + (" within one turn" if lost else ""), unit)
         else:
             key, place = f"scalars {unit}", "more"

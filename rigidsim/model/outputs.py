@@ -12,7 +12,7 @@ import rigidsim.model.partial_invariants  # noqa: F401  (enters what it defines 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder
-from rigidsim.model.observables import Observable
+from rigidsim.model.observables import Observable, Steady
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.registry import OBSERVABLES
 
@@ -28,6 +28,7 @@ class Recorded:
             "unwrap" (angles that are functions of the state), "parity" and "nearest" (quaternion signs).
         squared_sizes: of angles that are functions of the state what vanishes where each is undefined; none
             for Euler angles, whose middle one tells it.
+        steady: how these angles advance between samples, where that is known.
         attributes: beside units, long name and frame.
     """
 
@@ -42,6 +43,7 @@ class Recorded:
     invariant: bool
     continuity: str = ""
     squared_sizes: list[Symbolic] = field(default_factory=list)
+    steady: Steady | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -103,6 +105,7 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
                 observable.conserved(m) is not None,
                 observable.continuity(m),
                 [] if observable.angles is None else [x.squared_size for x in observable.angles(m)],
+                observable.steady(m),
                 observable.attributes(m),
             )
         )

@@ -37,6 +37,7 @@ _ARCSEC = ExactNumber(Fraction(1, 3600 * 180), pi_power=1)
 _P = ("4.199094", "0.1939873", "-0.00022466", "-0.000000912", "0.0000000120")
 _Q = ("-46.811015", "0.0510283", "0.00052413", "-0.000000646", "-0.0000000172")
 """Arcseconds by powers of centuries (TDB) from J2000, the first on."""
+_ECLIPTIC_DRIFT = 1e-12  # rad/s; 0.47 arcsec a year are 7e-14
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,16 @@ def initial_normal(scene: Scene, loads: Sequence[Any]) -> Vector:
         offset = [x - a for x, a in zip(scene.position, load.attracting_point, strict=True)]
         return cross(offset, scene.velocity)
     return [context.zero, context.zero, context.one]
+
+
+def plane_drift(scene: Scene, loads: Sequence[Any]) -> Any | None:
+    """Bound of the rate (rad/s) at which the plane turns; None where none is known."""
+    if scene.reference is not None:
+        return scene.context.zero
+    load = _source(scene, loads)
+    if load.orbit is not None:
+        return abs(load.orbit.node_rate)
+    return None if load.attracting_point is not None else scene.context.mpf(_ECLIPTIC_DRIFT)
 
 
 def _normal_of(context: Any, inclination: Any, node: Any) -> Vector:

@@ -131,11 +131,13 @@ class Diagnostics:
         joined = [r.name for r in system.recorded if r.continuity == "nearest"]
         lost = self.statistics.angles_wrapped_from
         if not math.isnan(lost):
-            names = " and ".join(r.name for r in system.recorded if r.continuity == "unwrap")
+            names = [r.name for r in system.recorded if r.continuity == "unwrap"]
+            carried = names == ["euler_angles"]
+            other = ', or choose formulation = "euler_angles", which carries them' if carried else ""
             yield Caution(
                 WarningCode.NOT_JOINED,
-                f"the turns of {names} aren't known from {lost:.6g} s on, where they are recorded within one "
-                'turn; sample more often, or choose formulation = "euler_angles", which carries them',
+                f"the turns of {' and '.join(names)} aren't known from {lost:.6g} s on, where they are "
+                f"recorded within one turn; sample more often{other}",
             )
         if joined and turns > 1:
             yield Caution(

@@ -127,7 +127,8 @@ class Evaluator:
     Attributes:
         initial: initial values of the invariants' components, in internal units.
         continuity: to the next block.
-        sparse: whether there are angles whose turns the samples are too sparse to tell.
+        sparse: whether there are angles that are followed, since the samples are too sparse to tell turns.
+        dense: whether the samples tell the turns of all angles.
 
     Args:
         countable: whether the motion between such samples can be followed.
@@ -147,7 +148,7 @@ class Evaluator:
         self._parameters = len(components)
         self._angles = JoinedAngles(system, self._compile, wrapping, precision=precision, countable=countable)
         self.continuity = self._angles.first()
-        self.sparse = self._angles.sparse
+        self.sparse, self.dense = self._angles.sparse, self._angles.dense
         factor = system.singular_factor
         self._singular = None if factor is None else self._compile([factor])
 
@@ -217,7 +218,7 @@ class Evaluator:
         angles that aren't states are within one turn where samples are too sparse to tell their turns.
         """
         before = copy.deepcopy(self.continuity)
-        if self.sparse:
+        if not self._angles.dense:
             self.continuity.wrapped_from = -math.inf
         try:
             return self.evaluate(block)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import heyoka as hy
@@ -14,8 +14,10 @@ from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.followed_system import FollowedSystem
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.steady_angles import SteadyAngles, advances_steadily
 from rigidsim.solve.turn_count import Place, TurnCounter, angles_to_join, doubtful_rows, is_sparse, nearest
 
 UNDEFINED = 16.0
@@ -48,8 +50,12 @@ class Continuity:
 class JoinedAngles:
     """The angles of a system that are joined.
 
+    Between dense samples they take the nearest way. Between sparse ones they advance steadily, where that is
+    known (``rigidsim.model.observables.steadiness``), and are followed along the motion elsewhere.
+
     Attributes:
-        sparse: whether the samples are too sparse to tell turns.
+        dense: whether the samples tell all turns.
+        sparse: whether there are angles that are followed, since the samples are too sparse to tell turns.
         columns: of the system's outputs, one for each angle.
 
     Args:
@@ -69,9 +75,18 @@ class JoinedAngles:
     ) -> None:
         self.variables = angles_to_join(system)
         self.columns = [r.first + i for r in self.variables for i in range(r.count)]
-        self.sparse = bool(self.variables) and is_sparse(system)
         self._system, self._wrapping = system, wrapping
-        self._counter = TurnCounter(system, self.variables) if self.variables and countable else None
+        self.dense = not self.variables or not is_sparse(system)
+        steady = [] if self.dense else [r for r in self.variables if advances_steadily(system, r)]
+        self._others = [r for r in self.variables if r not in steady]
+        self.sparse = bool(self._others) and not self.dense
+        self._followed = FollowedSystem(system)
+        followed = self._followed.system
+        countable = countable and followed is not None
+        followed = followed or system
+        self._steady = SteadyAngles(followed, steady) if steady else None
+        self._counter = TurnCounter(followed, self._others) if self._others and countable else None
+        self._way = TurnCounter(followed, steady) if steady and countable else None
         sizes = [size for r in self.variables for size in r.squared_sizes]
         self.sizes = compiled(sizes) if sizes else None
         self._least = (UNDEFINED * float(precision.epsilon)) ** 2
@@ -104,18 +119,24 @@ class JoinedAngles:
             angles: without turns.
             sizes: squared, of those that have one, (their number, n).
         """
-        size = self._all_sizes(sizes, len(angles))
-        lost = (size < self._least) | ~np.isfinite(size)
+        squared = self._all_sizes(sizes, len(angles))
+        lost = (squared < self._least) | ~np.isfinite(squared)
         if lost.any():
             angles = angles.copy()
             angles[lost] = self._zero  # no direction
-        if self.sparse:
-            turns, known = self._counted(known, angles, samples)
+        plain, size = angles.astype(np.float64), np.sqrt(squared)
+        times, states = samples.times.astype(np.float64), self._followed.states(samples)
+        block = _Block(times, states, plain, size)
+        if self.dense:
+            turns = known.turns[: len(self.columns)] + np.cumsum(self._nearest(known, block), axis=0)
+            wrapped_from = known.wrapped_from
         else:
-            turns, known = self._unwrapped(known, angles, np.sqrt(size), samples)
+            turns, wrapped_from = self._sparse_turns(known, block)
         found = self._wrapping.unwrapped(angles, turns)
-        if lost.any():
-            found[lost] = self._undefined
+        found[lost] = self._undefined
+        known = replace(known, turns=turns[-1], last_angles=plain[-1], wrapped_from=wrapped_from)
+        if not self.dense or self._counter is not None:
+            known = replace(known, last_time=float(times[-1]), last_state=states[-1])
         return found, known
 
     def follow(self, known: Continuity, time: float) -> None:
@@ -124,8 +145,9 @@ class JoinedAngles:
         Args:
             time: internal units.
         """
-        if self._counter is not None and (latest := _latest(known)) is not None:
-            self._counter.begin(latest)
+        latest = _latest(known)
+        if self._counter is not None and latest is not None and math.isnan(known.wrapped_from):
+            self._counter.begin(_of(latest, self._columns_of(self._others)))
             self._counter.follow(time)
 
     def _all_sizes(self, sizes: np.ndarray | None, count: int) -> np.ndarray:
@@ -142,6 +164,11 @@ class JoinedAngles:
                 place += variable.count
         return found
 
+    def _columns_of(self, variables: Sequence[Recorded]) -> np.ndarray:
+        """Where their angles are among the joined ones."""
+        all_of = np.arange(len(self.columns))
+        return np.concatenate([all_of[:0], *(all_of[self.part(r)] for r in variables)])
+
     def _doubtful(self, jumps: np.ndarray, angles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """Rows whose turns dense samples don't tell, since an angle is near its pole."""
         found: set[int] = set()
@@ -155,55 +182,106 @@ class JoinedAngles:
             found |= set(rows.tolist())
         return np.array(sorted(found), dtype=np.int64)
 
-    def _unwrapped(
-        self, known: Continuity, block: np.ndarray, sizes: np.ndarray, samples: SampleBlock
-    ) -> tuple[np.ndarray, Continuity]:
-        """The full turns that make each angle nearest to the sample before, but for those near a pole, whose
-        way is followed.
+    def _nearest(self, known: Continuity, block: _Block) -> np.ndarray:
+        """The full turns (n, angles) from row to row that make each angle nearest to the sample before, but
+        for those near a pole, whose way is followed.
         """
-        plain = block.astype(np.float64)
-        before = plain[0] if known.last_angles is None else known.last_angles
-        angles = np.vstack([before, plain])
+        before = block.angles[0] if known.last_angles is None else known.last_angles
+        angles = np.vstack([before, block.angles])
         made = -np.rint(np.diff(angles, axis=0) / (2 * np.pi)).astype(np.int64)
-        if self._counter is not None:
-            jumps = nearest(np.diff(angles, axis=0))
-            times, states = samples.times.astype(np.float64), samples.states.astype(np.float64)
-            for row in self._doubtful(jumps, angles, sizes):
-                latest = Place(times[row - 1], states[row - 1], plain[row - 1]) if row else _latest(known)
-                if latest is not None:
-                    self._counter.begin(latest)
-                    found = self._counter.turns(Place(times[row], states[row], plain[row]))
-                    made[row] = made[row] if found is None else found
-            known = replace(known, last_time=float(times[-1]), last_state=states[-1])
-        turns = known.turns[: plain.shape[1]] + np.cumsum(made, axis=0)
-        return turns, replace(known, turns=turns[-1], last_angles=plain[-1])
+        if self._counter is None:
+            return made
+        jumps = nearest(np.diff(angles, axis=0))
+        for row in self._doubtful(jumps, angles, block.sizes):
+            latest = block.place(row - 1) if row else _latest(known)
+            if latest is not None:
+                self._counter.begin(latest)
+                found = self._counter.turns(block.place(row))
+                made[row] = made[row] if found is None else found
+        return made
 
-    def _counted(
-        self, known: Continuity, block: np.ndarray, samples: SampleBlock
-    ) -> tuple[np.ndarray, Continuity]:
-        """The full turns that the motion from each sample to the next makes; none once they are lost."""
-        plain, turns = block.astype(np.float64), np.zeros(block.shape, dtype=np.int64)
-        times, states = samples.times.astype(np.float64), samples.states.astype(np.float64)
-        for row, (time, state, angles) in enumerate(zip(times.tolist(), states, plain, strict=True)):
-            latest, here = _latest(known), Place(time, state, angles)
-            if not math.isnan(known.wrapped_from):
+    def _sparse_turns(self, known: Continuity, block: _Block) -> tuple[np.ndarray, float]:
+        """The full turns (n, angles) of each row, and from when on those that are followed are lost."""
+        turns = np.zeros(block.angles.shape, dtype=np.int64)
+        wrapped_from = known.wrapped_from
+        others, steady = self._columns_of(self._others), self._columns_of(self._steady_variables)
+        if len(others):
+            turns[:, others], wrapped_from = self._counted(known, block, others)
+        if self._steady is not None and known.wrapped_from != -math.inf:
+            turns[:, steady] = known.turns[steady] + np.cumsum(self._advanced(known, block, steady), axis=0)
+        return turns, wrapped_from
+
+    @property
+    def _steady_variables(self) -> list[Recorded]:
+        return [] if self._steady is None else self._steady.variables
+
+    def _advanced(self, known: Continuity, block: _Block, columns: np.ndarray) -> np.ndarray:
+        """The full turns (n, columns) from row to row of angles that advance steadily."""
+        assert self._steady is not None
+        made = np.zeros((len(block.times), len(columns)), dtype=np.int64)
+        for row in range(len(block.times)):
+            latest = block.place(row - 1) if row else _latest(known)
+            if latest is None:
+                continue
+            before, here = _of(latest, columns), _of(block.place(row), columns)
+            found = self._steady.turns(before, here, block.sizes[row, columns])
+            if found is None and self._way is not None:
+                self._way.begin(before)
+                found = self._way.turns(here)
+            if found is None:
+                found = -np.rint((here.angles - before.angles) / (2 * np.pi)).astype(np.int64)
+            made[row] = found
+        return made
+
+    def _counted(self, known: Continuity, block: _Block, columns: np.ndarray) -> tuple[np.ndarray, float]:
+        """The full turns (n, columns) of the motion from sample to sample; none once they are lost, and from
+        when on they are.
+        """
+        turns = np.zeros((len(block.times), len(columns)), dtype=np.int64)
+        latest, before, wrapped_from = _latest(known), known.turns[columns], known.wrapped_from
+        for row, time in enumerate(block.times.tolist()):
+            if not math.isnan(wrapped_from):
                 break
             made: np.ndarray | None = None
+            here = block.place(row)
             if self._counter is not None and latest is not None:
-                self._counter.begin(latest)
-                made = self._counter.turns(here)
-            elif self._counter is not None and known.last_angles is None:  # the first sample
-                made = np.zeros(plain.shape[1], dtype=np.int64)
+                self._counter.begin(_of(latest, columns))
+                made = self._counter.turns(_of(here, columns))
+            elif self._counter is not None and latest is None:  # the first sample
+                made = np.zeros(len(columns), dtype=np.int64)
             if made is None:
-                known = replace(known, wrapped_from=time, turns=turns[row])
+                wrapped_from = time
                 break
-            turns[row] = known.turns[: plain.shape[1]] + made
-            known = replace(known, turns=turns[row], last_angles=angles, last_time=time, last_state=state)
-        return turns, known
+            before = turns[row] = before + made
+            latest = here
+        return turns, wrapped_from
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Samples in float64, internal units.
+
+    Attributes:
+        angles: (n, angles) without turns; sizes: of their sines and cosines, likewise.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    angles: np.ndarray
+    sizes: np.ndarray
+
+    def place(self, row: int) -> Place:
+        """One of them."""
+        return Place(float(self.times[row]), self.states[row], self.angles[row])
+
+
+def _of(place: Place, columns: np.ndarray) -> Place:
+    """With some of its angles."""
+    return replace(place, angles=place.angles[columns])
 
 
 def _latest(known: Continuity) -> Place | None:
-    """The latest sample; None without one, and where the turns are lost."""
-    if known.last_state is None or known.last_angles is None or not math.isnan(known.wrapped_from):
+    """The latest sample; None without one."""
+    if known.last_state is None or known.last_angles is None:
         return None
     return Place(known.last_time, known.last_state, known.last_angles)

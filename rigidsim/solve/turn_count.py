@@ -17,6 +17,7 @@ import math
 import time as clock_time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import heyoka as hy
 import numpy as np
@@ -67,16 +68,20 @@ class Place:
     angles: np.ndarray
 
 
+def largest_spacing(samples: SampleTimes) -> float:
+    """Between neighbouring samples, seconds."""
+    if samples.times is None:
+        return float(samples.step)
+    return max((float(b - a) for a, b in pairwise(samples.times)), default=0.0)
+
+
 def radians_between(samples: SampleTimes, rate: float) -> float:
     """By how much a body turns at most between neighbouring samples.
 
     Args:
         rate: bound of each component of the angular velocity, rad/s.
     """
-    if samples.times is None:
-        return math.sqrt(3) * rate * float(samples.step)
-    spacing = [float(b - a) for a, b in zip(samples.times, samples.times[1:], strict=False)]
-    return math.sqrt(3) * rate * max(spacing, default=0.0)
+    return math.sqrt(3) * rate * largest_spacing(samples)
 
 
 def angles_to_join(system: System) -> list[Recorded]:
@@ -186,6 +191,8 @@ class TurnCounter:
             self._advance(place.time)
         watched = self._watched
         off = np.abs(self._state[watched] - place.state[watched]).max()
+        if self._two_signs:
+            off = min(off, np.abs(self._state[watched] + place.state[watched]).max())
         if self._lost or not off < _FAR:
             return None
         return np.rint((self._followed - place.angles) / _TURN).astype(np.int64)
@@ -208,11 +215,14 @@ class TurnCounter:
         system = self._exact.rounded(double.number)
         m = system.mechanics
         self._chunk = _CHUNK if not system.switches else _SWITCHING_CHUNK
-        outputs = [system.outputs[r.first + i] for r in self._angles for i in range(r.count)]
+        names = [r.name for r in self._angles]
+        found = [r for name in names for r in system.recorded if r.name == name]
+        outputs = [system.outputs[r.first + i] for r in found for i in range(r.count)]
         ends = np.cumsum([r.count for r in self._angles]).tolist()
         self._groups = [slice(end - r.count, end) for r, end in zip(self._angles, ends, strict=True)]
         squared = hy.sum([w * w for w in m.rates])
         names = system.states[:3] if m.attitude is None else m.attitude.names
+        self._two_signs = m.attitude is not None and m.attitude.kind == "quaternion"
         self._watched = [system.states.index(name) for name in names]
         self._function: CompiledFunction = hy.cfunc([*outputs, squared], system.variables, compact_mode=True)
         bound = angle_rate(system, self._angles)

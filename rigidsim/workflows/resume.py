@@ -32,6 +32,7 @@ from rigidsim.store.segments import Chain, read_chain, root_attributes
 from rigidsim.store.summary import Caution, Summary, WarningCode
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.certify import certified
+from rigidsim.workflows.recorded_then import as_recorded
 from rigidsim.workflows.verify import embedded, text_difference
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def resume(
             raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with {FORCE}")
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
         if chain.paths:
-            experiment = _continued(experiment, chain.paths[-1])
+            experiment = as_recorded(_continued(experiment, chain.paths[-1]), chain.paths[0])
         prepared = prepare(experiment, loads=loads)
         if chain.paths:
             session.mixed = _compared(prepared, chain)

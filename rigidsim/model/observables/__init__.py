@@ -9,6 +9,7 @@ from rigidsim.model.observables import axes, rotation, wobble  # noqa: F401
 from rigidsim.model.observables.observable import (
     Angle as Angle,
     Observable as Observable,
+    Steady as Steady,
     always as always,
     continuous_angles as continuous_angles,
     only_when_named as only_when_named,

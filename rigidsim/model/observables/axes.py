@@ -26,6 +26,7 @@ from rigidsim.model.observables.observable import (
     same_unit,
 )
 from rigidsim.model.observables.scene_subject import is_planet
+from rigidsim.model.observables.steadiness import steady_directions
 from rigidsim.model.observables.vectors import figure_told, in_body, plane_told, unit
 from rigidsim.model.reference_plane import reference_plane
 from rigidsim.model.rotations import Symbolic, apply
@@ -146,7 +147,7 @@ _OBSERVABLES: tuple[Observable, ...] = (
     ),
     continuous_angles(
         "right_ascension", AXIS, "right ascension of the figure, spin and momentum axes", _right_ascensions,
-        frame="space axes", needs=("attitude",),
+        frame="space axes", needs=("attitude",), steady=steady_directions,
         attributes=_sky("longitude from X towards Y, turns counted; NaN at the poles"),
     ),
     Observable(
@@ -162,7 +163,7 @@ _OBSERVABLES: tuple[Observable, ...] = (
     continuous_angles(
         "node_longitude", AXIS,
         "longitude of the node of the equator of the figure, spin and momentum axes", node_longitudes,
-        frame="space axes", needs=("attitude", "plane"), by_default=is_planet,
+        frame="space axes", needs=("attitude", "plane"), by_default=is_planet, steady=steady_directions,
         attributes=_told(
             "where the equator whose pole is the axis rises through the reference plane, from X turned by "
             "the smallest rotation that takes Z to the normal, in the direct sense; turns counted; NaN where "

@@ -68,6 +68,26 @@ class Angle:
 
 
 @dataclass(frozen=True)
+class Steady:
+    """How angles advance between samples, where that tells their turns without following the motion.
+
+    Attributes:
+        rates: of each angle as expressions of the state, rad per internal unit of time.
+        uncertainty: by which these may change between samples, rad/s.
+        excursion: by which the angles may be off besides, rad. Both count for an angle whose sine and cosine
+            have size 1, and are divided by a smaller one.
+    """
+
+    rates: list[Symbolic]
+    uncertainty: float
+    excursion: float
+
+
+def _unsteady(_: Mechanics) -> Steady | None:
+    return None
+
+
+@dataclass(frozen=True)
 class Observable:
     """One recordable quantity; one of your own enters by ``rigidsim.scene.registry.register_observable``.
 
@@ -85,6 +105,7 @@ class Observable:
         by_default: whether it is recorded where the config names nothing.
         continuity: how samples are joined, see ``rigidsim.model.outputs.Recorded``.
         angles: where it is made of angles whose turns are counted (``continuous_angles``).
+        steady: how its angles advance between samples; None where they have to be followed.
         attributes: further attributes of the variable: convention, reference plane, ...
         absent: why this scene can't have it although it has all that it needs; None where it can.
     """
@@ -102,6 +123,7 @@ class Observable:
     by_default: Callable[[Mechanics], bool] = always
     continuity: Callable[[Mechanics], str] = _as_it_is
     angles: Callable[[Mechanics], list[Angle]] | None = None
+    steady: Callable[[Mechanics], Steady | None] = _unsteady
     attributes: Callable[[Mechanics], Mapping[str, str]] = _nothing
     absent: Callable[[Mechanics], str | None] = _never
 
@@ -127,6 +149,7 @@ def continuous_angles(
     frame: str = "",
     needs: tuple[str, ...] = (),
     by_default: Callable[[Mechanics], bool] = only_when_named,
+    steady: Callable[[Mechanics], Steady | None] = _unsteady,
     attributes: Callable[[Mechanics], Mapping[str, str]] = _nothing,
     absent: Callable[[Mechanics], str | None] = _never,
 ) -> Observable:
@@ -135,6 +158,7 @@ def continuous_angles(
 
     Args:
         angles: one for each component.
+        steady: how they advance, where that is known well enough to tell turns between sparse samples.
     """
     return Observable(
         name,
@@ -147,6 +171,7 @@ def continuous_angles(
         by_default=by_default,
         continuity=lambda m: "unwrap",
         angles=angles,
+        steady=steady,
         attributes=attributes,
         absent=absent,
     )

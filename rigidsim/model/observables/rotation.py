@@ -22,6 +22,7 @@ from rigidsim.model.observables.observable import (
     same_unit,
 )
 from rigidsim.model.observables.scene_subject import is_nearly_axial
+from rigidsim.model.observables.steadiness import steady_rotation
 from rigidsim.model.observables.vectors import along, figure_told, in_body, length, plane_told, unit
 from rigidsim.model.reference_plane import initial_normal, reference_plane
 from rigidsim.model.rotations import Symbolic, apply
@@ -90,7 +91,7 @@ def _told(convention: str) -> dict[str, str]:
 _OBSERVABLES = (
     continuous_angles(
         "rotation_angle", (), "angle of rotation about the angular momentum", _rotation_angle,
-        frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial,
+        frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial, steady=steady_rotation,
         attributes=lambda m: _told(
             "h + g + l of andoyer_angles: from X, carried to the momentum's equator by the smallest "
             "rotations, to the figure's first axis; in the direct sense about the momentum; turns counted"

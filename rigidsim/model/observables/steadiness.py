@@ -1,0 +1,105 @@
+"""How steadily a body turns between sparse samples, where that tells its turns without following the motion.
+
+A body whose momentum keeps near a principal axis of extreme moment, free of torques or a planet under gravity
+gradients, advances from sample to sample by its momentary rate times the time between, but for
+
+- what the momentum's direction drifts and its size changes: the torque is at most twice the amplitude U of
+  the loads' energy, so that |k'| <= 2 U / G and a rate changes by at most 2 U / G;
+- the wobble: the momentum stays within J of the axis. Free of torques the polhode says how far: with
+  d_i = |C - I_i| / I_i of the two other moments J_max / J <= sqrt(max d / min d). What the torques force,
+  some (2 U / G) / w, is allowed ten times over, and the whole four times.
+
+Where these leave more than half a radian open the turns are counted along the motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables.observable import Steady
+from rigidsim.model.observables.scene_subject import is_planet
+from rigidsim.model.observables.vectors import along, in_body, length
+from rigidsim.model.reference_plane import plane_drift
+from rigidsim.model.rotations import constant
+from rigidsim.model.scaling import loads_amplitude
+from rigidsim.scene.arithmetic import apply, cross, dot, norm
+
+_FORCED = 10
+_SPARE = 4
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """Of a steady rotation; moments in kg m^2, rates in rad/s (mpf).
+
+    Attributes:
+        wobble: largest angle between momentum and figure axis, rad.
+        drift: of the momentum's direction, and of a rate.
+        polar: the moment about the figure axis; equatorial: the others.
+    """
+
+    wobble: Any
+    drift: Any
+    polar: Any
+    equatorial: tuple[Any, Any]
+
+
+def _bounds(m: Mechanics) -> _Bounds | None:
+    """None where the motion isn't known to be steady."""
+    scene, context = m.scene, m.scene.context
+    body, pole = scene.body, scene.figure.pole
+    momentum = apply(body.inertia, scene.angular_velocity)
+    size = norm(context, momentum)
+    if size == 0 or (m.torque and not is_planet(m)):
+        return None
+    turned = apply(body.inertia, pole)
+    polar = dot(pole, turned)
+    if norm(context, cross(turned, pole)) > polar * 1e-12:  # not principal
+        return None
+    first, second, _ = sorted(body.principal_moments, key=lambda x: -abs(x - polar))
+    ratios = [abs(polar - x) / x if x else context.inf for x in (first, second)]
+    if (polar - first) * (polar - second) <= 0 or not min(ratios) > 0:
+        return None
+    amplitude = loads_amplitude(scene) if m.torque else context.zero
+    drift = 2 * amplitude / size
+    start = context.atan2(norm(context, cross(momentum, pole)), abs(dot(momentum, pole)))
+    wobble = start * context.sqrt(max(ratios) / min(ratios))
+    wobble = _SPARE * (wobble + _FORCED * drift / norm(context, scene.angular_velocity))
+    return _Bounds(wobble, drift, polar, (first, second))
+
+
+def steady_directions(m: Mechanics) -> Steady | None:
+    """Of angles of the figure, spin and momentum axes, which advance by nothing."""
+    found, away = _bounds(m), plane_drift(m.scene, m.loads)
+    if found is None or away is None:
+        return None
+    # the spin leaves the momentum by no more than the ratio of moments times what the figure axis does
+    moments = [x for x in (found.polar, *found.equatorial) if x]
+    leave = max(moments) / min(moments)
+    return Steady([constant(0.0)] * 3, float(found.drift + away), float(2 * found.wobble * leave))
+
+
+def steady_rotation(m: Mechanics) -> Steady | None:
+    """Of the rotation angle: with L the momentum along the axis it advances by (G - L)/A + L/C, 1/A being the
+    mean of both equatorial moments' inverses (Deprit 1967, eq. 25: dK/dG + dK/dL).
+    """
+    found, away = _bounds(m), plane_drift(m.scene, m.loads)
+    if found is None or away is None or 0 in found.equatorial:
+        return None
+    context, inertia = m.scene.context, m.scaling.inertia
+    inverse = sum(1 / x for x in found.equatorial) / 2
+    apart = abs(1 / found.equatorial[0] - 1 / found.equatorial[1]) / 2
+    size = norm(context, apply(m.scene.body.inertia, m.scene.angular_velocity))
+    equatorial, polar = (m.number(context.ldexp(x, inertia)) for x in (inverse, 1 / found.polar))
+    total = length(m.momentum_body)
+    axial = along(in_body(m, m.scene.figure.pole), m.momentum_body)
+    axial = hy.sqrt(axial * axial)
+    rate = equatorial * (total - axial) + polar * axial
+    if apart:
+        apart += abs(inverse - 1 / found.polar)  # L varies as well
+    changes = size * (1 - context.cos(min(found.wobble, context.pi))) * apart
+    return Steady([rate], float(changes + 2 * found.drift + away), float(2 * found.wobble))

@@ -1,0 +1,63 @@
+"""The system by which a motion is followed between samples: the run's own, or its twin in quaternions.
+
+Euler angles and their momenta have singularities, near which a run changes its chart. Following the motion
+needs neither: the twin carries the same motion, and its states are functions of the run's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.assembly import RATES
+from rigidsim.model.system import System
+from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.sample_block import SampleBlock
+
+_CHARTS = ("euler_angles", "canonical")
+
+
+class FollowedSystem:
+    """What is followed in place of a system.
+
+    Attributes:
+        system: whose motion is followed; None where there is none that can be.
+    """
+
+    def __init__(self, system: System) -> None:
+        self._own = system
+        self._charts: list[CompiledFunction] = []
+        self.system: System | None = system
+        plan = system.plan
+        if plan.requirements.formulation in _CHARTS:
+            requirements = replace(plan.requirements, formulation="quaternion")
+            twin = System(replace(plan, requirements=requirements), system.number)
+            self.system = None if system.switches else twin
+
+    def states(self, block: SampleBlock) -> np.ndarray:
+        """Of the system that is followed, float64, at the samples of a block, (n, states)."""
+        states = block.states.astype(np.float64)
+        if self.system is None or self.system is self._own:
+            return states
+        if not self._charts:
+            number = precision_of("double").number
+            own = self._own.rounded(number)
+            for chart in (own, own.partner):
+                if chart is not None:
+                    expressions = _twin_states(self.system, chart)
+                    self._charts.append(hy.cfunc(expressions, chart.variables, compact_mode=True))
+        charts = [np.asarray(chart(np.ascontiguousarray(states.T))).T for chart in self._charts]
+        return np.where(block.chart[:, None] == 0, charts[0], charts[-1])
+
+
+def _twin_states(twin: System, chart: System) -> list[hy.expression]:
+    """The states of the twin as expressions of those of a chart."""
+    m = chart.mechanics
+    attitude = m.carried(m.attitude)
+    known = dict(zip(chart.states, chart.variables, strict=True))
+    known |= dict(zip(m.carried(twin.mechanics.attitude).names, attitude.quaternion, strict=True))
+    known |= dict(zip(RATES, m.rate_states, strict=True))
+    return [known[name] for name in twin.states]

@@ -1,0 +1,138 @@
+"""Polar motion, wobble, the rotation angle and Andoyer's variables against closed forms."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import cases, config, loaded, run_text
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.solve.assembly import assemble
+from rigidsim.solve.problem import prepare
+
+MOMENTS = (1.0, 1.0, 1.5)
+NAMES = (
+    "quaternion", "rotation_angle", "rotation_rate", "rotation_period", "andoyer_momenta", "andoyer_angles",
+    "polar_motion", "wobble_angle", "nutation_angle",
+)  # fmt: skip
+RECORD = f"record = {list(NAMES)}".replace("'", '"')
+TILTED = 'angular_momentum = ["0.3", "0.4", 2]\neuler_angles = [0.3, 0.35, 0.2]'
+
+
+def symmetric(time: str, integrator: str, runs: Path) -> xr.Dataset:
+    return loaded(
+        run_text(config(f"principal_moments = {[*MOMENTS]}", TILTED, (), time, integrator, RECORD), runs)
+    )
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    cases(
+        ['formulation = "quaternion"', 'formulation = "euler_angles"', 'formulation = "rotation_matrix"',
+         'formulation = "canonical"', 'method = "closed_form"', 'precision = "extended"'],
+        ['formulation = "quaternion"', 'formulation = "euler_angles"', 'method = "closed_form"'],
+    ),
+)  # fmt: skip
+@pytest.mark.parametrize("samples", [3, 2001])
+def test_a_free_symmetric_top_has_constant_momenta_and_uniform_angles(
+    samples: int, integrator: str, runs: Path
+) -> None:
+    """l' = L (1/C - 1/A), g' = G/A, h' = 0; polar motion circles at l', and all turns are counted."""
+    a, _, c = MOMENTS
+    found = symmetric(f"end = 200\nsamples = {samples}", integrator, runs)
+    time = found["time"].values
+    big_l, big_g, big_h = found["andoyer_momenta"].values.T
+    momentum = np.array([0.3, 0.4, 2])
+    assert big_g == pytest.approx(np.linalg.norm(momentum), rel=1e-13)
+    assert big_h == pytest.approx(2, rel=1e-12)
+    assert np.ptp(big_l) < 1e-11
+    angles = found["andoyer_angles"].values
+    rates = np.array([big_l[0] * (1 / c - 1 / a), big_g[0] / a, 0.0])
+    np.testing.assert_allclose(angles - angles[0], np.outer(time, rates), atol=1e-9)
+    np.testing.assert_allclose(angles.sum(axis=1), found["rotation_angle"].values, atol=1e-9)
+    # h: the node of the invariable plane on XY, by definition n x L = (-L_Y, L_X)
+    assert angles[0, 2] == pytest.approx(math.atan2(momentum[0], -momentum[1]), abs=1e-14)
+    tilt = math.acos(big_l[0] / big_g[0])
+    for name in ("wobble_angle", "nutation_angle"):
+        assert found[name].values == pytest.approx(tilt, abs=1e-11)
+    # w1, w2, w3 = G sin J sin l / A, G sin J cos l / A, L / C
+    size = big_g[0] * math.sin(tilt) / a / (big_l[0] / c)
+    expected = size * np.column_stack([np.sin(angles[:, 0]), np.cos(angles[:, 0])])
+    np.testing.assert_allclose(found["polar_motion"].values, expected, atol=1e-10)
+    rate = math.hypot(big_g[0] * math.sin(tilt) / a, big_l[0] / c)
+    assert found["rotation_rate"].values == pytest.approx(rate, rel=1e-12)
+    assert found["rotation_period"].values == pytest.approx(2 * math.pi / rate, rel=1e-12)
+
+
+def test_the_rotation_of_an_earth_is_told_without_following_it(runs: Path) -> None:
+    """The Sun's torque, a wobble of an arcsecond, 20 days between samples: the turns of dense samples."""
+    body, start = 'preset = "earth"', 'euler_angles = [0, "-23.44 deg", 0.3]\n'
+    start += 'angular_velocity = ["3.5e-10 rad/s", 0, "7.292115e-5 rad/s"]'
+    load = (
+        'kind = "gravity_gradient"\ngravitational_parameter = "1.327e20 m^3/s^2"\n'
+        'orbit = {semi_major_axis = "1.496e11 m", eccentricity = 0.0167}'
+    )
+    few, many = (
+        run_text(config(body, start, load, f'end = "400 day"\nevery = "{every} day"'), runs, f'name="e{n}"')
+        for n, every in enumerate((20, 0.05))
+    )
+    for name in ("rotation_angle", "node_longitude", "obliquity"):
+        np.testing.assert_array_equal(few.dataset[name].values, many.dataset[name].values[::400])
+    turns = few.dataset["rotation_angle"].values[-1] / (2 * np.pi)
+    assert turns == pytest.approx(400 * 86400 * 7.292115e-5 / (2 * np.pi), abs=0.1)
+    text = config(body, start, load, 'end = "400 day"\nevery = "20 day"')
+    evaluator = assemble(prepare(rigidsim.parse(text))).evaluator
+    assert not evaluator.sparse
+    assert not evaluator.dense
+
+
+def test_retrograde_and_upside_down_bodies_turn_in_the_direct_sense_about_their_momentum(runs: Path) -> None:
+    for n, (start, away) in enumerate(
+        (("[0, 0, -1]", 0.1), ("[0, 0, 1]", 3.1), ("[0, 0, -1]", 3.1), ("[0, 0, 1]", 0.1))
+    ):
+        initial = f"angular_velocity = {start}\neuler_angles = [0.4, {away}, 0.5]"
+        text = config("principal_moments = [1, 1.1, 1.5]", initial, (), "end = 100\nsamples = 3", "", RECORD)
+        angle = run_text(text, runs, f'name="r{n}"').dataset["rotation_angle"].values
+        np.testing.assert_allclose(angle - angle[0], [0, 50, 100], atol=1e-10)
+
+
+def test_polar_motion_is_absent_where_the_spin_has_left_the_figure_axis(runs: Path) -> None:
+    with pytest.raises(ConfigError, match=r"87.*deg from the figure axis"):
+        prepare(
+            rigidsim.parse(
+                config("principal_moments = [1, 2, 3]", "angular_velocity = [0, 20, 1]",
+                       output='record = ["polar_motion"]')
+            )
+        )  # fmt: skip
+    unstable = "angular_velocity = [0, 1, 0.01]"
+    output = 'record = ["polar_motion", "angular_velocity"]\n[frame]\nfigure_axis = "y"'
+    body = "principal_moments = [1, 2, 3]"
+    found = loaded(run_text(config(body, unstable, (), "end = 40\nsamples = 401", "", output), runs))
+    w = found["angular_velocity"].values
+    off = np.hypot(w[:, 2], w[:, 0]) > np.abs(w[:, 1])
+    assert 0 < off.sum() < 401
+    np.testing.assert_array_equal(np.isnan(found["polar_motion"].values[:, 0]), off)
+    np.testing.assert_allclose(
+        found["polar_motion"].values[~off], (w[:, [2, 0]] / w[:, [1]])[~off], rtol=1e-14
+    )
+
+
+def test_what_is_recorded_by_default() -> None:
+    def names(body: str, start: str, load: str = "") -> set[str]:
+        system = prepare(rigidsim.parse(config(body, start, load))).system
+        return {r.name for r in system.recorded}
+
+    axial = {"polar_motion", "wobble_angle", "nutation_angle", "rotation_angle"}
+    planet = {"figure_axis", "obliquity", "node_longitude"}
+    body, start = "principal_moments = [1, 1, 1.01]", "angular_velocity = [0.001, 0, 1]"
+    sun = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 100}'
+    assert names(body, start) & (axial | planet) == axial
+    assert names(body, start, sun) & (axial | planet) == axial | planet
+    assert not names(body, "angular_velocity = [0.5, 0, 1]") & (axial | planet)
+    assert not names(body, "angular_velocity = [0, 0, 1]") & (axial | planet)
+    assert not names(body, "angular_velocity = [0, 0, 0.001]", sun) & (axial | planet)
