@@ -14,7 +14,7 @@ app = typer.Typer(
     name="rigidsim",
     help="High-precision experiments on rotating rigid bodies: one TOML file is one experiment.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )

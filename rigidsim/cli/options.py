@@ -13,16 +13,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rigidsim.cli import completion
 from rigidsim.errors import RigidsimError
 
 if TYPE_CHECKING:
     from rigidsim.store.run import Run
 
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="TOML file of the experiment.")]
-RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder (runs/NAME) or its dataset.h5.")]
+RunPath = Annotated[
+    Path,
+    typer.Argument(
+        metavar="RUN", help="Run folder (runs/NAME) or its dataset.h5.", autocompletion=completion.runs
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value, such as time.end=10; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a value, such as time.end=10; repeatable.",
+        autocompletion=completion.settings,
+    ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]

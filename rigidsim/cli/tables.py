@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -13,9 +13,13 @@ from rich.table import Table
 from rich.text import Text
 
 from rigidsim.cli.understood import understood
+from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import span_text
 from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
 from rigidsim.store.understood import Body, Span, Start
+
+if TYPE_CHECKING:
+    from rigidsim.workflows.check import Checked
 
 
 def console() -> Console:
@@ -235,6 +239,28 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         out.print(
             f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
         )
+
+
+def print_scenes(described: dict[str, str]) -> None:
+    """What ``rigidsim new`` can write."""
+    out = console()
+    table = _table("scene", "what it is")
+    for name, text in described.items():
+        table.add_row(name, text)
+    out.print(table)
+    out.print("rigidsim new SCENE [NAME] writes NAME.toml", markup=False)
+
+
+def print_checked(found: Checked) -> None:
+    """What a check found: errors on stderr, as of all commands."""
+    if not found.valid:
+        print(f"rigidsim: {ConfigError(found.problems, found.source).for_command_line()}", file=sys.stderr)
+        return
+    out = console()
+    out.print(Text.assemble((found.source, "bold"), "  ", ("valid", "bold green")))
+    print_understood(found.body, found.start, found.time, out)
+    for caution in found.cautions:
+        _line(out, "warning", caution.text, "bold red")
 
 
 def print_verdict(verdict: dict[str, Any]) -> None:

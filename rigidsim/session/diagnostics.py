@@ -71,7 +71,6 @@ class Diagnostics:
         return [
             *self._drifts(),
             *self._singularity(),
-            *self._gravity(),
             *self._digits(),
             *self._joining(),
         ]
@@ -99,15 +98,6 @@ class Diagnostics:
             f"the Euler angles came near the singularity of {system.sequence}{where}, where they lose "
             'digits; choose formulation = "quaternion"',
         )
-
-    def _gravity(self) -> Iterator[Caution]:
-        scene = self.prepared.scene
-        if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
-            yield Caution(
-                WarningCode.NO_EFFECT,
-                "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] "
-                "reference or center_of_mass for a top, or [initial] position for free flight",
-            )
 
     def _digits(self) -> Iterator[Caution]:
         found = self.estimate

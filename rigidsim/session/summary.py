@@ -68,7 +68,7 @@ def summarise(
         status=progress.status.value,
         message=message,
         exit_code=progress.status.exit_code,
-        **as_fields([*remarks, *cautions_of(scene.config), *found.cautions()]),
+        **as_fields([*remarks, *cautions_of(scene), *found.cautions()]),
         samples=progress.next_sample,
         samples_planned=progress.samples,
         time_reached=time_reached,

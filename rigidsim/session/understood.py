@@ -7,7 +7,6 @@ from typing import Any
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.schema import Config
 from rigidsim.scene.suspicions import suspicious_angles
 from rigidsim.store.summary import Caution, WarningCode
 from rigidsim.store.summary_fields import Three
@@ -56,9 +55,18 @@ def span_of(scene: Scene) -> Span:
     )
 
 
-def cautions_of(config: Config) -> list[Caution]:
-    """What may be meant otherwise than it was understood."""
-    return [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(problem)) for problem in suspicious_angles(config)]
+def cautions_of(scene: Scene) -> list[Caution]:
+    """What may be meant otherwise than it was understood, known before anything is run."""
+    found = [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(p)) for p in suspicious_angles(scene.config)]
+    if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
+        found.append(
+            Caution(
+                WarningCode.NO_EFFECT,
+                "uniform_gravity has no effect, since the body turns about its centre of mass; give [body] "
+                "reference or center_of_mass for a top, or [initial] position for free flight",
+            )
+        )
+    return found
 
 
 def _three(vector: Vector) -> Three:

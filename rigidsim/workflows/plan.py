@@ -80,7 +80,7 @@ def plan(
     system = prepared.system
     rate = float(system.rate_bound)
     growth = motion_growth(prepared)
-    warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene.config)]
+    warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene)]
     if room.problem is not None:
         warnings.append(("disk_space", f"the run {room.problem}"))
     return {

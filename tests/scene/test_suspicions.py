@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigidsim.scene.config import parse
+from rigidsim.scene.scene import build_scene
 from rigidsim.scene.suspicions import suspicious_angles
 from rigidsim.session.understood import cautions_of
 
@@ -59,5 +60,6 @@ def test_degrees_without_their_unit() -> None:
 
 
 def test_it_has_a_code() -> None:
-    (caution,) = cautions_of(parse(CONFIG.format(angles="[0, 7, 0]", inclination="0", anomaly="0")).config)
+    scene = build_scene(parse(CONFIG.format(angles="[0, 7, 0]", inclination="0", anomaly="0")))
+    (caution,) = cautions_of(scene)
     assert caution.code.value == "angle_without_unit"

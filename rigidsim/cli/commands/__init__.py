@@ -3,5 +3,18 @@
 Each loads what it needs when it is called, so that the others start fast.
 """
 
-COMMANDS = ("run", "resume", "verify", "plan", "info", "view", "plot", "tradeoff", "export", "schema")
+COMMANDS = (
+    "new",
+    "check",
+    "run",
+    "resume",
+    "verify",
+    "plan",
+    "info",
+    "view",
+    "plot",
+    "tradeoff",
+    "export",
+    "schema",
+)
 """All there are, in the order in which ``rigidsim --help`` shows them."""

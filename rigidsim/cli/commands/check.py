@@ -1,0 +1,35 @@
+"""``rigidsim check``: validation alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigidsim.cli.options import JsonOption, SetOption
+
+
+def check(
+    configs: Annotated[list[Path], typer.Argument(metavar="CONFIG...", help="TOML files.")],
+    overrides: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Validate configs, and show what was understood of them; nothing is run or written. Exit code 2 where
+    one can't be run.
+
+    Example: rigidsim check configs/heavy_top_nutating.toml
+    """
+    from rigidsim.cli import tables
+    from rigidsim.workflows.check import check as validate
+
+    valid = True
+    for path in configs:
+        found = validate(path, overrides=overrides or [])
+        valid = valid and found.valid
+        if as_json:
+            print(json.dumps(found.as_dict()), flush=True)
+        else:
+            tables.print_checked(found)
+    raise typer.Exit(0 if valid else 2)

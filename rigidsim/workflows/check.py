@@ -1,0 +1,66 @@
+"""Validation alone: whether a config could be run, and what was understood of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
+from rigidsim.solve.problem import prepare
+from rigidsim.store.summary import Caution
+from rigidsim.store.understood import Body, Span, Start
+from rigidsim.workflows.read import load
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check found.
+
+    Attributes:
+        problems: why it can't be run; empty for a valid config.
+        cautions: what may be meant otherwise.
+        body, start, time: what was understood; None where it can't be run.
+    """
+
+    source: str
+    problems: tuple[Problem, ...] = ()
+    cautions: tuple[Caution, ...] = ()
+    body: Body | None = None
+    start: Start | None = None
+    time: Span | None = None
+
+    @property
+    def valid(self) -> bool:
+        """Whether it can be run."""
+        return not self.problems
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "source": self.source,
+            "valid": self.valid,
+            "problems": [{"where": problem.where, "what": problem.what} for problem in self.problems],
+            "warnings": [caution.text for caution in self.cautions],
+            "warning_codes": [caution.code.value for caution in self.cautions],
+            "body": None if self.body is None else self.body.as_dict(),
+            "start": None if self.start is None else self.start.as_dict(),
+            "time": None if self.time is None else self.time.as_dict(),
+        }
+
+
+def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
+    """Validate a config as far as ``run`` would before its first step, and write nothing.
+
+    Args:
+        overrides: ``KEY=VALUE`` texts, as of ``rigidsim.load``.
+    """
+    try:
+        prepared = prepare(load(path, overrides=overrides))
+    except ConfigError as error:
+        return Checked(error.source or str(path), problems=tuple(error.problems))
+    scene = prepared.scene
+    cautions = tuple(cautions_of(scene))
+    return Checked(str(path), (), cautions, body_of(scene), start_of(scene), span_of(scene))

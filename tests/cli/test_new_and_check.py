@@ -1,0 +1,153 @@
+"""Starting from an empty folder: templates, validation alone, and what the shell completes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import support
+
+import rigidsim
+from rigidsim.cli import completion
+from rigidsim.cli.commands import COMMANDS
+from rigidsim.errors import RigidsimError
+from rigidsim.workflows import templates
+from rigidsim.workflows.check import check
+
+Config = Callable[..., str]
+Command = Callable[..., Any]
+
+
+# templates
+
+
+def test_every_template_is_listed() -> None:
+    folder = Path(templates.__file__).with_name("templates")
+    assert sorted(path.stem for path in folder.glob("*.toml")) == sorted(templates.SCENES)
+    assert all(templates.described().values())
+
+
+def marked(*quick: str) -> list[Any]:
+    """All scenes, the quick ones in the usual suite."""
+    return [
+        pytest.param(scene, id=scene, marks=[] if scene in quick else [pytest.mark.slow])
+        for scene in templates.SCENES
+    ]
+
+
+@pytest.mark.parametrize("scene", marked(*(s for s in templates.SCENES if s not in ("gyroscope", "planet"))))
+def test_a_template_is_valid_and_means_nothing_else(scene: str, tmp_path: Path) -> None:
+    path = templates.write_new(scene, folder=tmp_path)
+    found = check(path)
+    assert found.valid, found.problems
+    assert found.cautions == ()
+    assert rigidsim.load(path).config.name == scene
+
+
+@pytest.mark.parametrize("scene", marked("coin", "thrusters"))
+def test_a_template_runs(scene: str, tmp_path: Path) -> None:
+    """To its end, without a warning, and what its comments promise happens."""
+    run = support.run_text(templates.template(scene), tmp_path, "output.estimate=false")
+    summary = run.summary
+    stopped = scene in ("coin", "gyroscope")
+    assert summary["status"] == ("finished: event" if stopped else "finished")
+    assert summary["warnings"] == []
+    happened = {"coin": {"caught": 1}, "gyroscope": {"horizontal": 1}}.get(scene, {})
+    assert summary["events"] == summary["events"] | happened
+    if scene == "coin":  # up and down again: 2 v / g
+        assert summary["time_reached"] == pytest.approx(2 * 2.5 / 9.80665, rel=1e-14)
+    if scene == "racket":
+        assert summary["events"]["flip"] >= 4
+
+
+# new
+
+
+def test_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command) -> None:
+    monkeypatch.chdir(tmp_path)
+    alone = rigidsim_command("new")
+    assert alone.exit_code == 0
+    assert all(scene in alone.stdout for scene in templates.SCENES)
+    assert list(tmp_path.iterdir()) == []
+    assert rigidsim_command("new", "coin").exit_code == 0
+    assert rigidsim_command("new", "coin", "my_coin").exit_code == 0
+    assert rigidsim.load("my_coin.toml").config.name == "my_coin"
+    before = Path("coin.toml").read_bytes()
+    again = rigidsim_command("new", "coin")
+    assert again.exit_code == 2
+    assert "coin.toml: is there already, and nothing was written; give another NAME" in again.stderr
+    assert Path("coin.toml").read_bytes() == before
+    unknown = rigidsim_command("new", "gyroscpe")
+    assert unknown.exit_code == 2
+    assert 'did you mean "gyroscope"?; scenes to choose from: free_body' in unknown.stderr
+    for name in ("a/b", "..", "a b"):
+        with pytest.raises(RigidsimError, match="letters, digits, dots, underscores and hyphens are allowed"):
+            templates.write_new("coin", name, tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["coin.toml", "my_coin.toml"]
+
+
+# check
+
+
+def test_check(config: Config, rigidsim_command: Command) -> None:
+    good = config("good")
+    bad = config("bad", body="principal_moments = [1, 2, 4]")
+    found = rigidsim_command("check", good)
+    assert found.exit_code == 0
+    assert found.stdout.startswith("good.toml  valid\nbody     from principal_moments")
+    both = rigidsim_command("check", bad, good)
+    assert both.exit_code == 2
+    assert "bad.toml: 1 problem in the config\n  [body] principal_moments: " in both.stderr
+    assert "good.toml  valid" in both.stdout  # the others are looked at all the same
+    first, second = map(json.loads, rigidsim_command("check", bad, good, "--json").stdout.splitlines())
+    assert (first["valid"], second["valid"]) == (False, True)
+    assert first["problems"][0]["where"] == "[body] principal_moments"
+    assert first["body"] is first["start"] is None
+    assert second["start"]["euler_sequence"] == "zxz"
+    assert rigidsim_command("check", good, "--set", "time.end=-1").exit_code == 2
+    assert rigidsim_command("check", "nowhere.toml").exit_code == 2
+    assert rigidsim_command("check").exit_code == 2
+    assert sorted(path.name for path in Path().iterdir()) == ["bad.toml", "good.toml"]  # nothing is written
+
+
+def test_check_knows_what_will_have_no_effect(config: Config, rigidsim_command: Command) -> None:
+    path = config(
+        body="principal_moments = [1, 2, 2.5]\nmass = 1", rest='[[loads]]\nkind = "uniform_gravity"'
+    )
+    found = json.loads(rigidsim_command("check", path, "--json").stdout)
+    assert found["valid"]
+    assert found["warning_codes"] == ["no_effect"]
+
+
+# help and completion
+
+
+def test_h_is_help_everywhere(rigidsim_command: Command) -> None:
+    assert rigidsim_command("-h").stdout == rigidsim_command("--help").stdout
+    for name in COMMANDS:
+        shown = rigidsim_command(name, "-h")
+        assert shown.exit_code == 0
+        assert "Example: rigidsim" in shown.stdout
+
+
+def test_completion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("one", "two"):
+        (tmp_path / "runs" / name).mkdir(parents=True)
+        (tmp_path / "runs" / name / "config.toml").touch()
+    assert completion.runs("") == ["runs/one", "runs/two"]
+    assert completion.runs("runs/t") == ["runs/two"]
+    assert [name for name, _ in completion.scenes("t")] == ["top", "thrusters", "torque"]
+    assert completion.settings("integrator.euler_s") == ["integrator.euler_sequence"]
+    assert completion.settings("integrator.method=") == [
+        "integrator.method=taylor",
+        "integrator.method=closed_form",
+    ]
+    assert "integrator.precision=quadruple" in completion.settings("integrator.precision=")
+    assert completion.settings("output.timeline=f") == ["output.timeline=false"]
+    assert completion.settings("body.preset=ea") == ["body.preset=earth"]
+    assert completion.settings("nonsense=") == []
+    assert "--install-completion" in rigidsim_command("--help").stdout
