@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from rigidsim.store import viewing
 from rigidsim.store.netcdf import Block
 from rigidsim.store.run import Run
 from rigidsim.store.segments import JoinedBlocks
@@ -86,6 +87,10 @@ class MemoryRun(Run):
         coordinates |= {n: found.pop(n) for n in list(found) if found[n].dims == (n,)}
         told = xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))
         return xarray.decode_cf(told)  # dates, and coordinates beside time
+
+    def view(self, *, web: bool = False) -> int:
+        """See ``Run``; the timeline goes with the viewer."""
+        return viewing.view(self, None, web=web)
 
     def concluded(self, outcome: Brief) -> Self:
         """The same run with another summary."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from rigidsim.errors import FORCE, RESUME, RunFolderError
-from rigidsim.store import provenance, segments
+from rigidsim.store import provenance, segments, viewing
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.joined_segments import join_segments
 from rigidsim.store.seal import check_whole, read_seal
@@ -52,6 +52,14 @@ class Run:
         """Its labelled numbers."""
 
     @abstractmethod
+    def view(self, *, web: bool = False) -> int:
+        """Open the timeline in the viewer, or the browser, and wait until it is closed; its exit code.
+
+        Raises:
+            RunFolderError: the timeline can't be drawn, or no viewer is installed.
+        """
+
+    @abstractmethod
     def concluded(self, outcome: Brief) -> Self:
         """The same run with what is known of it now, kept where the run is."""
 
@@ -79,6 +87,10 @@ class SavedRun(Run):
     def place(self) -> str:
         """Its folder."""
         return str(self.folder.path)
+
+    def view(self, *, web: bool = False) -> int:
+        """See ``Run``; a timeline that had to be drawn is kept in the folder."""
+        return viewing.view(self, self.folder, web=web)
 
     def concluded(self, outcome: Brief) -> Self:
         """The same run with another summary, which is written."""

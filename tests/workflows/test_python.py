@@ -157,3 +157,17 @@ def test_progress_is_shown_where_asked_for(capsys: pytest.CaptureFixture[str]) -
     assert capsys.readouterr().err == ""
     rigidsim.run(TOP, out=None, progress=True)
     assert "top: integrating in memory" in capsys.readouterr().err
+
+
+def test_a_run_in_memory_can_be_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[Path] = []
+
+    def viewer(path: Path, *, web: bool) -> int:
+        assert path.stat().st_size > 10_000
+        assert web
+        seen.append(path)
+        return 0
+
+    monkeypatch.setattr("rigidsim.look.viewer.open_viewer", viewer)
+    assert rigidsim.run(TOP, out=None).view(web=True) == 0
+    assert not seen[0].exists()

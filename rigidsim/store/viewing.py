@@ -1,0 +1,82 @@
+"""A run's timeline, drawn where there is none yet, and opened in the viewer."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from rigidsim.errors import RunFolderError
+from rigidsim.store import atomic
+from rigidsim.store.folder import RunFolder
+from rigidsim.store.summary import Brief
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Shown(Protocol):
+    """What is needed of a run."""
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Its labelled numbers."""
+
+    @property
+    def outcome(self) -> Brief:
+        """What its summary says."""
+
+
+def view(run: Shown, folder: RunFolder | None, *, web: bool = False) -> int:
+    """Open a run's timeline in the viewer and wait until it is closed.
+
+    Args:
+        folder: of the run; None for one in memory.
+        web: in the browser, served on loopback only, until Ctrl-C.
+
+    Returns:
+        The viewer's exit code; 130 after Ctrl-C.
+
+    Raises:
+        RunFolderError: the timeline can't be drawn, or no viewer is installed.
+    """
+    from rigidsim.look.viewer import open_viewer
+
+    with drawn(run, folder) as timeline:
+        try:
+            return open_viewer(timeline, web=web)
+        except FileNotFoundError as error:
+            raise RunFolderError(str(error)) from None
+
+
+@contextmanager
+def drawn(run: Shown, folder: RunFolder | None) -> Iterator[Path]:
+    """The recording: the run's own, kept with the run where that can be written, or one that goes at the end.
+
+    Raises:
+        RunFolderError: it can't be drawn.
+    """
+    if folder is not None and folder.timeline.exists():
+        yield folder.timeline
+    elif folder is not None and folder.read_only is None:
+        _draw(run, folder.timeline)
+        folder.note_timeline(run.outcome, folder.timeline)
+        yield folder.timeline
+    else:
+        with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
+            timeline = Path(scratch) / "timeline.rrd"
+            _draw(run, timeline)
+            yield timeline
+
+
+def _draw(run: Shown, timeline: Path) -> None:
+    from rigidsim.look.timeline import write_timeline
+
+    try:
+        with run.dataset as dataset, atomic.replacing(timeline) as new:
+            write_timeline(dataset, new)
+    except (OSError, RuntimeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise RunFolderError(f"{timeline}: can't be written: {why}") from None
