@@ -20,6 +20,7 @@ from rigidsim.accuracy.motion import Motion
 from rigidsim.accuracy.setting import Setting, epsilon, setting_of
 from rigidsim.accuracy.trial import Told
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import build_scene
@@ -232,8 +233,8 @@ def _unreachable(forecasts: Forecasts, best: Setting | None, accuracy: float) ->
     what = f"would be right to about {reached:.2g} rad" if reached < 1 else "would keep no digit"
     text = (
         f"given {accuracy:.3g} rad at the end, which no setting open to it reaches; the best, {best.title}, "
-        f"{what}, in about {seconds:.2g} s"
+        f"{what}, in about {span_text(seconds, 2)}"
     )
     if motion.growth.rate > 0:
-        text += f"; errors here grow e-fold every {1 / motion.growth.rate:.3g} s, so choose a nearer end"
+        text += f"; errors here grow e-fold every {span_text(1 / motion.growth.rate)}, so choose a nearer end"
     return text + "; ask for less, or leave precision, tolerance and method open"

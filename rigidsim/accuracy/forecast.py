@@ -15,6 +15,7 @@ from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
 from rigidsim.accuracy.reference import STANDARD, Policy, closed_form_beyond, stepped_reference
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import Told, Trial, Trials
+from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import build_scene
@@ -132,7 +133,7 @@ class Forecasts:
             return "its solution in closed form costs less than its steps"
         if setting.tolerance is None and self._obvious(setting):
             return "by the law of rounding errors"
-        extent = "whole run" if self.part >= 1 else f"first {self.part * self.motion.seconds:.3g} s"
+        extent = "whole run" if self.part >= 1 else f"first {span_text(self.part * self.motion.seconds)}"
         if setting.bits <= 53:
             return f"tried over the {extent} against a better solution"
         return f"from trials in double precision over the {extent}, whose errors shrink with epsilon"

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from rigidsim.cli.understood import understood
 from rigidsim.errors import ConfigError
-from rigidsim.look.readable_time import span_text
+from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
 from rigidsim.store.understood import Body, Span, Start
 
@@ -122,8 +122,8 @@ def _print_ended(summary: Summary, out: Console) -> None:
     if summary.hold_invariants:
         _line(out, "held", "put back: what the drift would have been; held drifts are no independent check")
     _print_accuracy(summary.accuracy, out)
-    if summary.events:
-        _line(out, "events", ", ".join(_event(summary, name) for name in summary.events))
+    for number, name in enumerate(summary.events):
+        _line(out, "" if number else "events", _event(summary, name))
     chaos = summary.lyapunov
     if chaos is not None:
         what = "chaotic" if chaos.chaotic else "regular"
@@ -135,12 +135,24 @@ def _print_ended(summary: Summary, out: Console) -> None:
 
 def _event(summary: Summary, name: str) -> str:
     """How often, and when."""
-    text, times = f"{name} {summary.events[name]:,}", summary.event_times.get(name)
+    count, times = summary.events[name], summary.event_times.get(name)
     if times is None:
-        return text
-    if times.first == times.last:
-        return f"{text} at {times.first:.9g} s"
-    return f"{text} from {times.first:.9g} s to {times.last:.9g} s"
+        return f"{name}: {count:,}"
+    early = times.early or (times.first,)
+    if count > len(early):  # a few, and the last one
+        early = early[:3]
+    words = _words(summary)
+    told = [words.moment(time) for time in early]
+    if count > len(told):
+        told += ["..."] * (count > len(told) + 1) + [words.moment(times.last)]
+    return f"{name}: {count:,}, at {', '.join(told)}"
+
+
+def _words(summary: Summary) -> TimeWords:
+    time = summary.time
+    if time is None:  # of an older version
+        return TimeWords.of({}, 0.0, summary.time_reached)
+    return TimeWords.of({"epoch": time.epoch, "time_unit": time.unit}, time.start_s, time.end_s)
 
 
 def _invariants(summary: Summary) -> Table:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look.plots import pretty_unit
+from rigidsim.look.readable_time import TimeWords
 from rigidsim.look.roles import drifts
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset, notes: list[s
         ("formulation", dataset.attrs.get("formulation") or integrator.get("formulation")),
         ("precision", dataset.attrs.get("precision") or integrator.get("precision")),
         ("status", dataset.attrs.get("status")),
-        ("span", _span(thinned)),
+        ("span", _span(dataset, thinned)),
         ("samples", _samples(dataset, thinned)),
         ("steps", dataset.attrs.get("steps")),
     ]
@@ -92,9 +93,10 @@ def _invariants(thinned: xarray.Dataset) -> list[tuple[str, ...]]:
     return rows
 
 
-def _span(thinned: xarray.Dataset) -> str:
-    times = thinned["time"].values
-    return f"{times[0]:.9g} s to {times[-1]:.9g} s"
+def _span(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
+    start, end = (float(thinned["time"].values[i]) for i in (0, -1))
+    words = TimeWords.of(dataset.attrs, start, end)
+    return f"{words.moment(start)} to {words.moment(end)}"
 
 
 def _samples(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:

@@ -110,7 +110,7 @@ def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
     for scale in (epoch, epoch.uniform()):
         try:
             then = scale.after(Decimal(seconds) + Decimal(half))
-        except ValueError:
+        except (ValueError, OverflowError):  # the latter of an infinite time
             continue
         text = then.calendar()
         if step >= DAY:
@@ -122,6 +122,46 @@ def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
         return f"{text} {then.scale}"
     uniform = epoch.uniform()
     return f"year {number_text(julian_year(epoch) + seconds / YEAR, 9)} {uniform.scale}"
+
+
+@dataclass(frozen=True)
+class TimeWords:
+    """How the times of one run are told.
+
+    Attributes:
+        unit: of all of them.
+        epoch: time 0, where it is known: dates are told, too.
+        span: of the run, s; dates are as fine as a thousandth of it.
+    """
+
+    unit: TimeUnit
+    epoch: Epoch | None
+    span: float
+
+    @classmethod
+    def of(cls, attributes: Mapping[str, Any], start: float, end: float) -> TimeWords:
+        """Those of a run.
+
+        Args:
+            attributes: ``time_unit`` and ``epoch``, where they are known.
+            start, end: of the run, s.
+        """
+        largest = max(abs(start), abs(end))
+        suiting = unit_for(largest)
+        if 1.0 < suiting.seconds < DAY:  # 5000 s rather than 83.3333333 min
+            suiting = TimeUnit("s", 1.0)
+        asked = str(attributes.get("time_unit") or "")
+        unit = unit_of(attributes, largest) if asked else suiting
+        return cls(unit, epoch_of(attributes), abs(end - start))
+
+    def short(self, seconds: float) -> str:
+        """A time of the scene to six digits, as ``304.2 d``."""
+        return span_text(seconds, 6, self.unit)
+
+    def moment(self, seconds: float, digits: int = 9) -> str:
+        """A time of the scene: ``304.2 d``, and with an epoch ``304.2 d (2029-04-13 TDB)``."""
+        text = span_text(seconds, digits, self.unit)
+        return text if self.epoch is None else f"{text} ({instant_text(self.epoch, seconds, self.span)})"
 
 
 def julian_year(epoch: Epoch) -> float:

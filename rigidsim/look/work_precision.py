@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look.figures.style import STYLE
+from rigidsim.look.readable_time import span_text
 
 if TYPE_CHECKING:
     import xarray
@@ -147,5 +148,5 @@ def _key(axes: Axes, dataset: xarray.Dataset) -> None:
 def _title(figure: Figure, dataset: xarray.Dataset) -> None:
     attrs = dataset.attrs
     over = "over its first" if attrs["measured_seconds"] < attrs["horizon_seconds"] else "over"
-    words = f"{attrs['title']}: speed against accuracy {over} {attrs['measured_seconds']:.4g} s"
+    words = f"{attrs['title']}: speed against accuracy {over} {span_text(attrs['measured_seconds'], 4)}"
     figure.suptitle(words, fontsize=12.5, fontweight="bold")

@@ -11,7 +11,9 @@ from itertools import pairwise
 from rigidsim.accuracy.error_law import DRIFT_FACTOR
 from rigidsim.accuracy.estimate import Estimate, estimate_errors
 from rigidsim.accuracy.growth import LOST
+from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.session.statistics import SampleStatistics
+from rigidsim.session.understood import time_words
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
@@ -75,6 +77,10 @@ class Diagnostics:
             *self._joining(),
         ]
 
+    @property
+    def _words(self) -> TimeWords:
+        return time_words(self.prepared.scene)
+
     def _drifts(self) -> Iterator[Caution]:
         for name, drift in self.statistics.largest.items():
             if not drift <= self.drift_bound:
@@ -88,7 +94,9 @@ class Diagnostics:
     def _singularity(self) -> Iterator[Caution]:
         system, seen, passed = self.prepared.system, self.statistics, self._passed()
         if seen.nearest_singularity < NEAR_SINGULAR:
-            where = f" (factor {seen.nearest_singularity:.2g} at {seen.singularity_time:.6g} s)"
+            where = (
+                f" (factor {seen.nearest_singularity:.2g} at {self._words.moment(seen.singularity_time, 6)})"
+            )
         elif system.singular_factor is not None and passed < NEAR_SINGULAR:
             where = f" between two samples (within about {passed:.1g} rad, by the shortest step)"
         else:
@@ -126,8 +134,8 @@ class Diagnostics:
             other = ', or choose formulation = "euler_angles", which carries them' if carried else ""
             yield Caution(
                 WarningCode.NOT_JOINED,
-                f"the turns of {' and '.join(names)} aren't known from {lost:.6g} s on, where they are "
-                f"recorded within one turn; sample more often{other}",
+                f"the turns of {' and '.join(names)} aren't known from {self._words.moment(lost, 6)} on, "
+                f"where they are recorded within one turn; sample more often{other}",
             )
         if joined and turns > 1:
             yield Caution(
@@ -141,7 +149,8 @@ class Diagnostics:
         if found.predictable_seconds is None or found.growth_rate == 0.0:
             return ""
         since = float(self.prepared.scene.start) + found.predictable_seconds
-        return f" from about {since:.3g} s on (errors grow e-fold every {1 / found.growth_rate:.3g} s)"
+        folding = span_text(1 / found.growth_rate)
+        return f" from about {self._words.moment(since, 3)} on (errors grow e-fold every {folding})"
 
     def _passed(self) -> float:
         """About how near a chart's singularity the motion came between two samples, by the shortest step,

@@ -73,8 +73,9 @@ def event_times(prepared: InitialValueProblem, log: EventLog, last: float) -> di
     for index, crossing in enumerate(prepared.system.crossings):
         found = log.occurrences(index, last)
         if found:
-            first, latest = (clock.seconds(f.time) for f in (found[0], found[-1]))
-            times[crossing.name] = EventTimes(first=first, last=latest)
+            early = tuple(clock.seconds(event.time) for event in found[: EventTimes.EARLY])
+            latest = clock.seconds(found[-1].time)
+            times[crossing.name] = EventTimes(first=early[0], last=latest, early=early)
     return times
 
 

@@ -18,6 +18,7 @@ from rich.progress import (
 )
 
 from rigidsim.session.guards import Observer
+from rigidsim.session.understood import time_words
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 
@@ -61,6 +62,7 @@ class TerminalObserver(Observer):
         last = float(prepared.scene.samples.last) - float(prepared.scene.start)
         self._start = float(prepared.scene.start)
         self._last = last
+        self._words = time_words(prepared.scene)
         self._draw(_shortened(prepared.scene.name), 1.0)
 
     def progressed(self, progress: Progress) -> None:
@@ -72,7 +74,7 @@ class TerminalObserver(Observer):
         rate = _engineering(progress.steps / max(elapsed, 1e-9))
         said = f"{100 * fraction:5.1f} %  {rate:>6} steps/s  {_left(elapsed, fraction)}"
         if self._bar.console.width >= _WIDE:
-            said += f"  t = {progress.time:.6g} s"
+            said += f"  t = {self._words.short(progress.time)}"
         self._bar.update(self._task, completed=fraction, said=said)
 
     def phase(self, name: str) -> None:
@@ -122,6 +124,7 @@ class LineObserver(Observer):
         self._name = prepared.scene.name
         self._start = float(prepared.scene.start)
         self._last = float(prepared.scene.samples.last) - self._start
+        self._words = time_words(prepared.scene)
         self._say("integrating in memory" if folder is None else f"integrating into {folder}")
 
     def progressed(self, progress: Progress) -> None:
@@ -133,8 +136,9 @@ class LineObserver(Observer):
         elapsed = now - self._begin
         fraction = (progress.time - self._start) / self._last if self._last else 1.0
         rate = _engineering(progress.steps / max(elapsed, 1e-9))
+        reached = self._words.short(progress.time)
         print(
-            f"{self._name}: {100 * min(fraction, 1):.1f} %, t = {progress.time:.6g} s, {rate} steps/s, "
+            f"{self._name}: {100 * min(fraction, 1):.1f} %, t = {reached}, {rate} steps/s, "
             f"{_left(elapsed, fraction)}",
             file=sys.stderr,
             flush=True,

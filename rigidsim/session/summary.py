@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
@@ -127,16 +127,16 @@ def closing_words(
     prepared: InitialValueProblem, progress: Progress, evaluator: Evaluator, log: EventLog
 ) -> str:
     """The status in words: with which event and when, or where and why for a run that broke down."""
-    text = progress.status.message
+    text, words = progress.status.message, time_words(prepared.scene)
     if progress.status is Status.EVENT:
         ending = next(f for f in log.found if log.stops[f.index])
         name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
-        return f"{text}: {name} at {when:.9g} s"
+        return f"{text}: {name} at {words.moment(when)}"
     if progress.status is Status.UNRESOLVED:
-        return f"{text}: {progress.detail} (at {progress.time:.9g} s, after {progress.steps} steps)"
+        return f"{text}: {progress.detail} (at {words.moment(progress.time)}, after {progress.steps} steps)"
     if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
         return text
-    text += f"; last good state at {progress.time:.9g} s after {progress.steps} steps"
+    text += f"; last good state at {words.moment(progress.time)} after {progress.steps} steps"
     if progress.last_good is None:
         return text
     state = np.array([progress.last_good.mark.state], dtype=prepared.precision.scalar)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rigidsim.look.readable_time import TimeWords
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.scene import Scene
@@ -51,8 +52,14 @@ def span_of(scene: Scene) -> Span:
         samples=samples.count,
         every_s=None if samples.times is not None else float(samples.step),
         epoch="" if scene.epoch is None else str(scene.epoch),
-        unit=getattr(scene.config.time, "unit", None) or "",
+        unit=scene.config.time.unit or "",
     )
+
+
+def time_words(scene: Scene) -> TimeWords:
+    """How times of the scene are told in messages."""
+    attributes = {"epoch": scene.epoch, "time_unit": scene.config.time.unit}
+    return TimeWords.of(attributes, float(scene.start), float(scene.samples.last))
 
 
 def cautions_of(scene: Scene) -> list[Caution]:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     AfterValidator,
@@ -158,10 +158,16 @@ class Lyapunov(Part):
 
 
 class EventTimes(Part):
-    """When an event happened, s."""
+    """When an event happened, s.
 
+    Attributes:
+        early: the first ones, at most ``EventTimes.EARLY``; the first among them.
+    """
+
+    EARLY: ClassVar[int] = 5
     first: Annotated[FiniteNumber, Claim()]
     last: Annotated[FiniteNumber, Claim()]
+    early: Annotated[tuple[FiniteNumber, ...], Claim(since=4)] = ()
 
 
 class ChartChanges(Part):
@@ -185,7 +191,7 @@ class Brief(Part):
     name: Annotated[Text, Claim()] = ""
     description: Annotated[StrictStr, Claim()] = ""
     status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$"), Claim(of_end=True)]
-    message: Annotated[Text, Claim(of_end=True)] = ""
+    message: Annotated[Text, Claim(since=4, of_end=True)] = ""  # in the unit that suits, since then
     exit_code: Annotated[StrictInt, Claim(of_end=True)] = 0
 
     @property

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 import xarray
 
-from rigidsim.look.readable_time import DAY, YEAR, instant_text, named_unit, span_text, time_axis_of, unit_for
+from rigidsim.look.readable_time import (
+    DAY,
+    YEAR,
+    TimeWords,
+    instant_text,
+    named_unit,
+    span_text,
+    time_axis_of,
+    unit_for,
+)
 from rigidsim.scene.epochs import J2000, parse_epoch
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
@@ -67,6 +76,16 @@ def test_an_instant_of_utc_goes_on_in_tt_where_nobody_knows_utc() -> None:
     epoch = parse_epoch("2016-12-31T23:59:59 UTC")
     assert instant_text(epoch, 1.5, 100.0) == "2016-12-31T23:59:60.5 UTC"
     assert instant_text(epoch, 100 * YEAR, 100 * YEAR) == "2117-01-02 TT"  # 36,525 days
+
+
+def test_moments_of_a_run_are_told_in_one_unit_and_as_dates() -> None:
+    assert TimeWords.of({}, 0.0, 7200.0).moment(2861.86209) == "2861.86209 s"
+    assert TimeWords.of({}, 0.0, 1e-9).moment(5e-10) == "0.5 ns"
+    assert TimeWords.of({}, 0.0, 400 * DAY).short(303.62 * DAY) == "303.62 d"
+    assert TimeWords.of({"time_unit": "day"}, 0.0, 400 * DAY).short(303.62 * DAY) == "303.62 day"
+    dated = TimeWords.of({"epoch": str(FLYBY)}, 0.0, 40 * DAY)
+    assert dated.moment(1.5 * DAY) == "1.5 d (2029-04-15T09:46 TDB)"
+    assert dated.moment(float("inf")).startswith("inf d")
 
 
 @pytest.mark.parametrize(
