@@ -35,6 +35,7 @@ class Load(SceneLoad):
         orbit: the prescribed orbit that its source moves on; all loads on one orbit share its states.
         corotating_orbit: a circular orbit in a fixed plane in whose frame its potential rests: then there is
             Jacobi's constant.
+        has_source: whether the direction to its source is known: nadir, roll and libration count from it.
         attracting_point: centre of its force (mpf, m, space axes), where that always points to one.
     """
 
@@ -45,6 +46,7 @@ class Load(SceneLoad):
     about_vertical = True
     orbit: KeplerOrbit | None = None
     corotating_orbit: KeplerOrbit | None = None
+    has_source: bool = False
     attracting_point: Vector | None = None
 
     # --- equations ---------------------------------------------------------------------------------------
@@ -90,6 +92,10 @@ class Load(SceneLoad):
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
         """3 G M / R^3 (mpf, 1/s^2) and unit vector (space axes) of a source that rests in space."""
+        return None
+
+    def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
+        """Unit vector towards its source, body axes, where it ``has_source``."""
         return None
 
     def damping(self) -> Vector | None:

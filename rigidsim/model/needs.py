@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rigidsim.model import central_forces, fixed_axes
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
+from rigidsim.model.local_frame import first_source, flies_about_source
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.reference_plane import flies_in_plane
 from rigidsim.model.rotating_frame import rotating_orbit
@@ -78,6 +79,28 @@ def _no_vertical(scene: Scene, formulation: str) -> str | None:
     return "the scene has no load that marks a vertical; record angular_momentum instead"
 
 
+def _source_states(scene: Scene) -> str | None:
+    return "flight" if flies_about_source(scene) else None
+
+
+def _no_source(scene: Scene, formulation: str) -> str | None:
+    if first_source(scene.loads) is not None:
+        return None
+    return (
+        "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
+        "magnetic_dipole with an orbit); leave it out"
+    )
+
+
+def _sourced(m: Mechanics) -> bool:
+    load = first_source(m.loads)
+    return (
+        load is not None
+        and m.attitude is not None
+        and (load.attracting_point is None or m.velocity is not None)
+    )
+
+
 def _free_axis(which: int) -> Need:
     return Need(lambda m: m.attitude is not None and fixed_axes.free_axis(m, which) is not None)
 
@@ -116,6 +139,8 @@ NEEDS: dict[str, Need] = {
     **{f"free_axis_{name}": _free_axis(i) for i, name in enumerate("xyz")},
     "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
     "plane": Need(lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None, _plane_states),
+    "source": Need(_sourced, _source_states, _no_source),
+    "place": Need(lambda m: not m.scene.free_flight or m.velocity is not None, _flight_of_a_free_body),
     "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
     "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),
     "attracting_line": Need(

@@ -90,16 +90,16 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
         if not isinstance(scene.config.frame.reference, str):
             given = ", ".join(context.nstr(x, 17) for x in scene.reference)
             described = f"plane with the normal [{given}] in space axes"
-        return _fixed(m, scene.reference, described)
+        return fixed_plane(m, scene.reference, described)
     load = _source(scene, m.loads)
     if load.orbit is not None:
         orbit = load.orbit
         described = "plane of the source's orbit"
         if orbit.node_rate == 0:
-            return _fixed(m, _normal_of(context, orbit.inclination, orbit.ascending_node), described)
+            return fixed_plane(m, _normal_of(context, orbit.inclination, orbit.ascending_node), described)
         return _moving(m.orbit(orbit).normal, described + ", whose node moves")
     if load.attracting_point is not None:
-        return _moving(_flight_normal(m, load.attracting_point), "osculating plane of the body's own orbit")
+        return _moving(flight_normal(m, load.attracting_point), "osculating plane of the body's own orbit")
     return _moving(_ecliptic_of_date(m), "mean ecliptic of date (IAU 2006)")
 
 
@@ -146,8 +146,8 @@ def _source(scene: Scene, loads: Sequence[Any]) -> Any:
     raise ConfigError(Problem("[frame] reference", what + '; "space" or a normal [x, y, z] is allowed'))
 
 
-def _fixed(m: Mechanics, normal: Vector, described: str) -> ReferencePlane:
-    """Worked out in the scene's arithmetic, and rounded once."""
+def fixed_plane(m: Mechanics, normal: Vector, described: str) -> ReferencePlane:
+    """The plane with a fixed unit normal (mpf, space axes); worked out exactly, and rounded once."""
     context = m.scene.context
     x, y, z = normal
     one, zero = context.one, context.zero
@@ -167,7 +167,8 @@ def _moving(normal: list[Symbolic], described: str) -> ReferencePlane:
     return ReferencePlane(first, second, normal, described)
 
 
-def _flight_normal(m: Mechanics, point: Vector) -> list[Symbolic]:
+def flight_normal(m: Mechanics, point: Vector) -> list[Symbolic]:
+    """Unit vector along r x v about an attracting point, space axes."""
     context, scaling = m.scene.context, m.scaling
     offset = []
     for x, a in zip(m.carried(m.position), point, strict=True):

@@ -77,6 +77,15 @@ def largest_axis(body: RigidBody, context: Any) -> Vector | None:
     return _upright(body.principal_axes[order[2]])
 
 
+def smallest_axis(body: RigidBody, context: Any) -> Vector | None:
+    """The same of smallest moment: the long axis."""
+    moments = body.principal_moments
+    order = sorted(range(3), key=lambda i: moments[i])
+    if moments[order[1]] - moments[order[0]] <= moments[order[2]] * negligible(context):
+        return None
+    return _upright(body.principal_axes[order[0]])
+
+
 def reference_normal(config: schema.Config, context: Any) -> Vector | None:
     """Unit normal (mpf, space axes) of the plane that ``[frame] reference`` names; None for a moving one.
 

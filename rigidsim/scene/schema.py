@@ -20,6 +20,7 @@ from pydantic import (
     Tag,
     create_model,
     field_validator,
+    model_validator,
 )
 
 from rigidsim.scene.exact import ZERO, parse_number
@@ -248,6 +249,11 @@ class Output(ConfigTable):
     timeline_rows: StrictInt = Field(default=100_000, ge=2)
     estimate: StrictBool = True
     lyapunov: StrictBool = False
+    tip: Triple[Metre] | None = Field(
+        default=None,
+        description="the point whose path is recorded as tip, in body axes from the reference point; by "
+        "default the centre of mass of a body that turns about another point",
+    )
 
     @field_validator("record")
     @classmethod
@@ -261,6 +267,12 @@ class Output(ConfigTable):
         if value is not None and len(set(value)) < len(value):
             raise refuse("a variable is named twice; name each once")
         return value
+
+    @model_validator(mode="after")
+    def _tip_is_recorded(self) -> Output:
+        if self.tip is not None and self.record is not None and "tip" not in self.record:
+            raise refuse('a tip is given, but record has no "tip"; name it there, or leave tip out')
+        return self
 
 
 class EventTable(ConfigTable):

@@ -27,7 +27,10 @@ RecordedParts = dict[str, list[np.ndarray]]
 
 
 def evaluate_rows(
-    function: CompiledFunction, states: np.ndarray, constants: np.ndarray | None = None
+    function: CompiledFunction,
+    states: np.ndarray,
+    constants: np.ndarray | None = None,
+    times: np.ndarray | None = None,
 ) -> np.ndarray:
     """Evaluate a compiled function at each row of states.
 
@@ -38,6 +41,7 @@ def evaluate_rows(
     Args:
         states: (n, states).
         constants: the function's parameters, (k,) for all rows or (k, n).
+        times: (n,), internal units, where the function may depend on them.
 
     Returns:
         (outputs, n).
@@ -49,11 +53,14 @@ def evaluate_rows(
         states = np.concatenate([states, np.repeat(states[-1:], padded - count, axis=0)])
     # compiled code for expressions without parameters refuses an array of them
     arguments = {}
+    if times is not None and getattr(function, "is_time_dependent", False):
+        moments = np.asarray(times, dtype=states.dtype)
+        arguments["time"] = np.concatenate([moments, np.repeat(moments[-1:], padded - count)])
     if constants is not None:
         table = np.repeat(constants[:, None], padded, axis=1) if constants.ndim == 1 else constants
         if table.shape[1] < padded:
             table = np.concatenate([table, np.repeat(table[:, -1:], padded - count, axis=1)], axis=1)
-        arguments = {"pars": np.ascontiguousarray(table)}
+        arguments["pars"] = np.ascontiguousarray(table)
     return np.asarray(function(np.ascontiguousarray(states.T), **arguments))[:, :count]
 
 
@@ -82,22 +89,27 @@ class _PartnerChart:
         """Of the partner chart, (n,)."""
         return np.asarray(evaluate_rows(self._singular, states)[0])
 
-    def sizes(self, states: np.ndarray) -> np.ndarray:
+    def sizes(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Squared, of the angles' sines and cosines, (angles that have one, n)."""
         assert self._sizes is not None
-        return evaluate_rows(self._sizes, states)
+        return evaluate_rows(self._sizes, states, times=times)
 
     def values(
-        self, states: np.ndarray, reference: np.ndarray, initial: np.ndarray, wrapping: AngleWrapping
+        self,
+        states: np.ndarray,
+        times: np.ndarray,
+        reference: np.ndarray,
+        initial: np.ndarray,
+        wrapping: AngleWrapping,
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """All outputs (outputs, n), and the recorded Euler angles of the asked sequence (n, 3), if any.
 
         Args:
-            states, reference: as of ``SampleBlock``.
+            states, times, reference: as of ``SampleBlock``.
             initial: invariants' components.
         """
         if self._angles is None:
-            return evaluate_rows(self._outputs, states, initial if len(initial) else None), None
+            return evaluate_rows(self._outputs, states, initial if len(initial) else None, times), None
         plain = states[:, self._positions].astype(np.float64)
         lifted = [
             self._lift(before, tuple(angles))
@@ -109,7 +121,7 @@ class _PartnerChart:
             [either[self._lift.branch(angles[1])] for angles, *_ in lifted], dtype=self._precision.scalar
         )
         constants = np.concatenate([np.repeat(initial[:, None], len(states), axis=1), [branches]])
-        values = evaluate_rows(self._outputs, states, constants)
+        values = evaluate_rows(self._outputs, states, constants, times)
         angles = values[self._angles].T
         full = np.rint((near - angles.astype(np.float64)) / (2 * np.pi))
         angles = wrapping.unwrapped(angles, full)
@@ -186,12 +198,18 @@ class Evaluator:
             The recorded variables, and of each invariant its drift, (n, 1), one part.
         """
         assert self._outputs is not None
-        values = evaluate_rows(self._outputs, block.states, self.initial if self._parameters else None)
+        initial = self.initial if self._parameters else None
+        values = evaluate_rows(self._outputs, block.states, initial, block.times)
         in_partner = block.chart != 0
         angles: np.ndarray | None = None
         if in_partner.any():
-            states, reference = block.states[in_partner], block.reference[in_partner]
-            there, angles = self._partner.values(states, reference, self.initial, self._wrapping)
+            there, angles = self._partner.values(
+                block.states[in_partner],
+                block.times[in_partner],
+                block.reference[in_partner],
+                self.initial,
+                self._wrapping,
+            )
             values[:, in_partner] = there
         result: RecordedParts = {}
         turned = self._turned(values, block) if self._angles else None
@@ -250,10 +268,10 @@ class Evaluator:
     def _sizes(self, block: SampleBlock) -> np.ndarray:
         """Squared sizes of the angles' sines and cosines, (angles that have one, n)."""
         assert self._angles.sizes is not None
-        sizes = evaluate_rows(self._angles.sizes, block.states)
+        sizes = evaluate_rows(self._angles.sizes, block.states, times=block.times)
         in_partner = block.chart != 0
         if in_partner.any():
-            sizes[:, in_partner] = self._partner.sizes(block.states[in_partner])
+            sizes[:, in_partner] = self._partner.sizes(block.states[in_partner], block.times[in_partner])
         return sizes
 
     def _nearest(self, block: np.ndarray) -> np.ndarray:

@@ -247,7 +247,7 @@ class TurnCounter:
         states = self._follower.states(times, state)
         if states is None or not np.isfinite(states).all():
             return None
-        values = np.asarray(self._function(np.ascontiguousarray(states.T)))
+        values = np.asarray(self._function(np.ascontiguousarray(states.T), time=times))
         return times, states, np.nan_to_num(values[:-1].T), np.sqrt(values[-1].max()) + self._source
 
     def _advance(self, limit: float) -> None:

@@ -21,6 +21,8 @@ LABELS: dict[str, list[str]] = {
     "polar_motion_component": ["m1", "m2"],
     "andoyer_momentum": ["L", "G", "H"],
     "andoyer_angle": ["l", "g", "h"],
+    "roll_pitch_yaw_component": ["roll", "pitch", "yaw"],
+    "libration_angle": ["in_plane", "out_of_plane"],
 }
 """Coordinates beside time, with their labels."""
 

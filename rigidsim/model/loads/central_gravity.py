@@ -45,6 +45,7 @@ class CentralGravity(Load):
     described = "a central-gravity load"
     reads = frozenset({"attitude", "flight"})
     conservative = True
+    has_source = True
 
     @classmethod
     def resolve(cls, fields: CentralGravityFields, around: Surroundings) -> CentralGravity:
@@ -82,6 +83,10 @@ class CentralGravity(Load):
         inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in offset]))
         space = [x * inverse for x in offset]
         return space, apply(transpose(m.matrix), space), inverse
+
+    def source_direction(self, m: Kinematics) -> list[Symbolic]:
+        """Unit vector to the attracting point, body axes."""
+        return [-x for x in self.geometry(m)[1]]
 
     def _strength(self, m: Kinematics, length_power: int, extra: int) -> Any:
         """G M over length^power, times 2^extra."""

@@ -54,6 +54,7 @@ class GravityGradient(Load):
     title = "gravity_gradient"
     described = "a gravity-gradient load"
     reads = frozenset({"attitude"})
+    has_source = True
 
     @classmethod
     def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> GravityGradient:
@@ -103,7 +104,7 @@ class GravityGradient(Load):
             time = time + m.number(ExactNumber(self.epoch.since_j2000()).at(context))
         return source_position(self.ephemeris, time)
 
-    def direction(self, m: Kinematics) -> list[Symbolic]:
+    def source_direction(self, m: Kinematics) -> list[Symbolic]:
         """Unit vector towards the attracting body, body axes."""
         if m.attitude is not None and m.attitude.orbital is not None:
             return m.attitude.orbital.direction
@@ -132,12 +133,12 @@ class GravityGradient(Load):
 
     def torque(self, m: Kinematics) -> list[Term]:
         """(3 G M / R^3) c x (I c)."""
-        return gradient_terms(m, self.direction(m), *self.strength(m))
+        return gradient_terms(m, self.source_direction(m), *self.strength(m))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         """(3 G M / 2 R^3) c . I c (the part that doesn't depend on the attitude is left out)."""
         strength, factor = self.strength(m)
-        potential = as_factor(m.number(3 * strength / 2)) * quadratic_form(m, self.direction(m))
+        potential = as_factor(m.number(3 * strength / 2)) * quadratic_form(m, self.source_direction(m))
         return potential if factor is None else factor * potential
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:

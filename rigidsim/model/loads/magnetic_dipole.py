@@ -92,6 +92,15 @@ class MagneticDipole(Load):
         """In a uniform field."""
         return self.orbit is None
 
+    @property
+    def has_source(self) -> bool:  # type: ignore[override]
+        """Along an orbit."""
+        return self.orbit is not None
+
+    def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
+        """Of the centred dipole."""
+        return None if self.orbit is None else apply(transpose(m.matrix), m.orbit(self.orbit).direction)
+
     def _size(self, scene: Scene) -> Any:
         """Of the field, T: at the semi-major axis over the source's equator, where there is an orbit."""
         size = norm(scene.context, self.source)

@@ -1,0 +1,107 @@
+"""The local frame of a body with a source: z to the source, y against the orbit's normal, x horizontal.
+
+On a circular orbit x points forward. The normal is that of
+
+- a prescribed orbit: its own plane's, which moves with the node;
+- free flight about an attracting point: r x v, the osculating plane's;
+- an ephemeris: the pole of the ecliptic (space Z), less its part along z;
+- a source at rest, which has no orbit: space Z in the same way, or X where the source lies along Z.
+
+Of several sources the first in the config counts. (Hughes, Spacecraft Attitude Dynamics, 1986, ch. 9; Wertz,
+Spacecraft Attitude Determination and Control, 1978, ch. 2.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.load import Load
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.reference_plane import flight_normal
+from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.scene.arithmetic import cross, norm
+from rigidsim.scene.scene import Scene
+
+_SLOW = 2
+"""Turns per revolution up to which a scene is about the attitude in orbit: a spin or tumble is faster."""
+
+
+@dataclass(frozen=True)
+class LocalFrame:
+    """Unit vectors in body axes.
+
+    Attributes:
+        down: z, towards the source.
+        normal: of the orbit, -y.
+        described: what the source and the normal are.
+    """
+
+    down: list[Symbolic]
+    normal: list[Symbolic]
+    described: str
+
+    @property
+    def forward(self) -> list[Symbolic]:
+        """x = y x z."""
+        x: list[Symbolic] = cross(self.down, self.normal)
+        return x
+
+
+def first_source(loads: Sequence[Any]) -> Any | None:
+    """The load whose source angles speak of; None where no load has one."""
+    return next((load for load in loads if getattr(load, "has_source", False)), None)
+
+
+def flies_about_source(scene: Scene) -> bool:
+    """Whether the source's direction is that of the body's own flight."""
+    load = first_source(scene.loads)
+    return load is not None and load.attracting_point is not None
+
+
+def local_frame(m: Mechanics) -> LocalFrame:
+    """Of the first source."""
+    load = m.carried(first_source(m.loads))
+    down = m.carried(load.source_direction(m))
+    normal, described = _normal(m, load, down)
+    return LocalFrame(down, normal, f"source: {load.title}, number {m.loads.index(load) + 1}; {described}")
+
+
+def moves_slowly_in_orbit(m: Mechanics) -> bool:
+    """Whether the scene is about the body's attitude in its orbit: a prescribed one or free flight, and at
+    most two turns per revolution at the start.
+    """
+    load: Load | None = first_source(m.loads)
+    if load is None:
+        return False
+    context, scene = m.scene.context, m.scene
+    if load.orbit is not None:
+        rate = abs(load.orbit.mean_motion)
+    elif load.attracting_point is not None and scene.position is not None and scene.velocity is not None:
+        place = [x - a for x, a in zip(scene.position, load.attracting_point, strict=True)]
+        rate = norm(context, cross(place, scene.velocity)) / sum(x * x for x in place)
+    else:
+        return False
+    return bool(norm(context, scene.angular_velocity) <= _SLOW * rate)
+
+
+def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbolic], str]:
+    if m.attitude is not None and m.attitude.orbital is not None:
+        return m.attitude.orbital.normal, "normal of its orbit"
+    to_body = transpose(m.matrix)
+    if load.orbit is not None:
+        return apply(to_body, m.orbit(load.orbit).normal), "normal of its orbit"
+    if load.attracting_point is not None:
+        return apply(to_body, flight_normal(m, load.attracting_point)), "normal of the osculating orbit"
+    which, described = 2, "space Z, across the source's direction, as the normal"
+    fixed = load.fixed_source(m.scene)
+    if fixed is not None and all(x == 0 for x in fixed[1][:2]):
+        which, described = 0, "space X as the normal"
+    pole = m.matrix[which]
+    part = hy.sum([a * b for a, b in zip(pole, down, strict=True)])
+    across = [a - part * b for a, b in zip(pole, down, strict=True)]
+    size = hy.sqrt(hy.sum([x * x for x in across]))
+    return [x / size for x in across], described

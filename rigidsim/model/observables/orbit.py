@@ -1,0 +1,96 @@
+"""The attitude in orbit: roll, pitch and yaw, libration, and where the source is (``local_frame``).
+
+With c the direction to the source and o the orbit's normal in body axes, and R the matrix whose rows are the
+local frame's axes in body axes,
+
+    R = Rz(yaw) Ry(pitch) Rx(roll),   roll = atan2(c_y, c_z),   pitch = -asin(c_x),   yaw = atan2(-o_x, x_x)
+
+with x = c x o. On a circular orbit a satellite at rest in the local frame has all three zero.
+
+Libration of the long axis l (the principal axis of smallest moment): in the plane atan2(l . x, l . c),
+positive forward, and out of it asin(l . o), positive to the normal's side. (Hughes, Spacecraft Attitude
+Dynamics, 1986, ch. 9; Beletskii, Motion of an Artificial Satellite about its Center of Mass, 1966, ch. 2.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import heyoka as hy
+
+from rigidsim.model.local_frame import local_frame, moves_slowly_in_orbit
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables.observable import (
+    BODY,
+    NO_UNIT,
+    Angle,
+    Observable,
+    continuous_angles,
+    same_unit,
+)
+from rigidsim.model.observables.vectors import along, in_body
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.frame import smallest_axis
+from rigidsim.scene.registry import register_observable
+
+ROLL_PITCH_YAW = ("roll_pitch_yaw_component",)
+LIBRATION = ("libration_angle",)
+
+
+def nadir(m: Mechanics) -> list[Symbolic]:
+    """Unit vector to the source, body axes."""
+    return local_frame(m).down
+
+
+def roll_pitch_yaw(m: Mechanics) -> list[Angle]:
+    """3-2-1 angles from the local frame to body axes."""
+    frame = local_frame(m)
+    c, o = frame.down, frame.normal
+    level = hy.sqrt(c[1] * c[1] + c[2] * c[2])
+    return [Angle(c[1], c[2]), Angle(-c[0], level), Angle(-o[0], frame.forward[0])]
+
+
+def libration(m: Mechanics) -> list[Angle]:
+    """Of the long axis, in the orbit's plane and out of it."""
+    frame = local_frame(m)
+    axis = in_body(m, m.carried(smallest_axis(m.scene.body, m.scene.context)))
+    x, z = along(axis, frame.forward), along(axis, frame.down)
+    return [Angle(x, z), Angle(along(axis, frame.normal), hy.sqrt(x * x + z * z))]
+
+
+def _no_long_axis(m: Mechanics) -> str | None:
+    if smallest_axis(m.scene.body, m.scene.context) is not None:
+        return None
+    return "the body has no single axis of smallest moment, whose libration it would be"
+
+
+def _told(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
+    return lambda m: {"convention": convention, "local_frame": local_frame(m).described}
+
+
+_NEEDS = ("attitude", "source")
+
+for _observable in (
+    continuous_angles(
+        "roll_pitch_yaw", ROLL_PITCH_YAW, "roll, pitch and yaw", roll_pitch_yaw,
+        frame="local frame to body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit,
+        attributes=_told(
+            "3-2-1 (yaw about z, pitch about y, roll about x) from the local frame (z to the source, y "
+            "against the orbit's normal) to body axes; turns counted; roll and yaw are NaN where pitch is a "
+            "quarter turn"
+        ),
+    ),
+    continuous_angles(
+        "libration", LIBRATION, "libration of the axis of smallest moment", libration,
+        frame="local frame", needs=_NEEDS, absent=_no_long_axis,
+        attributes=_told(
+            "angles of the axis of smallest moment from the direction to the source: in the orbit's plane, "
+            "positive forward, turns counted; out of it, positive towards the orbit's normal"
+        ),
+    ),
+    Observable(
+        "nadir", BODY, "1", "direction to the source", nadir, same_unit(NO_UNIT, 3), "body axes", _NEEDS,
+        by_default=moves_slowly_in_orbit, attributes=_told("unit vector"),
+    ),
+):  # fmt: skip
+    register_observable(_observable)

@@ -1,0 +1,136 @@
+"""A top: tilt, precession and spin of its figure axis against the vertical, and the path of a point of it.
+
+With p the figure axis and v the upward vertical (against gravity) in body axes, e and f the axes of the
+figure's equator, and p_X, p_Y the figure axis along the horizontal axes,
+
+    tilt = atan2(hypot(v.e, v.f), v.p),   spin = atan2(v.e, v.f),   precession = atan2(p_X, -p_Y):
+
+the z-x-z Euler angles theta, psi and phi where gravity points down along Z and the figure axis is z (Landau
+& Lifshitz, Mechanics, section 35). The horizontal X is the space axis turned by the smallest rotation that
+takes Z to the vertical.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import heyoka as hy
+
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables.axes import figure_axis
+from rigidsim.model.observables.observable import (
+    NO_UNIT,
+    SPACE,
+    Angle,
+    Observable,
+    continuous_angles,
+    same_unit,
+)
+from rigidsim.model.observables.vectors import along, figure_told, in_body
+from rigidsim.model.reference_plane import fixed_plane
+from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.registry import register_observable
+
+
+def _vertical(m: Mechanics) -> list[Symbolic]:
+    """The upward vertical along the figure's equator (two) and the figure axis."""
+    figure = m.scene.figure
+    up = m.carried(m.vertical)
+    return [along(in_body(m, axis), up) for axis in (figure.first, figure.second, figure.pole)]
+
+
+def tilt(m: Mechanics) -> list[Symbolic]:
+    """Angle of the figure axis from the upward vertical, 0 to pi."""
+    e, f, p = _vertical(m)
+    return [hy.atan2(hy.sqrt(e * e + f * f), p)]
+
+
+def spin_angle(m: Mechanics) -> list[Angle]:
+    """Of the body about its figure axis, from the line of nodes."""
+    e, f, _ = _vertical(m)
+    return [Angle(e, f)]
+
+
+def precession_angle(m: Mechanics) -> list[Angle]:
+    """Of the figure axis about the vertical: of the line of nodes from the horizontal X."""
+    plane = fixed_plane(m, m.carried(m.numbers.up), "horizontal plane")
+    u, v, _ = plane.components(figure_axis(m))
+    return [Angle(u, -v)]
+
+
+def tip_point(m: Mechanics) -> Vector | None:
+    """The point whose path is recorded, body axes from the reference point, m (mpf): ``[output] tip``, or the
+    centre of mass of a body that turns about another point; None without either.
+    """
+    given = m.scene.config.output.tip
+    if given is not None:
+        return [x.at(m.scene.context) for x in given]
+    center = m.scene.body.center_of_mass
+    return list(center) if any(x != 0 for x in center) else None
+
+
+def tip(m: Mechanics) -> list[Symbolic]:
+    """Where it is in space."""
+    context, length = m.scene.context, _tip_exponent(m)
+    point = [context.ldexp(x, -length) for x in m.carried(tip_point(m))]
+    turned = apply(m.matrix, in_body(m, point))
+    if m.position is None:
+        return turned
+    return [x + a for x, a in zip(m.position, turned, strict=True)]
+
+
+def _tip_exponent(m: Mechanics) -> int:
+    return m.scaling.length if m.position is not None else 0
+
+
+def _no_tip(m: Mechanics) -> str | None:
+    if tip_point(m) is not None:
+        return None
+    return "nothing says which point; give [output] tip = [x, y, z] in body axes, or"
+
+
+def _is_top(m: Mechanics) -> bool:
+    return m.numbers.arm is not None
+
+
+def _traced(m: Mechanics) -> bool:
+    return _is_top(m) or m.scene.config.output.tip is not None
+
+
+def _told(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
+    return lambda m: {"convention": convention} | figure_told(m)
+
+
+def _tip_told(m: Mechanics) -> dict[str, str]:
+    point = tip_point(m)
+    told = "" if point is None else ", ".join(m.scene.context.nstr(x, 17) for x in point)
+    return {"point": f"[{told}] m in body axes"}
+
+
+for _observable in (
+    Observable(
+        "tilt", (), "rad", "angle of the figure axis from the upward vertical", tilt, same_unit(NO_UNIT, 1),
+        "", ("vertical",), by_default=_is_top, attributes=_told("from 0, upright, to pi, hanging"),
+    ),
+    continuous_angles(
+        "precession_angle", (), "precession of the figure axis about the vertical", precession_angle,
+        frame="space axes", needs=("attitude", "vertical"), by_default=_is_top,
+        attributes=_told(
+            "of the line of nodes from the horizontal X, about the upward vertical; turns counted; NaN where "
+            "the figure axis is vertical"
+        ),
+    ),
+    continuous_angles(
+        "spin_angle", (), "rotation about the figure axis", spin_angle,
+        needs=("attitude", "vertical"), by_default=_is_top,
+        attributes=_told(
+            "of the body from the line of nodes; turns counted; NaN where the figure axis is vertical"
+        ),
+    ),
+    Observable(
+        "tip", SPACE, "m", "path of a point of the body", tip, same_unit(_tip_exponent, 3), "space axes",
+        ("attitude", "place"), by_default=_traced, attributes=_tip_told, absent=_no_tip,
+    ),
+):  # fmt: skip
+    register_observable(_observable)

@@ -1,0 +1,230 @@
+"""Roll, pitch and yaw, libration and nadir: against their definitions, and against closed forms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+import pytest
+import xarray
+from mpmath import mp
+from support import EPSILON, config, loaded, run_text, wide
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.model.ephemeris import source_position
+
+pytestmark = pytest.mark.compact
+
+NAMES = 'record = ["quaternion", "roll_pitch_yaw", "libration", "nadir"{}]'
+BODY = 'principal_moments = ["0.9", 1, "0.4"]\nmass = 2'
+START = 'angular_velocity = ["0.1", "-0.9", "0.3"]\neuler_angles = ["0.4", "0.3", "0.2"]'
+GRADIENT = 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+ORBIT = """orbit = {{semi_major_axis = 1, eccentricity = {e}, inclination = "0.7", ascending_node = "0.5", \
+periapsis = "0.3", mean_anomaly = "0.2", node_rate = {node}, periapsis_rate = {periapsis}}}"""
+LONG_AXIS = 2  # body z
+
+
+def exactly(values: np.ndarray) -> list[Any]:
+    """80-bit numbers as mpf."""
+    return [mp.mpf(float(x)) + mp.mpf(float(x - np.longdouble(float(x)))) for x in np.ravel(values)]
+
+
+def rotation(q: list[Any]) -> Any:
+    """Body to space."""
+    w, x, y, z = (a / mp.sqrt(sum(b * b for b in q)) for a in q)
+    return mp.matrix(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def turn(angle: Any, axis: int) -> Any:
+    """About space axis 1 or 3."""
+    c, s = mp.cos(angle), mp.sin(angle)
+    if axis == 1:
+        return mp.matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return mp.matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def unit(vector: Any) -> Any:
+    return vector / mp.norm(vector)
+
+
+def cross(a: Any, b: Any) -> Any:
+    return mp.matrix([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def kepler(time: Any, e: Any, node: Any, periapsis: Any) -> tuple[Any, Any]:
+    """Direction to the source and normal of ``ORBIT``, space axes."""
+    mean = mp.mpf("0.2") + time
+    anomaly = mp.findroot(lambda x: x - e * mp.sin(x) - mean, mean)
+    place = mp.matrix([mp.cos(anomaly) - e, mp.sqrt(1 - e * e) * mp.sin(anomaly), 0])
+    plane = turn(mp.mpf("0.5") + node * time, 3) * turn(mp.mpf("0.7"), 1)
+    return unit(plane * turn(mp.mpf("0.3") + periapsis * time, 3) * place), plane * mp.matrix([0, 0, 1])
+
+
+def defined(matrix: Any, down: Any, normal: Any) -> list[Any]:
+    """Roll, pitch, yaw, libration in and out of the plane, nadir, from their definitions alone."""
+    y = -normal
+    local = [cross(y, down), y, down]  # in space axes
+    rows = [[sum(axis[k] * matrix[k, j] for k in range(3)) for j in range(3)] for axis in local]
+    roll, pitch = mp.atan2(rows[2][1], rows[2][2]), -mp.asin(rows[2][0])
+    yaw = mp.atan2(rows[1][0], rows[0][0])
+    long = [row[LONG_AXIS] for row in rows]  # along x, y, z of the local frame
+    return [roll, pitch, yaw, mp.atan2(long[0], long[2]), -mp.asin(long[1]), *rows[2]]
+
+
+def misses(dataset: xarray.Dataset, row: int, down: Any, normal: Any) -> float:
+    """Largest difference of what a row has from the definitions, whole turns apart."""
+    matrix = rotation(exactly(wide(dataset, "quaternion")[row]))
+    expected = defined(matrix, down, normal)
+    got: list[Any] = []
+    for name in ("roll_pitch_yaw", "libration", "nadir"):
+        got += exactly(wide(dataset, name)[row])
+    found = [
+        mp.fmod(a - b + 9 * mp.pi, 2 * mp.pi) - mp.pi for a, b in zip(got[:5], expected[:5], strict=True)
+    ]
+    found += [a - b for a, b in zip(got[5:], expected[5:], strict=True)]
+    return float(max(abs(x) for x in found))
+
+
+def ran(out: Path, loads: Any, **tables: str) -> xarray.Dataset:
+    tables = {
+        "body": BODY,
+        "initial": START,
+        "time": "end = 6\nsamples = 4",
+        "output": NAMES.format(""),
+    } | tables
+    return loaded(run_text(config(loads=loads, **tables), out))
+
+
+@pytest.mark.parametrize(
+    ("e", "node", "periapsis"),
+    [("0", "0", "0"), ("0.3", "-0.2", "0.1")],
+    ids=["carried in the orbit's frame", "eccentric, node and periapsis move"],
+)
+def test_they_are_their_definitions_to_80_bits(runs: Path, e: str, node: str, periapsis: str) -> None:
+    """From the recorded quaternion and Kepler's equation, both in 40 digits."""
+    load = GRADIENT + ORBIT.format(e=f'"{e}"', node=f'"{node}"', periapsis=f'"{periapsis}"')
+    dataset = ran(runs, load, integrator='precision = "extended"')
+    assert dataset["roll_pitch_yaw"].dims == ("time", "roll_pitch_yaw_component")
+    assert list(dataset["roll_pitch_yaw_component"].values) == ["roll", "pitch", "yaw"]
+    assert list(dataset["libration_angle"].values) == ["in_plane", "out_of_plane"]
+    with mp.workdps(40):
+        motion = [mp.mpf(x) for x in (e, node, periapsis)]
+        for row in range(4):
+            down, normal = kepler(mp.mpf(2) * row, *motion)
+            # the orbit's states and the quaternion keep 80 bits to some 1e2 roundings over so few steps
+            assert misses(dataset, row, down, normal) < 100 * EPSILON["extended"]
+    assert "number 1; normal of its orbit" in dataset["nadir"].attrs["local_frame"]
+
+
+def test_in_free_flight_they_count_from_the_path(runs: Path) -> None:
+    """Central gravity: down to the point, normal r x v. It is recorded by default: the body turns slowly."""
+    start = START.replace("0.9", "0.4") + "\nposition = [10, 1, 2]\nvelocity = [0.3, 3, 1]"
+    load = 'kind = "central_gravity"\ngravitational_parameter = 100\nposition = ["0.2", 0, 0]'
+    dataset = ran(runs, load, initial=start, output=NAMES.format(', "position", "velocity"'))
+    with mp.workdps(40):
+        for row in range(4):
+            place = mp.matrix(exactly(wide(dataset, "position")[row])) - mp.matrix([0.2, 0, 0])
+            velocity = mp.matrix(exactly(wide(dataset, "velocity")[row]))
+            assert misses(dataset, row, unit(-place), unit(cross(place, velocity))) < 50 * EPSILON["double"]
+    everything = ran(runs, load, initial=start, output="", time="end = 1\nsamples = 2")
+    assert {"roll_pitch_yaw", "nadir"} <= set(everything)
+    assert "libration" not in everything  # only when named
+
+
+def test_a_source_at_rest_and_an_ephemeris_count_from_space_z(runs: Path) -> None:
+    """And of several sources the first counts."""
+    rest = GRADIENT + "position = [3, 4, 5]"
+    orbit = GRADIENT + ORBIT.format(e=0, node=0, periapsis=0)
+    dataset = ran(runs, [rest, orbit])
+    with mp.workdps(40):
+        down, z = unit(mp.matrix([3, 4, 5])), mp.matrix([0, 0, 1])
+        normal = unit(z - down * down[2])
+        assert max(misses(dataset, row, down, normal) for row in range(4)) < 50 * EPSILON["double"]
+        above = ran(runs, GRADIENT + "position = [0, 0, -2]", time="end = 1\nsamples = 2")
+        assert misses(above, 1, mp.matrix([0, 0, -1]), mp.matrix([1, 0, 0])) < 50 * EPSILON["double"]
+        sun = GRADIENT.replace("= 1", "= 1.32712440018e20") + 'ephemeris = "sun"'
+        body = 'principal_moments = ["0.9", 1, "0.4"]'
+        dataset = ran(
+            runs, sun, body=body, initial="angular_velocity = [0, 0, 1e-6]", time='end = "2 day"\nsamples = 3'
+        )
+        series = hy.cfunc(
+            source_position("sun", hy.time).direction, [hy.make_vars("none")], compact_mode=True
+        )
+        for row in range(3):
+            down = mp.matrix([mp.mpf(float(x)) for x in series([0.0], time=float(dataset["time"][row]))])
+            assert misses(dataset, row, down, unit(z - down * down[2])) < 1e-13  # time's digits in the series
+
+
+def polar(time: str, initial: str, record: str = '"roll_pitch_yaw", "nadir"', body: str = BODY) -> str:
+    """A satellite at the Earth's unit distance, whose local frame starts along the space axes; n = 1."""
+    orbit = 'orbit = {semi_major_axis = 1, inclination = "90 deg", periapsis = "90 deg"}'
+    return config(body, initial, GRADIENT + orbit, time, 'euler_sequence = "zyx"', f"record = [{record}]")
+
+
+def test_a_satellite_at_rest_in_its_orbit_has_none_and_a_small_pitch_swings_at_its_frequency(
+    runs: Path,
+) -> None:
+    """n sqrt(3 (I_x - I_z)/I_y), Hughes 1986, ch. 9; a pendulum's frequency falls by (2 a)^2/16."""
+    rest = loaded(run_text(polar("end = 20\nsamples = 41", "angular_velocity = [0, -1, 0]"), runs))
+    assert np.abs(rest["roll_pitch_yaw"].values).max() < 1e-13
+    assert np.abs(rest["nadir"].values - [0, 0, 1]).max() < 1e-13
+    small = 1e-4
+    start = f"angular_velocity = [0, -1, 0]\neuler_angles = [0, {small}, 0]"  # yaw, pitch, roll
+    swing = loaded(run_text(polar("end = 40\nsamples = 401", start), runs))
+    rate = np.sqrt(3 * (0.9 - 0.4) / 1)
+    time, angles = swing["time"].values, swing["roll_pitch_yaw"].values
+    assert np.abs(angles[:, 1] - small * np.cos(rate * time)).max() < small * (
+        small**2 / 4 * rate * 40 + 1e-9
+    )
+    assert np.abs(angles[:, [0, 2]]).max() < 1e-15
+
+
+def test_sparse_samples_keep_true_turns(runs: Path) -> None:
+    """A satellite that spins in roll, eight turns between samples, and one that tumbles in the orbit's plane:
+    its in-plane angle obeys a'^2 = a'(0)^2 - k sin(a)^2 with k = 3 (I_x - I_z)/I_y, as a pendulum.
+    """
+    spun = "angular_velocity = [200, 0, 0]\neuler_angles = [0, 0.1, 0]"
+    stable = 'principal_moments = [1, "0.9", "0.4"]'
+    dense = loaded(run_text(polar("end = 1\nevery = 0.005", spun, '"roll_pitch_yaw"', stable), runs))
+    sparse = loaded(run_text(polar("end = 1\nevery = 0.25", spun, '"roll_pitch_yaw"', stable), runs))
+    every, few = (found["roll_pitch_yaw"].values for found in (dense, sparse))
+    assert np.abs(np.diff(every, axis=0)).max() < 1.5  # so dense that it tells turns
+    assert np.abs(few - every[::50]).max() < 1e-9
+    assert few[-1, 0] > 150
+    rate, k = 31.0, 3 * (0.9 - 0.4)
+    found = loaded(
+        run_text(polar("end = 12\nevery = 4", "angular_velocity = [0, 30, 0]", '"libration"'), runs)
+    )
+    turned, time = found["libration"].values[:, 0], found["time"].values
+    assert np.abs(turned - (rate - k / (4 * rate)) * time).max() < 1e-3  # to first order in k / rate^2 = 2e-3
+
+
+def test_what_a_scene_lacks_is_said(tmp_path: Path) -> None:
+    def refused(loads: str, body: str = BODY, name: str = "libration") -> str:
+        text = config(body, START, loads, output=f'record = ["{name}"]')
+        with pytest.raises(ConfigError) as raised:
+            rigidsim.run(rigidsim.parse(text), out=tmp_path)
+        return str(raised.value)
+
+    orbit = GRADIENT + ORBIT.format(e=0, node=0, periapsis=0)
+    assert "no load has a source" in refused("", name="nadir")
+    assert "no single axis of smallest moment" in refused(orbit, "principal_moments = [1, 1, 2]")
+
+
+def test_a_planet_is_no_satellite(runs: Path) -> None:
+    """A spin of many turns per revolution: nobody asks for its roll."""
+    orbit = GRADIENT + ORBIT.format(e=0, node=0, periapsis=0)
+    start = "angular_velocity = [0, 0, {}]"
+    for spin, there in ((2, True), (2.01, False)):
+        dataset = ran(runs, orbit, initial=start.format(spin), output="", time="end = 0.1\nsamples = 2")
+        assert ("nadir" in dataset) is there
+        assert ("roll_pitch_yaw" in dataset) is there
