@@ -86,4 +86,4 @@ def _plain(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)[:200]
 
 
-FORMAT = Format(write_csv, side_tables=True)
+FORMAT = Format(write_csv, angles=True, side_tables=True)

@@ -38,4 +38,4 @@ def write_parquet(table: Table, path: Path, source: Source) -> None:
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
-FORMAT = Format(write_parquet, package="pyarrow", side_tables=True)
+FORMAT = Format(write_parquet, package="pyarrow", angles=True, side_tables=True)

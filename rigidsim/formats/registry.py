@@ -13,6 +13,7 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats import FORMATS
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.tables import Table
+from rigidsim.look.angle_units import AngleUnit
 
 
 @dataclass(frozen=True)
@@ -24,12 +25,14 @@ class Source:
         bits: of its precision.
         attributes: of its dataset.
         naming: what the dataset may not know of itself.
+        angle_unit: that angles are written in; None for rad.
     """
 
     title: str
     bits: int
     attributes: dict[str, Any]
     naming: Naming
+    angle_unit: AngleUnit | None = None
 
 
 @dataclass(frozen=True)
@@ -39,12 +42,14 @@ class Format:
     Attributes:
         write: writes a table to a path that doesn't exist yet.
         package: that it needs beside what rigidsim always has.
+        angles: whether it takes angles in any unit.
         side_tables: whether tables along other dimensions than time get files of their own.
         folder: what such a folder is called, and a file by which one is known; None: it is a file.
     """
 
     write: Callable[[Table, Path, Source], None]
     package: str = ""
+    angles: bool = False
     side_tables: bool = False
     folder: tuple[str, str] | None = None
 

@@ -7,7 +7,7 @@ beyond double.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import xarray
 
+from rigidsim.formats.angles import RADIAN, converted
+from rigidsim.look.angle_units import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.variables import LABELS, parts_in
 
@@ -32,6 +34,7 @@ class Column:
         parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
         attributes: units, long_name, ... of the variable.
         is_date: whether it holds datetime64 instead of float64.
+        angle_unit: that its angles are converted to, and that the column's name ends with; None: as they are.
     """
 
     variable: str
@@ -40,15 +43,22 @@ class Column:
     parts: tuple[str, ...]
     attributes: dict[str, Any]
     is_date: bool = False
+    angle_unit: AngleUnit | None = None
 
     @property
     def name(self) -> str:
-        """``angular_velocity_x``."""
-        return self.variable + self.suffix
+        """``angular_velocity_x``, or ``obliquity_figure_deg``."""
+        return self.variable + self.suffix + self._unit
+
+    @property
+    def _unit(self) -> str:
+        return "" if self.angle_unit is None else f"_{self.angle_unit.name}"
 
     @property
     def units(self) -> str:
-        """As in the dataset."""
+        """As in the dataset, or those that angles are converted to."""
+        if self.angle_unit is not None:
+            return self.angle_unit.name
         return str(self.attributes.get("units", "1"))
 
     def bits(self, of_run: int) -> int:
@@ -57,7 +67,7 @@ class Column:
 
     def part_name(self, part: int) -> str:
         """Name of a residual's column: ``angular_velocity_lo_x``."""
-        return self.parts[part] + self.suffix
+        return self.parts[part] + self.suffix + self._unit
 
 
 @dataclass(frozen=True)
@@ -68,11 +78,13 @@ class Table:
         dim: "time", or the name of an event, ...
         columns: the coordinate first where there is one.
         dataset: that the columns are read from, block by block.
+        bits: of the run's precision.
     """
 
     dim: str
     columns: tuple[Column, ...]
     dataset: xarray.Dataset
+    bits: int = 53
 
     @property
     def rows(self) -> int:
@@ -92,7 +104,13 @@ class Table:
         for first in range(0, self.rows, rows):
             here = {self.dim: slice(first, first + rows)}
             read = {name: self.dataset[name].isel(here).values for name in names}
-            yield [[_column(read[part], column.index) for part in column.parts] for column in wanted]
+            yield [self._values(column, read) for column in wanted]
+
+    def _values(self, column: Column, read: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+        """The parts of one column."""
+        parts = [_column(read[part], column.index) for part in column.parts]
+        unit = column.angle_unit
+        return parts if unit is None else converted(parts, unit, column.bits(self.bits))
 
 
 def _column(values: np.ndarray, index: tuple[int, ...]) -> np.ndarray:
@@ -101,27 +119,34 @@ def _column(values: np.ndarray, index: tuple[int, ...]) -> np.ndarray:
     return np.asarray(values[key])
 
 
-def tables_of(dataset: xarray.Dataset) -> list[Table]:
-    """The table along time, then those along other dimensions."""
+def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits: int = 53) -> list[Table]:
+    """The table along time, then those along other dimensions.
+
+    Args:
+        angle_unit: that angles are converted to.
+        bits: of the run's precision.
+    """
     variables = dataset.variables
     names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind in "fM"]
     names.sort(key=lambda name: (name != "time", name not in dataset.coords))
     columns: dict[str, list[Column]] = {}
     for name in names:
-        columns.setdefault(str(variables[name].dims[0]), []).extend(_columns(dataset, name))
-    return [Table(dim, tuple(found), dataset) for dim, found in columns.items() if found]
+        columns.setdefault(str(variables[name].dims[0]), []).extend(_columns(dataset, name, angle_unit))
+    return [Table(dim, tuple(found), dataset, bits) for dim, found in columns.items() if found]
 
 
-def _columns(dataset: xarray.Dataset, name: str) -> list[Column]:
+def _columns(dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None) -> list[Column]:
     variable = dataset[name]
     if "residual_of" in variable.attrs:
         return []
     parts = tuple(parts_in(dataset, name))
+    unit = angle_unit if variable.attrs.get("units") == RADIAN else None
+    is_date = variable.dtype.kind == "M"
     labels = []
     for dim in map(str, variable.dims[1:]):
         labels.append(LABELS.get(dim) or [str(n) for n in range(variable.sizes[dim])])
     found = []
     for index in product(*(range(len(names)) for names in labels)):
         suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True))
-        found.append(Column(name, suffix, index, parts, dict(variable.attrs), variable.dtype.kind == "M"))
+        found.append(Column(name, suffix, index, parts, dict(variable.attrs), is_date, unit))
     return found

@@ -7,9 +7,12 @@ from typing import Any
 
 import xarray
 
+from rigidsim.formats.angles import RADIAN, converted
 from rigidsim.formats.registry import Format, Source
 from rigidsim.formats.tables import Table
+from rigidsim.look.angle_units import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
+from rigidsim.store.variables import parts_in
 
 BLOCK_ROWS = 8 * CHUNK_ROWS
 
@@ -25,7 +28,7 @@ def write_zarr(table: Table, path: Path, source: Source) -> None:
     dataset = table.dataset
     along = dataset[[name for name in dataset.variables if "time" in dataset[name].dims]]
     for first in range(0, max(dataset.sizes["time"], 1), BLOCK_ROWS):
-        block = _plain(along.isel(time=slice(first, first + BLOCK_ROWS)))
+        block = _plain(along.isel(time=slice(first, first + BLOCK_ROWS)), source)
         if first:
             block = block.drop_vars([name for name in block.variables if "time" not in block[name].dims])
             block.to_zarr(path, mode="a", append_dim="time", zarr_format=2, consolidated=False)
@@ -35,18 +38,34 @@ def write_zarr(table: Table, path: Path, source: Source) -> None:
                       if "time" in block[name].dims}  # fmt: skip
             block.to_zarr(path, mode="w", encoding=chunks, zarr_format=2, consolidated=False)
     rest = [name for name in dataset.variables if "time" not in dataset[name].dims]
-    _plain(dataset[rest]).to_zarr(path, mode="a", zarr_format=2, consolidated=True)
+    _plain(dataset[rest], source).to_zarr(path, mode="a", zarr_format=2, consolidated=True)
 
 
-def _plain(dataset: xarray.Dataset) -> xarray.Dataset:
-    """In memory, without the HDF5 file's own encodings."""
+def _plain(dataset: xarray.Dataset, source: Source) -> xarray.Dataset:
+    """In memory, with angles in the unit that is asked for, without the HDF5 file's own encodings."""
     loaded = dataset.load().copy()
+    if source.angle_unit is not None:
+        loaded = _converted(loaded, source.angle_unit, source.bits)
     for name in loaded.variables:
         kept = ("units", "calendar", "dtype") if loaded[name].dtype.kind == "M" else ()
         loaded[name].encoding = {key: loaded[name].encoding[key] for key in kept}
         loaded[name].attrs = {key: _json(value) for key, value in loaded[name].attrs.items()}
     loaded.encoding = {}
     return loaded
+
+
+def _converted(dataset: xarray.Dataset, unit: AngleUnit, bits: int) -> xarray.Dataset:
+    """With all angles, and their residuals, in a unit."""
+    changed = {}
+    for name in map(str, dataset.variables):
+        variable = dataset[name]
+        if variable.attrs.get("units") != RADIAN or "residual_of" in variable.attrs:
+            continue
+        names = parts_in(dataset, name)
+        values = converted([dataset[part].values for part in names], unit, bits)
+        for part, found in zip(names, values, strict=True):
+            changed[part] = (dataset[part].dims, found, dict(dataset[part].attrs, units=unit.name))
+    return dataset.assign(changed)
 
 
 def _chunks(variable: xarray.DataArray) -> tuple[int, ...]:
@@ -57,4 +76,4 @@ def _json(value: Any) -> Any:
     return value.item() if hasattr(value, "item") and getattr(value, "ndim", 1) == 0 else value
 
 
-FORMAT = Format(write_zarr, package="zarr", folder=("Zarr store", ".zgroup"))
+FORMAT = Format(write_zarr, package="zarr", angles=True, folder=("Zarr store", ".zgroup"))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.errors import RigidsimError, RunFolderError
+from rigidsim.formats.angles import angle_unit_named
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.registry import Format, Source, format_named
 from rigidsim.formats.tables import Table, tables_of
@@ -26,6 +27,7 @@ def export(
     *,
     force: bool = False,
     naming: Naming | None = None,
+    angle_unit: str | None = None,
 ) -> list[Path]:
     """Write a run, finished or partial, in another format; block by block, so that memory stays small.
 
@@ -36,24 +38,32 @@ def export(
             parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``.
         force: replace what is there.
         naming: what the run's config leaves open of epoch, axes and names, for aem and oem.
+        angle_unit: that angles are written in, one of ``rigidsim.look.angle_units.ANGLE_UNITS``; rad by
+            default. For csv, parquet and zarr.
 
     Returns:
         What was written; the table along time first.
 
     Raises:
-        RigidsimError: unknown format, a package is missing, or the format can't hold the run.
+        RigidsimError: unknown format or unit, a package is missing, or the format can't hold the run.
         RunFolderError: the run is damaged or empty.
     """
     found = format_named(file_format)
+    unit = None if angle_unit is None else angle_unit_named(angle_unit)
+    if unit is not None and not found.angles:
+        raise RigidsimError(
+            f"--angle-unit: given {angle_unit}, but {file_format} prescribes its units; leave it out"
+        )
     name = run.folder.path.resolve().name
     target = Path(f"{name}.{file_format}") if out is None else Path(out)
     with run.opened(indexed=False) as dataset:  # sample times are not loaded as an index
-        tables = tables_of(dataset)
+        bits = _bits(dataset)
+        tables = tables_of(dataset, unit, bits)
         kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
         for path in kept:
             _refuse_existing(path, found, force)
         attributes = dict(dataset.attrs, status=run.status)
-        source = Source(name, _bits(dataset), attributes, naming or Naming())
+        source = Source(name, bits, attributes, naming or Naming(), unit)
         for path, table in kept.items():
             with _replacing(path, found) as new:
                 found.write(table, new, source)

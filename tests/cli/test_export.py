@@ -9,6 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 import xarray
@@ -91,6 +92,38 @@ def test_zarr_is_the_dataset(exported: Callable[..., Path]) -> None:
             np.testing.assert_array_equal(store[name].values, dataset[name].values)
             assert store[name].attrs == dataset[name].attrs
         assert store.attrs["config"] == dataset.attrs["config"]
+
+
+@pytest.mark.parametrize(("precision", "bits"), [("double", 53), ("extended", 64)])
+def test_angles_are_exported_in_the_unit_asked_for(
+    precision: str, bits: int, exported: Callable[..., Path], rigidsim_command: Command
+) -> None:
+    """Rounded once, and named: in the columns of tables, in the attributes of a store."""
+    pytest.importorskip("zarr")
+    integrator = f'precision = "{precision}"\nformulation = "euler_angles"'
+    path = exported("csv", integrator, "--angle-unit", "arcsec", "--force")
+    names, *rows = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert "euler_angles_theta [arcsec]" not in path.read_text()
+    assert "euler_angles_theta_arcsec [arcsec]" in path.read_text()
+    told = [Decimal(row[names.index("euler_angles_theta_arcsec")]) for row in rows]
+    assert rigidsim_command(
+        "export", "runs/throw", "--format", "zarr", "--angle-unit", "turns", "--force"
+    ).exit_code == 0  # fmt: skip
+    with mpmath.workdps(60), xarray.open_zarr("throw.zarr") as store:
+        with rigidsim.open_run("runs/throw").dataset as dataset:
+            assert store["euler_angles"].attrs["units"] == "turns"
+            assert store["angular_velocity"].attrs["units"] == "rad s-1"
+            for row, text in enumerate(told):
+                angle = mpmath.mpf(str(exact(dataset, "euler_angles", row, 1)))
+                for found, per_turn in ((text, 1296000), (exact(store, "euler_angles", row, 1), 1)):
+                    true = angle * per_turn / (2 * mpmath.pi)
+                    # half a unit in the last place, and in double what 64 bits leave open beside it
+                    assert abs(mpmath.mpf(str(found)) - true) <= abs(true) * 1.01 * 2.0**-bits
+    refused = rigidsim_command("export", "runs/throw", "--format", "aem", "--angle-unit", "deg")
+    assert refused.exit_code != 0
+    assert "aem prescribes its units" in refused.output
+    refused = rigidsim_command("export", "runs/throw", "--format", "csv", "--angle-unit", "grad", "--force")
+    assert "allowed: rad, turns, deg, arcsec, mas" in refused.output
 
 
 def keywords(text: str) -> dict[str, str]:

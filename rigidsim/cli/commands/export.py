@@ -20,6 +20,14 @@ def export(
         Path | None, typer.Option("--out", metavar="PATH", help="Default NAME.FORMAT in this folder.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
+    angle_unit: Annotated[
+        str | None,
+        typer.Option(
+            "--angle-unit",
+            metavar="UNIT",
+            help="For csv, parquet and zarr: rad, turns, deg, arcsec or mas; columns are named by it.",
+        ),
+    ] = None,
     epoch: Annotated[
         str | None,
         typer.Option(
@@ -51,5 +59,7 @@ def export(
 
     given = {"epoch": epoch, "axes": axes, "object_name": object_name}
     naming = Naming(**{key: value for key, value in given.items() if value is not None})
-    for path in write(open_run(run_path), file_format, out, force=force, naming=naming):
+    for path in write(
+        open_run(run_path), file_format, out, force=force, naming=naming, angle_unit=angle_unit
+    ):
         print(path)
