@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
     from rigidsim.store.memory import MemoryRun
     from rigidsim.store.run import Run, SavedRun, open_run
+    from rigidsim.workflows.analyse import analyse
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
     from rigidsim.workflows.resume import resume
@@ -36,6 +37,7 @@ _PLACES = {
     "resume": "rigidsim.workflows.resume",
     "verify": "rigidsim.workflows.verify",
     "plan": "rigidsim.workflows.plan",
+    "analyse": "rigidsim.workflows.analyse",
 }
 
 __all__ = [
@@ -46,6 +48,7 @@ __all__ = [
     "Run",
     "RunFolderError",
     "SavedRun",
+    "analyse",
     "load",
     "open_run",
     "parse",

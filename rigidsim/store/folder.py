@@ -56,6 +56,16 @@ class RunFolder:
         return self.path / f"figure_{what}.png"
 
     @property
+    def analysis(self) -> Path:
+        """Where ``rigidsim analyse`` writes unless told otherwise."""
+        return self.path / "analysis.h5"
+
+    @property
+    def spectrum(self) -> Path:
+        """Its figure."""
+        return self.path / "analysis.png"
+
+    @property
     def checkpoint(self) -> Path:
         """Where a finished run can be prolonged from."""
         return self.path / "checkpoint.h5"
@@ -92,6 +102,7 @@ class RunFolder:
         """
         files = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
         files += [self.figure_of(name) for name in FIGURES]
+        files += [self.analysis, self.spectrum]
         folders = [self.segments, self.set_aside]
         ours = files + folders
         try:

@@ -15,6 +15,7 @@ COMMANDS = (
     "plot",
     "tradeoff",
     "export",
+    "analyse",
     "schema",
 )
 """All there are, in the order in which ``rigidsim --help`` shows them."""

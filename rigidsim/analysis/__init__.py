@@ -1,0 +1,1 @@
+"""Frequency analysis of equidistant samples: secular rates and spectral lines, from a Dataset alone."""

@@ -1,0 +1,250 @@
+"""A dataset's signals taken apart into secular rates and labelled lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rigidsim.analysis.decomposition import Found, amplitude_spectrum, decompose
+from rigidsim.analysis.labels import Known, label, reversed_label, settled
+from rigidsim.analysis.result import Analysis, Line, SignalAnalysis
+from rigidsim.analysis.signals import Clock, Signal, clock_of, signals_of
+from rigidsim.errors import RigidsimError
+
+if TYPE_CHECKING:
+    import xarray
+
+SPECTRUM_POINTS = 4000
+_BLEND = 0.05  # bins by which a line can be off that has absorbed closer ones
+_SECULAR = "node_longitude.figure"
+
+
+@dataclass(frozen=True)
+class _Raw:
+    """A signal before its lines have names, with frequencies in rad/s."""
+
+    signal: Signal
+    found: Found
+    frequencies: tuple[Any, ...]
+    errors: tuple[float, ...]
+    spectrum: tuple[Any, Any]
+    bits: int
+
+    def finest(self, line: Line) -> float:
+        """Of a line's frequency: its error as it was found, rad/s."""
+        distance = [abs(abs(float(f)) - abs(float(line.observed))) for f in self.frequencies]
+        return self.errors[distance.index(min(distance))]
+
+    @property
+    def factor(self) -> int:
+        """Amplitude of a cosine over that of its exponential."""
+        return 2 if self.signal.real else 1
+
+
+def analyse_dataset(
+    dataset: xarray.Dataset,
+    variables: Sequence[str] = (),
+    *,
+    lines: int = 20,
+    floor: float = 1e-12,
+    known: Sequence[Known] = (),
+    order: int | None = None,
+    attitude_error: float | None = None,
+) -> Analysis:
+    """Secular rates and lines of a dataset's signals.
+
+    Args:
+        dataset: with equidistant ``time``; residuals ``_lo``, ``_lo2`` are taken into account.
+        variables: names of variables or of their signals; see ``signals_of``.
+        lines: of each signal at most.
+        floor: lines below this share of a signal's strongest are left out.
+        known: frequencies for labels; those with a tolerance are replaced by the strongest line near them.
+        order: of the Hann window; chosen by the lines' distances by default.
+        attitude_error: of the run at its end, rad, where it is known.
+
+    Raises:
+        RigidsimError: samples aren't equidistant, too few or not finite, or there is no such variable.
+    """
+    if not 1 <= lines <= 500:
+        raise RigidsimError(f"given lines = {lines}; 1 to 500 are allowed")
+    if not 0 < floor < 1:
+        raise RigidsimError(
+            f"given floor = {floor:g}; a share of the strongest line, between 0 and 1, is allowed"
+        )
+    if order is not None and not 1 <= order <= 20:
+        raise RigidsimError(f"given a window of order {order}; 1 to 20 are allowed")
+    clock = clock_of(dataset)
+    raws = [_raw(signal, clock, lines, floor, order) for signal in signals_of(dataset, variables)]
+    measured = {
+        raw.signal.name: [
+            (f, e, raw.factor * abs(complex(a)))
+            for f, e, a in zip(raw.frequencies, raw.errors, raw.found.sum.amplitudes, strict=True)
+        ]
+        for raw in raws
+    }
+    names = _with_precession(known, raws, clock)
+    names = settled([k for k in names if float(k.value) != 0], measured)
+    return Analysis(
+        signals=tuple(_named(raw, clock, names) for raw in raws),
+        known=tuple(names),
+        start=float(clock.start),
+        spacing=float(clock.spacing),
+        length=float(clock.length),
+        attitude_error=attitude_error,
+        title=str(dataset.attrs.get("title", "")),
+    )
+
+
+def _raw(signal: Signal, clock: Clock, lines: int, floor: float, order: int | None) -> _Raw:
+    samples = signal.samples(clock.context)
+    found = decompose(samples, lines, signal.degree, floor, order)
+    per_sample = 2 * clock.context.pi / clock.spacing
+    finest = 2.0**-clock.bits  # of the spacing
+    errors = [
+        math.hypot(float(per_sample) * e, finest * abs(float(per_sample * f)))
+        for f, e in zip(found.sum.frequencies, found.frequency_errors, strict=True)
+    ]
+    curve = amplitude_spectrum(samples, found, SPECTRUM_POINTS)
+    return _Raw(
+        signal,
+        found,
+        tuple(per_sample * f for f in found.sum.frequencies),
+        tuple(errors),
+        (curve[0] * float(per_sample), curve[1]),
+        samples.bits,
+    )
+
+
+def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: Clock) -> list[Known]:
+    """The equinox goes back with the precession that was measured, where it was and isn't known already."""
+    names = list(known)
+    if not known or any(k.name == "precession" for k in known):
+        return names
+    for raw in raws:
+        if raw.signal.name in (_SECULAR, "node_longitude"):
+            rate, error = _rate(raw, clock)
+            if abs(float(rate)) > 5 * error:
+                names.append(Known("precession", rate, 0.0, f"secular rate of {raw.signal.name}", error))
+    return names
+
+
+def _rate(raw: _Raw, clock: Clock) -> tuple[Any, float]:
+    slope = raw.found.sum.polynomial[1].real
+    per_second = 2 / clock.length
+    return slope * per_second, raw.found.polynomial_errors[1] * float(per_second)
+
+
+def _named(raw: _Raw, clock: Clock, known: Sequence[Known]) -> SignalAnalysis:
+    found, signal = raw.found, raw.signal
+    lines = [
+        _line(raw, clock, known, n)
+        for n in sorted(range(len(raw.frequencies)), key=lambda n: -abs(complex(found.sum.amplitudes[n])))
+    ]
+    rate, rate_error = _rate(raw, clock) if signal.degree > 0 else (None, math.nan)
+    value = found.sum.polynomial[0] if signal.degree >= 0 else None
+    per_sample = 2 * math.pi / float(clock.spacing)
+    return SignalAnalysis(
+        name=signal.name,
+        units=signal.units,
+        real=signal.real,
+        value=value,
+        value_error=found.polynomial_errors[0] if signal.degree >= 0 else math.nan,
+        rate=rate,
+        rate_error=rate_error,
+        lines=tuple(lines),
+        order=found.order,
+        bits=raw.bits,
+        left=found.left,
+        level=raw.factor * found.level,
+        close=tuple(f * per_sample for f in found.close),
+        exhausted=found.exhausted,
+        notes=tuple(_notes(raw, clock, known, lines)),
+        spectrum=raw.spectrum,
+    )
+
+
+def _line(raw: _Raw, clock: Clock, known: Sequence[Known], n: int) -> Line:
+    context = clock.context
+    observed, error = raw.frequencies[n], raw.errors[n]
+    amplitude = raw.found.sum.amplitudes[n]
+    real = raw.signal.real
+    if real and observed < 0:
+        observed, amplitude = -observed, context.conj(amplitude)
+    blend = _BLEND * 2 * math.pi / float(clock.length)
+    name = label(
+        float(observed), error, known, clock.nyquist, real=real, in_body=raw.signal.in_body, blend=blend
+    )
+    frequency = observed + 2 * name.folds * context.pi / clock.spacing
+    phase = context.arg(amplitude) - frequency * clock.middle
+    # turning it by whole turns a sample changes nothing at the samples, but at the middle between two it does
+    if name.folds and clock.count % 2 == 0:
+        phase += context.pi * name.folds
+    if real and frequency < 0:
+        frequency, phase, name = -frequency, -phase, reversed_label(name, known)
+    mismatch = math.nan
+    if name.multipliers:
+        combined = sum(
+            (m * context.mpf(k.value) for m, k in zip(name.multipliers, known, strict=True)), context.zero
+        )
+        turn = 2 * context.pi / clock.spacing
+        off = frequency - combined
+        mismatch = float(off - turn * context.nint(off / turn))
+        if not name.doubtful:
+            error = max(error, abs(mismatch))  # a blend of lines that are too close to be told apart
+    size = abs(complex(amplitude))
+    amplitude_error = raw.found.amplitude_errors[n]
+    return Line(
+        frequency=frequency,
+        observed=observed,
+        frequency_error=error,
+        amplitude=raw.factor * abs(amplitude),
+        amplitude_error=raw.factor * amplitude_error,
+        phase=_wrapped(context, phase),
+        phase_error=amplitude_error / size if size else math.inf,
+        label=name,
+        mismatch=mismatch,
+    )
+
+
+def _wrapped(context: Any, angle: Any) -> Any:
+    """Within +-pi; where rounding alone makes it -pi, it is pi."""
+    angle = angle - 2 * context.pi * context.nint(angle / (2 * context.pi))
+    return -angle if angle + context.pi < 1e-6 else angle
+
+
+def _notes(raw: _Raw, clock: Clock, known: Sequence[Known], lines: Sequence[Line]) -> list[str]:
+    notes = []
+    length = float(clock.length)
+    if raw.found.close:
+        notes.append(
+            "something is left closer than a bin to a line or to the secular part: errors tell its size, "
+            "a longer run tells it apart"
+        )
+    slow = [
+        k for k in known if k.name != "precession" and 0 < abs(float(k.value)) * length < 2 * math.pi * 1.5
+    ]
+    if slow and raw.signal.degree > 0:
+        names = ", ".join(k.name for k in slow)
+        notes.append(
+            f"the samples span less than 1.5 turns of {names}: the secular rate may contain part of it"
+        )
+    unfolded = [line for line in lines if line.unfolded]
+    if unfolded:
+        notes.append(
+            f"{len(unfolded)} frequencies lie beyond Nyquist's, and are unfolded through the known ones"
+        )
+    blends = [line for line in lines if abs(line.mismatch) >= 10 * raw.finest(line)]
+    if blends:
+        notes.append(
+            f"{len(blends)} lines lie off their labels by more than what is left explains: blends of lines "
+            "closer than a bin; their errors are those distances"
+        )
+    doubtful = [line for line in lines if line.ambiguous]
+    if doubtful:
+        notes.append(
+            f"{len(doubtful)} lines fit several combinations: they have the observed frequency, "
+            "unfolded by none"
+        )
+    return notes

@@ -1,0 +1,357 @@
+"""Lines of a quasi-periodic signal and its secular part, found and refined together.
+
+Frequency analysis after Laskar (1993, Physica D 67, 257) with the corrections of Sidlichovsky & Nesvorny
+(1996, Celest. Mech. Dyn. Astron. 65, 137), which free each line of what all others do to it: here as a Newton
+iteration of all frequencies, amplitudes and polynomial coefficients at once on what is left of the signal,
+until the windowed remainder is orthogonal to every exp(i w t), to t exp(i w t) and to the polynomial. A
+signal that is such a sum has it as its fixed point, whatever the distance of its lines. The steps are
+computed in double precision, the remainder in the signal's own: each step gains digits, until there are no
+more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rigidsim.analysis.exponentials import Complexes, Grid, Reals, Sum, blocks
+from rigidsim.analysis.windows import Spectrum, hann, moments, peak, positions, spectrum
+
+_FALSE_ALARM = 1e-5  # chance that noise alone shows a line
+_SEARCH_ORDERS = (3, 1)  # of the window while lines are looked for; the second where some are close
+_NEAREST = 1.0  # bins between lines that can be told apart
+_MOST_CANDIDATES = 40  # peaks that may be no lines, before there are none
+_STEPS = 3  # of Newton's method after each new line
+_MOST_STEPS = 25
+_HIGHEST_ORDER = 10
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Equidistant samples of a signal, from sample numbers.
+
+    Attributes:
+        parts: real and imaginary parts, (n,) float64; the value is the sum over the list.
+        real: whether imaginary parts are zero by nature.
+        bits: of the precision.
+        context: mpmath context with more digits than that.
+    """
+
+    parts: tuple[tuple[Reals, Reals], ...]
+    real: bool
+    bits: int
+    context: Any
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return len(self.parts[0][0])
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a signal consists of; complex lines of real signals come with their mirror images.
+
+    Attributes:
+        sum: polynomial, and lines (of a real signal those of positive frequency: twice their real part).
+        order: of the window.
+        frequency_errors, amplitude_errors: one standard deviation each, from what is left next to the line:
+            turns per sample, and the signal's unit.
+        polynomial_errors: the same of the polynomial's coefficients.
+        left: rms of what is left.
+        level: median size of the windowed remainder's spectrum: lines below it aren't seen.
+        close: frequencies (turns per sample) at which something is left that is too close to a line, or to
+            the secular part, to be told apart.
+        exhausted: whether lines above the floor may be left since as many were found as asked for.
+    """
+
+    sum: Sum
+    order: int
+    frequency_errors: tuple[float, ...]
+    amplitude_errors: tuple[float, ...]
+    polynomial_errors: tuple[float, ...]
+    left: float
+    level: float
+    close: tuple[float, ...]
+    exhausted: bool
+
+
+def decompose(samples: Samples, lines: int, degree: int, floor: float, order: int | None = None) -> Found:
+    """Find the strongest lines and a polynomial.
+
+    Args:
+        lines: at most so many.
+        degree: of the polynomial; -1 for none.
+        floor: lines below this share of the strongest are left.
+        order: of the window; by default as high as the distance of the lines allows.
+    """
+    double = replace(samples, parts=samples.parts[:1], bits=min(samples.bits, 53))
+    search: _Search | None = None
+    for search_order in (order,) if order else _SEARCH_ORDERS:
+        search = _Search(double, degree, search_order)
+        search.look_for(lines, floor)
+        if not search.close:
+            break
+    assert search is not None
+    total = search.total
+    final = order or _final_order(total, samples.real)
+    total = refined(double, total, final)
+    if samples.bits > 53:
+        total = refined(samples, total, final)
+    return _judged(samples, total, final, search)
+
+
+def _final_order(total: Sum, real: bool) -> int:
+    """Half the least distance in bins, less one: main lobes stay apart."""
+    places = _places(total, real)
+    if total.polynomial:
+        places = np.append(places, 0.0)
+    places = np.sort(places)
+    gaps = np.diff(places)
+    least = float(gaps.min()) if len(gaps) else math.inf
+    return int(np.clip(math.floor(least / 2 - 1) if math.isfinite(least) else 3, 1, _HIGHEST_ORDER))
+
+
+def _places(total: Sum, real: bool) -> Reals:
+    """Frequencies in bins, mirror images among them."""
+    own = np.array([float(f) for f in total.frequencies]) * total.count
+    return np.concatenate([own, -own]) if real else own
+
+
+class _Search:
+    """One line after the other, the strongest first, all refined after each."""
+
+    def __init__(self, samples: Samples, degree: int, order: int) -> None:
+        self.samples, self.order = samples, order
+        context = samples.context
+        self.total = Sum(context, samples.count, (context.mpc(0),) * (degree + 1), (), ())
+        self.close: list[float] = []
+        self.exhausted = False
+
+    def look_for(self, lines: int, floor: float) -> None:
+        if self.total.polynomial:
+            self.total = refined(self.samples, self.total, self.order, steps=2)
+        hidden: list[float] = []
+        while True:
+            left = remainder(self.samples, self.total)
+            found = spectrum(left, self.order, real=self.samples.real)
+            at = self._strongest(found, hidden, floor)
+            if at is None:
+                return
+            frequency = peak(found, at)
+            if self._near(frequency):
+                self.close.append(frequency)
+                hidden.append(frequency)
+                continue
+            if len(self.total.frequencies) == lines:
+                self.exhausted = True
+                return
+            self._add(frequency, found.amplitude(at))
+
+    def _strongest(self, found: Spectrum, hidden: Sequence[float], floor: float) -> int | None:
+        """The largest point that stands out of what is beside it."""
+        size = found.sizes.copy()
+        reach = self.order + 2
+        for frequency in hidden:
+            size[found.around(frequency, reach)] = 0
+        threshold = math.sqrt(math.log(len(size) / _FALSE_ALARM) / math.log(2))
+        largest = max((abs(complex(a)) for a in self.total.amplitudes), default=0.0)
+        least = max(floor * largest, 1e-300)
+        for _ in range(_MOST_CANDIDATES):
+            at = int(np.argmax(size))
+            if size[at] <= least:
+                return None
+            if size[at] > threshold * found.noise(at, reach):
+                return at
+            size[found.around(float(found.frequencies[at]), reach)] = 0
+        return None
+
+    def _near(self, frequency: float) -> bool:
+        places = _places(self.total, self.samples.real)
+        mirrored = -frequency * self.samples.count if self.samples.real else math.inf
+        if self.total.polynomial:
+            places = np.append(places, 0.0)
+        here = frequency * self.samples.count
+        around = self.samples.count
+        gaps = [abs((here - p + around / 2) % around - around / 2) for p in places]
+        if self.samples.real and not self.total.polynomial:
+            gaps.append(abs(here - mirrored))
+        return min(gaps, default=math.inf) < _NEAREST
+
+    def _add(self, frequency: float, amplitude: complex) -> None:
+        context = self.samples.context
+        self.total = replace(
+            self.total,
+            frequencies=(*self.total.frequencies, context.mpf(frequency)),
+            amplitudes=(*self.total.amplitudes, context.mpc(amplitude)),
+        )
+        self.total = refined(self.samples, self.total, self.order, steps=_STEPS)
+
+
+def mirrored(total: Sum, real: bool) -> Sum:
+    """With the mirror images of a real signal's lines."""
+    if not real:
+        return total
+    context = total.context
+    return replace(
+        total,
+        frequencies=(*total.frequencies, *(-f for f in total.frequencies)),
+        amplitudes=(*total.amplitudes, *(context.conj(a) for a in total.amplitudes)),
+    )
+
+
+def remainder(samples: Samples, total: Sum) -> Complexes:
+    """What is left of a signal, in double precision."""
+    left = mirrored(total, samples.real).left_of(samples.parts, samples.bits)
+    return np.asarray(left.real + 0j if samples.real else left, dtype=np.complex128)
+
+
+def refined(samples: Samples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
+    """Newton's method from where a sum is, as long as it gains."""
+    if not total.frequencies and not total.polynomial:
+        return total
+    last = math.inf
+    for _ in range(steps):
+        left = remainder(samples, total)
+        change, moved, size = _step(samples, total, left, order)
+        if not size < 0.7 * last and steps == _MOST_STEPS and last < 1e-3:
+            break  # the last step was rounding already
+        total, last = moved, size
+        if change == 0:
+            break
+    return total
+
+
+def _step(samples: Samples, total: Sum, left: Complexes, order: int) -> tuple[float, Sum, float]:
+    """The largest change of an amplitude, the sum after the step, and the step's size over the signal's."""
+    context, count = total.context, total.count
+    whole = mirrored(total, samples.real)
+    lines, powers = len(whole.frequencies), len(whole.polynomial)
+    right = _products(whole, left, order)
+    matrix = _gram(whole, order)
+    found = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    polynomial = found[:powers]
+    change, turning = found[powers : powers + lines], found[powers + lines :]
+    own = lines // 2 if samples.real else lines
+    frequencies, amplitudes = [], []
+    for k in range(own):
+        amplitude = complex(whole.amplitudes[k])
+        # a exp(i pi D x), D in bins: the change with D is i pi x a exp(...)
+        shift = (turning[k] / amplitude).imag / math.pi if amplitude else 0.0
+        shift = float(np.clip(shift, -0.5, 0.5))
+        frequencies.append(total.frequencies[k] + context.mpf(shift) / count)
+        amplitudes.append(total.amplitudes[k] + context.mpc(complex(change[k])))
+    coefficients = [
+        c + context.mpc(complex(x.real if samples.real else x))
+        for c, x in zip(total.polynomial, polynomial, strict=True)
+    ]
+    largest = max([abs(complex(a)) for a in (*amplitudes, *coefficients)], default=0.0)
+    size = float(np.max(np.abs(found), initial=0.0))
+    moved = replace(
+        total,
+        polynomial=tuple(coefficients),
+        frequencies=tuple(frequencies),
+        amplitudes=tuple(amplitudes),
+    )
+    return size, moved, size / largest if largest else 0.0
+
+
+def _products(total: Sum, left: Complexes, order: int) -> Complexes:
+    """Windowed means of a remainder times powers of x, conj(exp(i w t)) and x conj(exp(i w t))."""
+    count = total.count
+    x = positions(count)
+    weighted = left * hann(count, order) / count
+    powers = [np.sum(weighted * x**m) for m in range(len(total.polynomial))]
+    if not total.frequencies:
+        return np.array(powers, dtype=np.complex128)
+    first, within = Grid(count).tables(total.frequencies)
+    inner = [
+        np.sum(np.conj(first) * (blocks(values) @ np.conj(within)), axis=0)
+        for values in (weighted, weighted * x)
+    ]
+    return np.concatenate([np.array(powers, dtype=np.complex128), *inner])
+
+
+def _gram(total: Sum, order: int) -> Complexes:
+    """Windowed means of the products of all columns, nearly: what it lacks the next step mends."""
+    count = total.count
+    places = np.array([float(f) for f in total.frequencies]) * count
+    powers, lines = len(total.polynomial), len(places)
+    places = np.concatenate([np.zeros(powers), places, places])
+    raised = np.concatenate([np.arange(powers), np.zeros(lines, int), np.ones(lines, int)])
+    distance = places[None, :] - places[:, None]
+    distance = (distance + count / 2) % count - count / 2
+    power = raised[None, :] + raised[:, None]
+    matrix = np.zeros(distance.shape, dtype=np.complex128)
+    for m in np.unique(power):
+        chosen = power == m
+        matrix[chosen] = moments(order, int(m), distance[chosen])
+    return matrix
+
+
+def _growth(total: Sum, order: int) -> Reals:
+    """By how much the error of each column's factor is larger than if it stood alone."""
+    matrix = _gram(total, order)
+    if not len(matrix):
+        return np.empty(0)
+    inverse = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
+    return np.sqrt(np.maximum(np.diag(inverse).real * np.diag(matrix).real, 1.0))
+
+
+def _judged(samples: Samples, total: Sum, order: int, search: _Search) -> Found:
+    """With errors from what is left."""
+    left = remainder(samples, total)
+    found = spectrum(left, order, real=samples.real)
+    x = positions(total.count)
+    weights = hann(total.count, order)
+    spread = math.sqrt(float(np.mean(weights**2 * x**2) / np.mean(weights**2)))
+    second = float(np.mean(weights * x**2))
+    finest = 2.0**-samples.bits
+
+    def beside(frequency: float) -> float:
+        near = found.sizes[found.around(abs(frequency) if samples.real else frequency, 3 * (order + 2))]
+        return math.sqrt(float(np.mean(near**2))) if len(near) else float(found.sizes.max())
+
+    # neighbours that are hard to tell apart make errors grow
+    growth = _growth(mirrored(total, samples.real), order)
+    powers, lines = len(total.polynomial), len(total.frequencies) * (2 if samples.real else 1)
+    frequency_errors, amplitude_errors = [], []
+    for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
+        level = beside(float(frequency)) * growth[powers + n]
+        turned = beside(float(frequency)) * growth[powers + lines + n]
+        strength = abs(complex(amplitude))
+        own = turned / strength * spread / second / math.pi / total.count if strength else math.inf
+        frequency_errors.append(math.hypot(own, finest * abs(float(frequency))))
+        amplitude_errors.append(math.hypot(level, finest * strength))
+    level = beside(0.0)
+    polynomial_errors = [level * growth[m] * spread**m / second**m for m in range(powers)]
+    return Found(
+        total,
+        order,
+        tuple(frequency_errors),
+        tuple(amplitude_errors),
+        tuple(polynomial_errors),
+        math.sqrt(float(np.mean(np.abs(left) ** 2))),
+        float(np.median(found.sizes)),
+        tuple(search.close),
+        search.exhausted,
+    )
+
+
+def amplitude_spectrum(samples: Samples, found: Found, points: int) -> tuple[Reals, Reals]:
+    """Frequencies (turns per sample) and sizes of the signal's spectrum without its secular part, for a
+    picture: of neighbours the largest, so that no line is lost. Of a real signal the amplitude of the cosine.
+    """
+    secular = replace(found.sum, frequencies=(), amplitudes=())
+    left = remainder(replace(samples, parts=samples.parts[:1], bits=53), secular)
+    shown = spectrum(left, min(found.order, _SEARCH_ORDERS[0]), real=samples.real)
+    size = shown.sizes * (2 if samples.real else 1)
+    group = max(-(-len(size) // points), 1)
+    padded = -(-len(size) // group) * group
+    grouped = np.pad(size, (0, padded - len(size))).reshape(-1, group)
+    best = grouped.argmax(axis=1) + group * np.arange(len(grouped))
+    return shown.frequencies[best], size[best]

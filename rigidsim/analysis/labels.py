@@ -1,0 +1,224 @@
+"""Names for lines: integer combinations of known frequencies, also of lines that sampling has folded.
+
+A line that is sampled too rarely shows up at its frequency less a whole number of turns a sample. It is
+unfolded only where one combination of known frequencies fits it, beyond Nyquist's, and no other that is
+nearly as simple.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_ORDERS = {1: 60, 2: 40, 3: 16, 4: 10, 5: 8, 6: 7}
+"""Largest sum of abs(multipliers), by the number of known frequencies; 6 beyond."""
+_SIGMAS = 5.0
+_ROUNDING = 1e-13  # of a combination, relative to its largest term
+_CHANCE = 0.05  # labels that as many combinations would fit by chance aren't given
+_RIVALS = 2  # orders more that another combination may have and still make a label doubtful
+
+
+@dataclass(frozen=True)
+class Known:
+    """A frequency that a scene is known to have.
+
+    Attributes:
+        name: one word.
+        value: rad/s, mpf or float; the sign counts.
+        tolerance: relative; 0 where the value is exact. The strongest line within it takes its place.
+        source: where the value comes from.
+        error: one standard deviation of a value that was measured, rad/s.
+        where: "body" or "space" where only signals in body axes, or only those in space, can have it: how far
+            a symmetric body has turned about its axis is to be seen in body axes alone.
+    """
+
+    name: str
+    value: Any
+    tolerance: float = 0.0
+    source: str = ""
+    error: float = 0.0
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a line is.
+
+    Attributes:
+        multipliers: of the known frequencies; empty where none fits.
+        text: ``2 orbit - node``; "" where nothing fits.
+        folds: whole turns a sample that were added to the observed frequency.
+        doubtful: other combinations that fit as well; a folded line is not unfolded then.
+    """
+
+    multipliers: tuple[int, ...] = ()
+    text: str = ""
+    folds: int = 0
+    doubtful: tuple[str, ...] = ()
+
+
+def named(multipliers: Sequence[int], known: Sequence[Known]) -> str:
+    """A combination as text, the positive terms first."""
+    if not any(multipliers):
+        return "0"
+    terms = sorted(
+        ((m, k.name) for m, k in zip(multipliers, known, strict=True) if m), key=lambda term: term[0] < 0
+    )
+    words = []
+    for n, (m, name) in enumerate(terms):
+        sign = "-" if m < 0 else "+" if n else ""
+        size = "" if abs(m) == 1 else f"{abs(m)} "
+        words.append(f"{sign} {size}{name}" if n else f"{sign}{size}{name}")
+    return " ".join(words)
+
+
+@lru_cache(maxsize=8)
+def combinations(count: int) -> NDArray[np.int64]:
+    """All integer vectors (n, count) up to the largest order, the simplest first."""
+    most = _ORDERS.get(count, 6)
+    found: list[tuple[tuple[int, ...], int]] = [((), 0)]
+    for _ in range(count):
+        found = [
+            ((*vector, m), order + abs(m))
+            for vector, order in found
+            for m in range(-(most - order), most - order + 1)
+        ]
+    vectors = np.array([vector for vector, _ in found], dtype=np.int64).reshape(len(found), count)
+    order = np.abs(vectors).sum(axis=1)
+    # of two that differ in sign the one that begins with a positive multiplier
+    return vectors[np.lexsort((-vectors.sum(axis=1), order))]
+
+
+def label(
+    frequency: float,
+    error: float,
+    known: Sequence[Known],
+    nyquist: float,
+    *,
+    real: bool,
+    in_body: bool = False,
+    blend: float = 0.0,
+) -> Label:
+    """The combination that a line is.
+
+    Args:
+        frequency, error: rad/s, as observed: within +-nyquist.
+        real: of a real signal, in which a line can't be told from its mirror image.
+        in_body: whether the signal is in body axes.
+        blend: rad/s, far less than a bin: where nothing fits within the error, combinations that near do:
+            a line can have absorbed others that are too close to be told apart.
+    """
+    if not known:
+        return Label((), "0", 0) if abs(frequency) <= _SIGMAS * error else Label()
+    seen = [n for n, k in enumerate(known) if k.where in ("", "body" if in_body else "space")]
+    vectors = np.zeros((len(combinations(len(seen))), len(known)), dtype=np.int64)
+    vectors[:, seen] = combinations(len(seen))
+    values = np.array([float(k.value) for k in known])
+    errors = np.array([math.hypot(k.error, abs(float(k.value)) * 2.0**-52) for k in known])
+    true = vectors @ values
+    turns = np.round(true / (2 * nyquist))
+    observed = true - turns * 2 * nyquist
+    allowed: NDArray[np.float64] = _SIGMAS * np.sqrt(
+        error**2 + (vectors**2) @ errors**2
+    ) + _ROUNDING * np.max(np.abs(vectors * values), axis=1)
+    candidates = _Candidates(vectors, observed, turns, true, nyquist)
+    found = candidates.named(frequency, allowed, known, real=real)
+    if not found.multipliers and blend:
+        found = candidates.named(frequency, np.maximum(allowed, blend), known, real=real, blended=True)
+    return found
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """All combinations, with where each is observed and the turns a sample that this lacks."""
+
+    vectors: NDArray[np.int64]
+    observed: NDArray[np.float64]
+    turns: NDArray[np.float64]
+    true: NDArray[np.float64]
+    nyquist: float
+
+    def named(
+        self,
+        frequency: float,
+        allowed: NDArray[np.float64],
+        known: Sequence[Known],
+        *,
+        real: bool,
+        blended: bool = False,
+    ) -> Label:
+        """The simplest that fits; other frequencies that are nearly as simple make it doubtful."""
+        vectors, turns = self.vectors, self.turns
+        fits = np.abs(self.observed - frequency) <= allowed
+        if real:
+            # the mirror image has the opposite combination, which is in the list too
+            fits &= (turns != 0) | (self.true >= 0)
+        found = np.flatnonzero(fits)
+        if not len(found):
+            return Label()
+        cost = np.abs(vectors[found]).sum(axis=1) + (turns[found] != 0)
+        ranking = np.argsort(cost, kind="stable")
+        found, cost = found[ranking], cost[ranking]
+        best = found[0]
+        if self._by_chance(frequency, float(allowed[best]), int(cost[0])) > _CHANCE:
+            return Label()
+        rivals = [
+            n
+            for n, c in zip(found[1:], cost[1:], strict=True)
+            if not _same(vectors[n], vectors[best], real)
+            and (c <= cost[0] + _RIVALS if turns[n] != turns[best] else c == cost[0] and not blended)
+        ]
+        others = tuple(named(vectors[n].tolist(), known) for n in rivals[:4])
+        # which of several frequencies it is can't be told
+        folds = 0 if any(turns[n] != turns[best] for n in rivals) else int(turns[best])
+        multipliers = tuple(vectors[best].tolist())
+        return Label(multipliers, named(multipliers, known), folds, others)
+
+    def _by_chance(self, frequency: float, allowed: float, cost: int) -> float:
+        """How many combinations as simple would fit by chance, as dense as they are here."""
+        width: float = max(200 * allowed, self.nyquist / 500)
+        near = np.abs(self.observed - frequency) <= width
+        near &= np.abs(self.vectors).sum(axis=1) <= cost
+        return max(int(np.count_nonzero(near)) - 1, 0) * allowed / width
+
+
+def reversed_label(name: Label, known: Sequence[Known]) -> Label:
+    """Of a real line's mirror image."""
+    multipliers = tuple(-m for m in name.multipliers)
+    return Label(multipliers, named(multipliers, known), -name.folds, name.doubtful)
+
+
+def _same(one: NDArray[np.int64], other: NDArray[np.int64], real: bool) -> bool:
+    return bool(np.array_equal(one, other) or (real and np.array_equal(one, -other)))
+
+
+def settled(known: Sequence[Known], lines: Mapping[str, Sequence[tuple[Any, float, float]]]) -> list[Known]:
+    """Frequencies that are known roughly, replaced by the strongest line near them, or left out.
+
+    Args:
+        lines: of each signal, frequency (rad/s), its error, and amplitude.
+    """
+    found = []
+    for one in known:
+        value = float(one.value)
+        if not one.tolerance:
+            found.append(one)
+            continue
+        best: Known | None = None
+        strength = 0.0
+        for signal in lines.values():
+            largest = max((a for _, _, a in signal), default=0.0)
+            for frequency, error, amplitude in signal:
+                near = abs(abs(float(frequency)) - abs(value)) <= one.tolerance * abs(value)
+                if near and largest and amplitude / largest > strength:
+                    strength = amplitude / largest
+                    measured = abs(frequency) if value > 0 else -abs(frequency)
+                    best = replace(one, value=measured, error=error, source=f"{one.source}; measured")
+        found += [best] if best is not None else []
+    return found

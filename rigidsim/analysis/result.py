@@ -1,0 +1,325 @@
+"""What an analysis finds, as typed values and as a Dataset."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.analysis.labels import Known, Label
+from rigidsim.store.variables import part_name
+
+if TYPE_CHECKING:
+    import xarray
+
+TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line: of a real signal A cos(w t + phase), of a complex one A exp(i (w t + phase)).
+
+    Attributes:
+        frequency: w, rad/s (mpf with the digits of the samples), unfolded where ``label.folds`` says so.
+        observed: before it was unfolded.
+        frequency_error: one standard deviation, from what is left of the signal beside the line.
+        amplitude: A, in the signal's unit; mpf.
+        phase: at time zero of the scene, rad within +-pi; mpf.
+        phase_error: of the phase in the middle of the samples, rad.
+        label: what it is; ``mismatch`` is how far from that, rad/s.
+    """
+
+    frequency: Any
+    observed: Any
+    frequency_error: float
+    amplitude: Any
+    amplitude_error: float
+    phase: Any
+    phase_error: float
+    label: Label
+    mismatch: float
+
+    @property
+    def period(self) -> float:
+        """In s, positive; infinite for a constant."""
+        return float(TURN / abs(self.frequency)) if self.frequency else float("inf")
+
+    @property
+    def unfolded(self) -> bool:
+        """Whether the frequency lies beyond Nyquist's."""
+        return self.label.folds != 0
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether several combinations fit it."""
+        return bool(self.label.doubtful)
+
+
+@dataclass(frozen=True)
+class SignalAnalysis:
+    """One signal: a secular part and lines, the largest first.
+
+    Attributes:
+        value, value_error: of the secular part in the middle of the samples; None without one.
+        rate, rate_error: of the secular part, per s; None without one.
+        order: of the Hann window.
+        left: rms of what is left without lines and secular part.
+        level: lines below it aren't seen.
+        close: frequencies (rad/s) where something is left that is too close to a line to be told apart.
+        exhausted: whether there are more lines than were asked for.
+        notes: what a reader has to know.
+        spectrum: frequencies (rad/s) and sizes, for a picture.
+    """
+
+    name: str
+    units: str
+    real: bool
+    value: Any
+    value_error: float
+    rate: Any
+    rate_error: float
+    lines: tuple[Line, ...]
+    order: int
+    bits: int
+    left: float
+    level: float
+    close: tuple[float, ...]
+    exhausted: bool
+    notes: tuple[str, ...]
+    spectrum: tuple[NDArray[np.float64], NDArray[np.float64]] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """All signals that were analysed.
+
+    Attributes:
+        known: frequencies that labels are made of, in the order of multipliers.
+        spacing, length, start: of the samples, s.
+        attitude_error: of the run at its end, rad, as far as it is known.
+        title: of the dataset.
+    """
+
+    signals: tuple[SignalAnalysis, ...]
+    known: tuple[Known, ...]
+    start: float
+    spacing: float
+    length: float
+    attitude_error: float | None
+    title: str
+
+    def __getitem__(self, name: str) -> SignalAnalysis:
+        """By the signal's name, or that of a variable that has one signal."""
+        found = [s for s in self.signals if name in (s.name, s.name.split(".")[0])]
+        if len(found) != 1:
+            raise KeyError(f"{name!r}; there are {', '.join(s.name for s in self.signals)}")
+        return found[0]
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{s.name}: {len(s.lines)} lines" for s in self.signals)
+        return f"<Analysis of {self.title or 'a dataset'}: {counts}>"
+
+    @property
+    def nyquist(self) -> float:
+        """rad/s."""
+        return float(np.pi / self.spacing)
+
+    @property
+    def rounding(self) -> float | None:
+        """Error of frequencies that comes from the run's own error, rad/s: a phase that is wrong by it at the
+        end.
+        """
+        return None if self.attitude_error is None else self.attitude_error / self.length
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Everything, with dimensions ``signal``, ``line`` and ``known``; frequencies beyond double precision
+        have residuals ``_lo``, ``_lo2``, as runs have them.
+        """
+        return _dataset(self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "title": self.title,
+            "start_seconds": self.start,
+            "spacing_seconds": self.spacing,
+            "length_seconds": self.length,
+            "nyquist_rad_per_s": self.nyquist,
+            "attitude_error_rad": self.attitude_error,
+            "rounding_rad_per_s": self.rounding,
+            "known": [
+                {
+                    "name": k.name,
+                    "rad_per_s": float(k.value),
+                    "digits": digits(k.value, 113),
+                    "source": k.source,
+                }
+                for k in self.known
+            ],
+            "signals": [_signal_dict(s, self.known) for s in self.signals],
+        }
+
+
+def digits(value: Any, bits: int) -> str:
+    """A number with as many digits as a precision has."""
+    import mpmath
+
+    return str(mpmath.nstr(mpmath.mpf(value), max(int(bits * 0.30103), 17)))
+
+
+def _signal_dict(signal: SignalAnalysis, known: Sequence[Known]) -> dict[str, Any]:
+    secular: dict[str, Any] = {"value": _number(signal.value), "value_error": signal.value_error}
+    if signal.rate is not None:
+        secular |= {"rate_per_s": _number(signal.rate), "rate_error_per_s": signal.rate_error}
+    return {
+        "name": signal.name,
+        "units": signal.units,
+        "real": signal.real,
+        "secular": secular if signal.value is not None else None,
+        "window_order": signal.order,
+        "left_rms": signal.left,
+        "noise_level": signal.level,
+        "more_lines": signal.exhausted,
+        "unresolved_rad_per_s": list(signal.close),
+        "notes": list(signal.notes),
+        "lines": [
+            {
+                "frequency_rad_per_s": float(line.frequency),
+                "frequency_digits": digits(line.frequency, signal.bits),
+                "frequency_error_rad_per_s": line.frequency_error,
+                "observed_rad_per_s": float(line.observed),
+                "period_seconds": line.period if line.frequency else None,
+                "amplitude": float(line.amplitude),
+                "amplitude_error": line.amplitude_error,
+                "phase_rad": float(line.phase),
+                "phase_error_rad": line.phase_error,
+                "label": line.label.text,
+                "multipliers": {
+                    k.name: m for k, m in zip(known, line.label.multipliers or (), strict=False) if m
+                },
+                "unfolded": line.unfolded,
+                "ambiguous_with": list(line.label.doubtful),
+                "mismatch_rad_per_s": line.mismatch,
+            }
+            for line in signal.lines
+        ],
+    }
+
+
+def _number(value: Any) -> Any:
+    value = complex(value)
+    return value.real if value.imag == 0 else [value.real, value.imag]
+
+
+def _dataset(analysis: Analysis) -> xarray.Dataset:
+    import xarray
+
+    signals, known = analysis.signals, analysis.known
+    longest = max((len(s.lines) for s in signals), default=0)
+    shape = (len(signals), longest)
+    parts = 1 if all(s.bits <= 53 for s in signals) else 3
+    dims = ("signal", "line")
+    data: dict[str, tuple[Any, ...]] = {}
+
+    def table(
+        name: str, units: str, long_name: str, of: Any, dtype: Any = np.float64, fill: Any = np.nan
+    ) -> None:
+        values = np.full(shape, fill, dtype=dtype)
+        for row, signal in enumerate(signals):
+            for column, line in enumerate(signal.lines):
+                values[row, column] = of(line)
+        data[name] = (dims, values, {"units": units, "long_name": long_name})
+
+    def remainder(value: Any, part: int) -> float:
+        for _ in range(part):
+            value = value - float(value)
+        return float(value)
+
+    for part in range(parts):
+        table(
+            part_name("frequency", part),
+            "rad s-1",
+            "angular frequency",
+            lambda x, p=part: remainder(x.frequency, p),
+        )
+        if part:
+            data[part_name("frequency", part)][2]["residual_of"] = "frequency"
+    table(
+        "frequency_error", "rad s-1", "one standard deviation of the frequency", lambda x: x.frequency_error
+    )
+    table("observed_frequency", "rad s-1", "frequency before it was unfolded", lambda x: float(x.observed))
+    table("amplitude", "", "amplitude, in the signal's unit", lambda x: float(x.amplitude))
+    table("amplitude_error", "", "one standard deviation of the amplitude", lambda x: x.amplitude_error)
+    table("phase", "rad", "phase at time zero", lambda x: float(x.phase))
+    table("phase_error", "rad", "one standard deviation of the phase at mid-span", lambda x: x.phase_error)
+    table("mismatch", "rad s-1", "frequency less that of its label", lambda x: x.mismatch)
+    table("label", "", "combination of known frequencies", lambda x: x.label.text, object, "")
+    table(
+        "unfolded", "1", "1 where the frequency lies beyond Nyquist's", lambda x: int(x.unfolded), np.int8, 0
+    )
+    table("ambiguous", "1", "1 where several combinations fit", lambda x: int(x.ambiguous), np.int8, 0)
+    multipliers = np.zeros((*shape, len(known)), dtype=np.int64)
+    for row, signal in enumerate(signals):
+        for column, line in enumerate(signal.lines):
+            if line.label.multipliers:
+                multipliers[row, column] = line.label.multipliers
+    data["multipliers"] = ((*dims, "known"), multipliers, {"units": "1", "long_name": "of known frequencies"})
+    data["known_frequency"] = (
+        ("known",), np.array([float(k.value) for k in known]),
+        {"units": "rad s-1", "long_name": "what labels are made of"},
+    )  # fmt: skip
+    data["known_source"] = (("known",), np.array([k.source for k in known], dtype=object), {"units": ""})
+
+    def along(name: str, values: list[Any], units: str, long_name: str, dtype: Any = np.float64) -> None:
+        data[name] = (("signal",), np.array(values, dtype=dtype), {"units": units, "long_name": long_name})
+
+    nan = float("nan")
+    along("signal_units", [s.units for s in signals], "", "unit of the signal", object)
+    along("real", [int(s.real) for s in signals], "1", "1 of a real signal", np.int8)
+    along(
+        "secular_value",
+        [nan if s.value is None else float(s.value.real) for s in signals],
+        "",
+        "secular part at mid-span",
+    )
+    along(
+        "secular_rate",
+        [nan if s.rate is None else float(s.rate.real) for s in signals],
+        "",
+        "rate of the secular part, per s",
+    )
+    along(
+        "secular_rate_error", [s.rate_error for s in signals], "", "one standard deviation of the rate, per s"
+    )
+    along("left", [s.left for s in signals], "", "rms of what is left without lines and secular part")
+    along("noise_level", [s.level for s in signals], "", "amplitude below which lines aren't seen")
+    along("window_order", [s.order for s in signals], "1", "order of the Hann window", np.int64)
+    size = max((len(s.spectrum[0]) for s in signals), default=0)
+    curves = np.full((2, len(signals), size), np.nan)
+    for row, signal in enumerate(signals):
+        for which in (0, 1):
+            curves[which, row, : len(signal.spectrum[which])] = signal.spectrum[which]
+    data["spectrum_frequency"] = (("signal", "spectrum"), curves[0], {"units": "rad s-1"})
+    data["spectrum_amplitude"] = (("signal", "spectrum"), curves[1], {"long_name": "windowed amplitude"})
+    attributes = {
+        "title": analysis.title,
+        "source": "rigidsim analyse",
+        "sample_spacing": analysis.spacing,
+        "length": analysis.length,
+        "start": analysis.start,
+        "nyquist_frequency": analysis.nyquist,
+        "notes": json.dumps({s.name: list(s.notes) for s in signals}),
+    }
+    if analysis.attitude_error is not None:
+        attributes["attitude_error"] = analysis.attitude_error
+    coords = {
+        "signal": np.array([s.name for s in signals], dtype=object),
+        "known": np.array([k.name for k in known], dtype=object),
+        "line": np.arange(1, longest + 1),
+    }
+    return xarray.Dataset(data, coords=coords, attrs=attributes)

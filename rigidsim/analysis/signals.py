@@ -1,0 +1,244 @@
+"""What of a dataset is analysed: its variables along time as real and complex signals, with every digit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.analysis.decomposition import Samples
+from rigidsim.errors import RigidsimError
+from rigidsim.store.variables import parts_in
+
+if TYPE_CHECKING:
+    import xarray
+
+Reals = NDArray[np.float64]
+
+LEAST_SAMPLES = 32
+MOST_SAMPLES = 20_000_000
+_SPARE_BITS = 100  # of sums and products beyond the precision of the samples
+_BITS = {1: 53, 2: 64, 3: 113}  # by number of parts, where the dataset doesn't say
+_PAIRS = {
+    "polar_motion": [("m1", "m2")],
+    "body_axis": [("x", "y")],
+    "space_axis": [("X", "Y")],
+    "quaternion_component": [("w", "z"), ("x", "y")],
+}
+"""Components, by variable or dimension, that are the real and imaginary part of a complex signal."""
+_IN_BODY = (
+    "polar_motion", "andoyer_angles", "rotation_angle", "spin_angle", "quaternion", "euler_angles",
+    "roll_pitch_yaw", "nadir",
+)  # fmt: skip
+FIRST = (
+    "polar_motion", "obliquity", "node_longitude", "roll_pitch_yaw", "tilt", "precession_angle", "spin_angle",
+    "figure_axis", "momentum_axis", "andoyer_angles", "wobble_angle", "nutation_angle",
+)  # fmt: skip
+"""Variables that are analysed where none is named; else the angular velocity, else all."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Equidistant times.
+
+    Attributes:
+        start, spacing: mpf, s.
+        count: how many.
+        bits: of the precision of the times.
+    """
+
+    start: Any
+    spacing: Any
+    count: int
+    bits: int
+    context: Any
+
+    @property
+    def middle(self) -> Any:
+        """Of the first and the last time."""
+        return self.start + self.spacing * (self.count - 1) / 2
+
+    @property
+    def length(self) -> Any:
+        """As many spacings as there are samples: one turn over it is a bin."""
+        return self.spacing * self.count
+
+    @property
+    def nyquist(self) -> float:
+        """Angular frequency of a turn in two samples, rad/s."""
+        return float(math.pi / self.spacing)
+
+
+def clock_of(dataset: xarray.Dataset) -> Clock:
+    """The times of a dataset.
+
+    Raises:
+        RigidsimError: none, too few, or not equidistant.
+    """
+    if "time" not in dataset.coords or dataset["time"].dims != ("time",):
+        raise RigidsimError("the dataset has no coordinate time along a dimension time; analyse needs one")
+    count = dataset.sizes["time"]
+    if count < LEAST_SAMPLES:
+        raise RigidsimError(f"the dataset has {count} samples; analyse needs at least {LEAST_SAMPLES}")
+    if count > MOST_SAMPLES:
+        raise RigidsimError(
+            f"the dataset has {count:,} samples, analyse takes up to {MOST_SAMPLES:,}: give it fewer, for "
+            "instance dataset.isel(time=slice(None, None, 10))"
+        )
+    if not np.issubdtype(dataset["time"].dtype, np.number):
+        raise RigidsimError("time is given as dates; analyse needs seconds as numbers")
+    parts = [np.asarray(dataset[name].values, dtype=np.float64) for name in parts_in(dataset, "time")]
+    bits = bits_of(dataset, len(parts))
+    context = mpmath.MPContext()
+    context.prec = bits + _SPARE_BITS
+    first, last = (sum((context.mpf(float(p[n])) for p in parts), context.zero) for n in (0, -1))
+    spacing = (last - first) / (count - 1)
+    _refuse_uneven(parts[0], float(first), float(spacing))
+    return Clock(first, spacing, count, bits, context)
+
+
+def _refuse_uneven(times: Reals, first: float, spacing: float) -> None:
+    """Rounded times lie within half a unit in the last place of equidistant ones."""
+    finest = 4 * np.finfo(float).eps * float(np.max(np.abs(times)))
+    gaps = np.diff(times)
+    if not spacing > 0 or not np.all(np.isfinite(times)):
+        raise RigidsimError("sample times don't increase; analyse needs equidistant ones")
+    if float(np.max(np.abs(times - (first + spacing * np.arange(len(times)))))) > finest:
+        raise RigidsimError(
+            f"samples aren't equidistant: {gaps.min():.9g} to {gaps.max():.9g} s apart; lines are found in "
+            "equidistant ones: run again with every or samples in [time] instead of times, or give "
+            "rigidsim.analyse a part that is equidistant"
+        )
+
+
+def bits_of(dataset: xarray.Dataset, parts: int) -> int:
+    """Of the precision of values that are kept in so many parts."""
+    if parts == 1:
+        return 53
+    given: Any = dataset.attrs.get("precision_bits")
+    given = given.item() if hasattr(given, "item") else given
+    known = (
+        given if isinstance(given, int) and 53 < given <= 53 * parts else _BITS.get(parts, 53 * parts - 12)
+    )
+    return int(known)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A real or complex function of time, as it is sampled.
+
+    Attributes:
+        name: variable and components: ``polar_motion.m1+i.m2``, ``obliquity.figure``.
+        variable: that it is made of.
+        units: of its values.
+        real: whether it is.
+        degree: of the secular polynomial; -1 for none.
+    """
+
+    name: str
+    variable: str
+    units: str
+    real: bool
+    degree: int
+    dataset: xarray.Dataset
+    components: tuple[dict[str, Any], ...]
+
+    def samples(self, context: Any) -> Samples:
+        """All values.
+
+        Raises:
+            RigidsimError: some aren't finite, or don't vary.
+        """
+        names = parts_in(self.dataset, self.variable)
+        parts = []
+        for name in names:
+            columns = [
+                np.asarray(self.dataset[name].isel(chosen).values, dtype=np.float64)
+                for chosen in self.components
+            ]
+            parts.append((columns[0], columns[1] if len(columns) > 1 else np.zeros_like(columns[0])))
+        if not all(np.all(np.isfinite(column)) for pair in parts for column in pair):
+            raise RigidsimError(
+                f"{self.name}: not all samples are finite; analyse needs a part without gaps, for instance "
+                "dataset.isel(time=slice(0, 1000))"
+            )
+        return Samples(tuple(parts), self.real, bits_of(self.dataset, len(parts)), context)
+
+    @property
+    def in_body(self) -> bool:
+        """Whether it is seen from the body, so that the body's own turning is part of it."""
+        return self.variable in _IN_BODY or "body_axis" in self.dataset[self.variable].dims
+
+
+def signals_of(dataset: xarray.Dataset, chosen: Sequence[str] = ()) -> list[Signal]:
+    """The signals of a dataset.
+
+    Args:
+        chosen: names of variables (all their signals) or of signals; where empty, those of ``FIRST`` that the
+            dataset has, of axes the figure axis, else the angular velocity, else every variable.
+
+    Raises:
+        RigidsimError: there is none of a name.
+    """
+    offered = [signal for name in _variables(dataset) for signal in _signals(dataset, name)]
+    if not offered:
+        raise RigidsimError("the dataset has no variable along time that could be analysed")
+    if chosen:
+        found: list[Signal] = []
+        for name in chosen:
+            matching = [s for s in offered if name in (s.name, s.variable)]
+            if not matching:
+                raise RigidsimError(
+                    f"no signal {name!r}; there are {', '.join(s.name for s in offered)}; the name of a "
+                    "variable stands for all of its signals"
+                )
+            found += [s for s in matching if s not in found]
+        return found
+    by_default = [s for s in offered if s.variable in FIRST and _of_figure(s)]
+    rates = [s for s in offered if s.variable == "angular_velocity"]
+    return sorted(by_default, key=lambda s: FIRST.index(s.variable)) or rates or offered
+
+
+def _of_figure(signal: Signal) -> bool:
+    return "." not in signal.name or signal.name.split(".")[1] not in ("spin", "momentum")
+
+
+def _variables(dataset: xarray.Dataset) -> list[str]:
+    """Along time, of numbers, no residuals, no drifts."""
+    names = []
+    for name, data in dataset.data_vars.items():
+        plain = (
+            "time" in data.dims and np.issubdtype(data.dtype, np.floating) and "residual_of" not in data.attrs
+        )
+        bookkeeping = str(name).endswith(("_drift", "_put_back"))
+        if plain and not bookkeeping and len(data.dims) <= 2:
+            names.append(str(name))
+    return names
+
+
+def _signals(dataset: xarray.Dataset, name: str) -> list[Signal]:
+    data = dataset[name].transpose("time", ...)
+    units = str(data.attrs.get("units", ""))
+    if data.ndim == 1:
+        return [Signal(name, name, units, True, 1 if units == "rad" else 0, dataset, ({},))]
+    dim = str(data.dims[1])
+    labels = (
+        [str(x) for x in data[dim].values] if dim in data.coords else [str(n) for n in range(data.shape[1])]
+    )
+    signals, paired = [], set()
+    for real, imaginary in _PAIRS.get(name) or _PAIRS.get(dim, []):
+        if real in labels and imaginary in labels:
+            picks = tuple({dim: labels.index(label)} for label in (real, imaginary))
+            full = f"{name}.{real}+i{imaginary}"
+            signals.append(Signal(full, name, units, False, -1, dataset, picks))
+            paired |= {real, imaginary}
+    degree = 1 if units == "rad" else 0
+    for n, label in enumerate(labels):
+        if label not in paired:
+            signals.append(Signal(f"{name}.{label}", name, units, True, degree, dataset, ({dim: n},)))
+    return signals

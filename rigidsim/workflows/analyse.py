@@ -1,0 +1,127 @@
+"""``rigidsim analyse``: a run's secular rates and labelled lines, as a table, a dataset and a figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigidsim.analysis.analyse import analyse_dataset
+from rigidsim.analysis.labels import Known
+from rigidsim.analysis.result import Analysis
+from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.scene.scene import build_scene
+from rigidsim.store import atomic
+from rigidsim.store.run import Run, open_run
+from rigidsim.workflows.known_frequencies import known_frequencies
+from rigidsim.workflows.read import parse
+
+if TYPE_CHECKING:
+    import xarray
+
+FIGURES = (".png", ".svg")
+
+
+def analyse(
+    source: xarray.Dataset | Run | str | Path,
+    variables: str | Sequence[str] = (),
+    *,
+    lines: int = 20,
+    floor: float = 1e-12,
+    known: Mapping[str, Any] | None = None,
+    window: int | None = None,
+) -> Analysis:
+    """Secular rates and spectral lines of a run, or of any dataset with equidistant ``time`` in s.
+
+    Args:
+        source: a dataset, a run, or the path of one. Lines are labelled with the frequencies of the scene
+            that the dataset's attribute ``config`` describes.
+        variables: names of variables, or of their signals (``obliquity.figure``, ``polar_motion.m1+im2``); by
+            default those that the scene is about.
+        lines: of each signal at most.
+        floor: lines below this share of a signal's strongest are left out.
+        known: frequencies (rad/s) by name that replace the scene's, or stand where there is no scene.
+        window: order of the Hann window; by default what the lines' distances allow.
+
+    Returns:
+        Frequencies (rad/s), amplitudes (the variable's unit) and phases (rad, at time zero) with errors and
+        labels; ``.dataset`` has them as arrays.
+
+    Raises:
+        RigidsimError: samples aren't equidistant, not finite or too few, or there is no such variable.
+        RunFolderError: no run there, or a damaged one.
+    """
+    chosen = (variables,) if isinstance(variables, str) else tuple(variables)
+    options: dict[str, Any] = {"lines": lines, "floor": floor, "order": window}
+    if isinstance(source, (str, Path)):
+        source = open_run(source)
+    if isinstance(source, Run):
+        with source.dataset as dataset:
+            names = _known(dataset, known)
+            options["attitude_error"] = _attitude_error(source)
+            return analyse_dataset(dataset, chosen, known=names, **options)
+    return analyse_dataset(source, chosen, known=_known(source, known), **options)
+
+
+def _known(dataset: xarray.Dataset, given: Mapping[str, Any] | None) -> list[Known]:
+    if given is not None:
+        return [Known(name, value, 0.0, "given") for name, value in given.items()]
+    text = dataset.attrs.get("config")
+    if not isinstance(text, str):
+        return []
+    try:
+        scene = build_scene(parse(text, source="the dataset's config"))
+    except ConfigError:  # of another version: the numbers are there all the same
+        return []
+    return known_frequencies(scene, driven=bool(dataset.attrs.get("python_loads")))
+
+
+def _attitude_error(run: Run) -> float | None:
+    """Of the run at its end, as it was certified or estimated."""
+    accuracy = getattr(run.outcome, "accuracy", None)
+    for name in ("certified", "estimated_attitude_error"):
+        value = getattr(accuracy, name, None)
+        if value is not None and math.isfinite(value):
+            return float(value)
+    return None
+
+
+@dataclass(frozen=True)
+class Saved:
+    """Where an analysis was written."""
+
+    dataset: Path
+    figure: Path
+
+
+def save(analysis: Analysis, out: Path, figure: Path | None = None) -> Saved:
+    """Write dataset and figure, each visible only when it is whole.
+
+    Args:
+        out: netCDF-4 file.
+        figure: PNG or SVG; by default beside it.
+
+    Raises:
+        RigidsimError: they can't be written.
+    """
+    from rigidsim.look.spectrum import save_spectrum
+
+    drawn = figure or out.with_suffix(".png")
+    if out.suffix.lower() in FIGURES:
+        raise RigidsimError(
+            f"{out}: the dataset is no picture; give --out FILE.h5, the figure stands beside it"
+        )
+    if drawn.suffix.lower() not in FIGURES:
+        raise RigidsimError(f"{drawn}: a figure is a .png or a .svg")
+    dataset = analysis.dataset
+    try:
+        with atomic.replacing(out) as temporary:
+            dataset.to_netcdf(temporary, engine="h5netcdf")
+        with atomic.replacing(drawn) as temporary:
+            save_spectrum(dataset, temporary, file_format=drawn.suffix.lower()[1:])
+    except OSError as error:
+        why = error.strerror or error
+        raise RigidsimError(f"{out}: can't be written: {why}; choose another --out") from None
+    return Saved(out, drawn)

@@ -1,0 +1,201 @@
+"""analyse: frequencies of closed forms against elliptic functions, datasets from anywhere, refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import xarray
+from support import config, run_text
+from typer.testing import CliRunner
+
+import rigidsim
+from experiments.closed_forms import free_top
+from rigidsim.analysis.result import Analysis
+from rigidsim.cli.app import app
+from rigidsim.errors import RigidsimError
+
+MOMENTS, RATES = (3, 2, 1), ("0.3", "0.2", "1")
+
+
+def tumbling(periods: float, precision: str, every: str, tmp_path: Path) -> tuple[rigidsim.Run, Any]:
+    """A free asymmetric body in closed form, and its elliptic functions by mpmath."""
+    with mpmath.workdps(60):
+        exact = free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(w) for w in RATES])
+        end = mpmath.nstr(periods * exact.period, 12)
+        text = config(
+            f"principal_moments = {list(MOMENTS)}",
+            f"angular_velocity = {[*map(str, RATES)]}".replace("'", '"'),
+            time=f"end = {end}\nevery = {every}",
+            integrator=f'precision = "{precision}"\nmethod = "closed_form"',
+            output='record = ["angular_velocity", "quaternion"]\nestimate = false',
+        )
+        return run_text(text, tmp_path), exact
+
+
+def wrong(analysis: Analysis, exact: Any, share: float) -> list[float]:
+    """Relative errors of the frequencies of lines above a share of their signal's strongest, by labels."""
+    rates = {"wobble": 2 * mpmath.pi / exact.period, "precession": exact.precession}
+    errors = []
+    for signal in analysis.signals:
+        for line in signal.lines:
+            if line.amplitude < share * signal.lines[0].amplitude:
+                continue
+            assert line.label.multipliers, (signal.name, float(line.frequency))
+            combined = sum(
+                m * rates[k.name] for m, k in zip(line.label.multipliers, analysis.known, strict=True)
+            )
+            errors.append(float(abs(line.frequency - combined) / max(rates.values())))
+    return errors
+
+
+def test_lines_of_a_free_body_are_multiples_of_its_period(tmp_path: Path) -> None:
+    run, exact = tumbling(400, "double", "0.8", tmp_path)
+    analysis = rigidsim.analyse(run, "angular_velocity")
+    # eps over the angle turned and over the share of the largest line
+    with mpmath.workdps(40):
+        assert max(wrong(analysis, exact, 1e-2)) < 1e-15
+        assert max(wrong(analysis, exact, 1e-5)) < 1e-13
+    signal = analysis["angular_velocity.x+iy"]
+    assert all(line.label.text for line in signal.lines), "each line has its name"
+    assert {abs(line.label.multipliers[0]) % 2 for line in signal.lines} == {1}
+    assert {line.label.multipliers[0] % 2 for line in analysis["angular_velocity.z"].lines} == {0}
+
+
+@pytest.mark.slow
+def test_digits_over_ten_thousand_periods(tmp_path: Path) -> None:
+    run, exact = tumbling(10000, "double", "1.5", tmp_path)
+    with mpmath.workdps(40):
+        analysis = rigidsim.analyse(run, ["angular_velocity", "quaternion"])
+        assert max(wrong(analysis, exact, 1e-3)) < 1e-14
+        assert max(wrong(analysis, exact, 1e-12)) < 1e-13
+
+
+@pytest.mark.slow
+def test_digits_of_quadruple_precision_over_ten_thousand_periods(tmp_path: Path) -> None:
+    run, exact = tumbling(10000, "quadruple", "4", tmp_path)
+    with mpmath.workdps(60):
+        analysis = rigidsim.analyse(run, "angular_velocity", lines=8)
+        assert max(wrong(analysis, exact, 1e-3)) < 1e-28
+        assert all(line.label.text for signal in analysis.signals for line in signal.lines)
+        saved = analysis.dataset
+        parts = [float(saved[name][0, 0]) for name in ("frequency", "frequency_lo", "frequency_lo2")]
+        assert abs(sum(map(mpmath.mpf, parts)) / analysis.signals[0].lines[0].frequency - 1) < 1e-31
+
+
+def test_the_free_nutation_of_the_earth(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "configs/earth_free_nutation.toml").read_text()
+    run = run_text(text, tmp_path, 'output.record=["polar_motion"]', "time.end=365 day")
+    signal = rigidsim.analyse(run)["polar_motion"]
+    assert [line.label.text for line in signal.lines] == ["wobble"]
+    # 304.456 sidereal days, prograde, from little more than one turn
+    sidereal = 2 * np.pi / 7.292115e-5
+    assert signal.lines[0].period == pytest.approx(sidereal * (1 - 0.00327379492) / 0.00327379492, rel=1e-9)
+    assert signal.lines[0].period / 86400 == pytest.approx(303.62, abs=0.01)
+    assert signal.lines[0].frequency > 0
+    assert float(signal.lines[0].amplitude) == pytest.approx(1e-6, rel=1e-9)
+
+
+def test_librations_of_a_satellite(tmp_path: Path) -> None:
+    # amplitudes of 1e-4 rad: frequencies of the linearised equations to 1e-7
+    text = config(
+        "principal_moments = [900, 1000, 400]",
+        "euler_angles = [0.0001, 0.00015, 0.0002]\nangular_velocity = [0, 0.0002, 1]",
+        'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}',
+        "end = 400\nevery = 0.25",
+        output='record = ["angular_velocity"]\nestimate = false',
+    ).replace("principal_moments = [900, 1000, 400]", "principal_moments = [400, 900, 1000]")
+    run = run_text(text, tmp_path)
+    analysis = rigidsim.analyse(run)
+    known = {k.name: float(k.value) for k in analysis.known}
+    pitch = np.sqrt(3 * (900 - 400) / 1000)
+    sx, sz = (1000 - 400) / 900, (1000 - 900) / 400
+    half, product = (1 + 3 * sx + sx * sz) / 2, 4 * sx * sz
+    fast, slow = (np.sqrt(half + sign * np.sqrt(half**2 - product)) for sign in (1, -1))
+    assert known["pitch"] == pytest.approx(pitch, rel=1e-7)
+    assert known["rollyaw1"] == pytest.approx(fast, rel=1e-7)
+    assert known["rollyaw2"] == pytest.approx(slow, rel=1e-7)
+    assert [line.label.text for line in analysis["angular_velocity.z"].lines[:1]] == ["pitch"]
+    transverse = {line.label.text.lstrip("-") for line in analysis["angular_velocity.x+iy"].lines[:4]}
+    assert transverse == {"rollyaw1", "rollyaw2"}
+
+
+def made_up(**attributes: Any) -> xarray.Dataset:
+    time = np.arange(400) * 0.5
+    values = 0.2 + 1e-3 * time + 0.1 * np.cos(0.7 * time + 0.3) + 0.01 * np.cos(1.4 * time)
+    return xarray.Dataset(
+        {"obliquity": ("time", values, {"units": "rad"}), "spin_rate": ("time", values)},
+        coords={"time": ("time", time)},
+        attrs=attributes,
+    )
+
+
+def test_any_dataset_with_frequencies_of_ones_own() -> None:
+    signal = rigidsim.analyse(made_up(title="x"), "obliquity", known={"swing": 0.7})["obliquity"]
+    assert [line.label.text for line in signal.lines[:2]] == ["swing", "2 swing"]
+    assert [float(line.amplitude) for line in signal.lines[:2]] == pytest.approx([0.1, 0.01], rel=1e-9)
+    assert float(signal.lines[0].phase) == pytest.approx(0.3, abs=1e-9)
+    assert float(signal.rate.real) == pytest.approx(1e-3, rel=1e-10)
+    assert [s.name for s in rigidsim.analyse(made_up()).signals] == ["obliquity"]
+    assert all(not line.label.text for line in rigidsim.analyse(made_up()).signals[0].lines)
+
+
+@pytest.mark.parametrize(
+    ("dataset", "options", "message"),
+    [
+        (made_up().isel(time=slice(0, 10)), {}, "has 10 samples; analyse needs at least 32"),
+        (
+            made_up().isel(time=[*range(100), *range(102, 200)]),
+            {},
+            "samples aren't equidistant: 0.5 to 1.5 s",
+        ),
+        (made_up().rename(time="t"), {}, "no coordinate time"),
+        (made_up(), {"variables": "tilt"}, "no signal 'tilt'; there are obliquity, spin_rate"),
+        (made_up(), {"lines": 0}, "given lines = 0; 1 to 500 are allowed"),
+        (made_up(), {"floor": 2.0}, "given floor = 2"),
+        (made_up(), {"window": 99}, "window of order 99; 1 to 20"),
+        (made_up().where(lambda d: d.time != 3), {}, "not all samples are finite"),
+    ],
+)
+def test_what_cannot_be_analysed_is_refused(dataset: Any, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(RigidsimError, match=message.replace("(", r"\(")):
+        rigidsim.analyse(dataset, **options)
+
+
+def test_the_command_prints_a_table_and_writes_dataset_and_figure(tmp_path: Path) -> None:
+    text = config(
+        time="end = 60\nsamples = 601",
+        integrator='method = "closed_form"',
+        output='record = ["angular_velocity"]\nestimate = false',
+    )
+    folder = run_text(text, tmp_path).folder.path
+    shown = CliRunner().invoke(app, ["analyse", str(folder), "--lines", "3"])
+    assert shown.exit_code == 0, shown.output
+    assert "wobble" in shown.stdout
+    assert (folder / "analysis.png").stat().st_size > 10_000
+    with xarray.open_dataset(folder / "analysis.h5") as saved:
+        assert saved["label"][0, 0].item() == "wobble"
+        assert saved.sizes["line"] == 3
+        first, error = float(saved["frequency"][0, 0]), float(saved["frequency_error"][0, 0])
+    told = CliRunner().invoke(
+        app,
+        [
+            "analyse",
+            str(folder),
+            "--json",
+            "--variable",
+            "angular_velocity.z",
+            "--out",
+            str(tmp_path / "a.nc"),
+        ],
+    )
+    found = json.loads(told.stdout)
+    assert [signal["name"] for signal in found["signals"]] == ["angular_velocity.z"]
+    assert found["signals"][0]["lines"][0]["frequency_rad_per_s"] == pytest.approx(2 * first, abs=20 * error)
+    assert (tmp_path / "a.png").exists()
+    refused = CliRunner().invoke(app, ["analyse", str(folder), "--out", str(tmp_path / "a.png")])
+    assert refused.exit_code == 2
