@@ -162,7 +162,7 @@ def test_an_attitude_message_turns_the_space_axes_into_the_body_axes(exported: C
     assert np.abs(attitudes(text) - expected).max() < 1e-15  # 16 digits are what the standard allows
 
 
-def test_an_orbit_message_is_in_kilometres(exported: Callable[..., Path]) -> None:
+def test_an_orbit_message_is_in_kilometres(exported: Callable[..., Path], rigidsim_command: Command) -> None:
     text = exported("oem", "", "--epoch", "2016-12-31T23:59:59 UTC", "--axes", "LAB_1").read_text()
     header = keywords(text)
     assert (header["TIME_SYSTEM"], header["REF_FRAME"]) == ("UTC", "LAB_1")
@@ -171,6 +171,9 @@ def test_an_orbit_message_is_in_kilometres(exported: Callable[..., Path]) -> Non
     with rigidsim.open_run("runs/throw").dataset as dataset:
         expected = np.hstack([dataset.position.values, dataset.velocity.values]) / 1000
     np.testing.assert_allclose(states(text), expected, rtol=1e-15, atol=1e-18)
+    options = ("--format", "csv", "--epoch", "2016-12-31T23:59:59 UTC")
+    assert rigidsim_command("export", "runs/throw", *options).exit_code == 0
+    assert "\n1.75,2016-12-31T23:59:60.75," in Path("throw.csv").read_text()
 
 
 SKY = '[frame]\naxes = "ecliptic J2000"\n'

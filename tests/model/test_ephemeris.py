@@ -92,6 +92,8 @@ def test_time_zero_is_the_epoch(runs: Path) -> None:
         "clock": later,
         "epoch": ["time.epoch=2000-01-02T12:00:00 TDB"],
         "J2000": [*later, "time.epoch=J2000"],
+        # TT - UTC was 64.184 s; TDB - TT is -1e-4 s
+        "UTC": ["time.epoch=2000-01-02T11:58:55.816 UTC"],
     }
     found = {name: run_text(text, runs, f"name={name}", *changes).dataset for name, changes in epochs.items()}
     assert {data.attrs["axes"] for data in found.values()} == {"ecliptic J2000"}
@@ -102,3 +104,7 @@ def test_time_zero_is_the_epoch(runs: Path) -> None:
     np.testing.assert_array_equal(rates["clock"], rates["J2000"])
     # the same times in two roundings: 1e-11 s of 9e4 s, in which the Sun moves by 2e-18 rad
     np.testing.assert_allclose(rates["epoch"], rates["clock"], rtol=1e-12)
+    # an ephemeris' argument is in TDB: 64 s off, the Sun would be 1.3e-5 rad elsewhere
+    np.testing.assert_allclose(rates["UTC"], rates["clock"], rtol=1e-10)
+    with pytest.raises(AssertionError):
+        np.testing.assert_allclose(rates["UTC"], rates["clock"], rtol=1e-13)

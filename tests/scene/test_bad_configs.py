@@ -279,6 +279,21 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[time] epoch",
         ['given "2029-04-13T21:46:00"; a date and time with its scale (TDB, TT, UTC)'],
     ),
+    "a unit of time that is none": (
+        {"time": 'end = 1\nunit = "parsec"'},
+        "[time] unit",
+        ['given "parsec"', 'unknown unit "parsec"', "a unit of time is allowed"],
+    ),
+    "a unit of length for times": (
+        {"time": 'end = 1\nunit = "km"'},
+        "[time] unit",
+        ['given "km"', "of the dimension asked for, which is s", 'such as "day"'],
+    ),
+    "a unit with a number": (
+        {"time": 'end = 1\nunit = "30 day"'},
+        "[time] unit",
+        ['given "30 day"', "not the name of a unit of time"],
+    ),
     "epoch a date": (
         {"time": "end = 1\nepoch = 2029-04-13"},
         "[time] epoch",

@@ -33,7 +33,8 @@ def export(
         typer.Option(
             "--epoch",
             metavar="TIME",
-            help='For aem and oem: what time 0 is, where the config doesn\'t say: "2029-04-13T21:46:00 TDB".',
+            help="What time 0 is, where the config doesn't say, for aem, oem and the dates of csv: "
+            '"2029-04-13T21:46:00 TDB".',
         ),
     ] = None,
     axes: Annotated[
