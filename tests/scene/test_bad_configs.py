@@ -942,10 +942,10 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[parameters]",
         ['given the name "a b"', "allowed: letters, digits and underscores"],
     ),
-    "parameter with a unit": (
-        {"more": '[parameters]\nk = "1 m"'},
+    "parameter with an unknown unit": (
+        {"more": '[parameters]\nk = "1 parsec"'},
         "[parameters] k",
-        ["without one is allowed"],
+        ['unknown unit "parsec"'],
     ),
     "lyapunov a number": (
         {"output": "lyapunov = 1"},
