@@ -26,6 +26,7 @@ from rigidsim.model.euler_charts import across, is_proper, partner_sequence, pol
 from rigidsim.model.system import System
 from rigidsim.scene.attitude import quaternion_from_euler
 from rigidsim.solve.angle_wrapping import Angles, AngleState, AngleWrapping
+from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import CompiledFunction, Integrator
 from rigidsim.solve.precision import Precision, Scalar
 
@@ -114,7 +115,7 @@ class Charts:
     def _compile(self, sequence: str) -> CompiledFunction:
         angles, branch = list(hy.make_vars("phi", "theta", "psi")), hy.make_vars("branch")
         precision = self._precision
-        return hy.cfunc(
+        return compiled_function(
             across(sequence, angles, hy, branch),
             [*angles, branch],
             compact_mode=precision.compact,

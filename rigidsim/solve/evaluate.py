@@ -15,6 +15,7 @@ from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.charts import Lift
+from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.joined_angles import JoinedAngles
 from rigidsim.solve.precision import Precision
@@ -184,7 +185,7 @@ class Evaluator:
         return _PartnerChart(self._system, self._compile, self._precision)
 
     def _compile(self, expressions: list[hy.expression]) -> CompiledFunction:
-        return hy.cfunc(
+        return compiled_function(
             expressions,
             self._system.variables,
             compact_mode=self._precision.compact or self._system.wide,

@@ -15,13 +15,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import cast
 
-import heyoka as hy
 import numpy as np
 
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
+from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.lanes import NEIGHBOURS, BatchLanes, Lanes, SeriesErrors
 
 _LARGEST = 2.0**-24
@@ -96,7 +95,7 @@ def _function(expressions: list[Symbolic], variables: list[Symbolic]) -> Callabl
     if all(x in variables for x in expressions):
         places = [variables.index(x) for x in expressions]
         return lambda states: states[places]
-    return cast("Callable[[np.ndarray], np.ndarray]", hy.cfunc(expressions, variables, compact_mode=True))
+    return compiled_function(expressions, variables, compact_mode=True)
 
 
 class Neighbours:

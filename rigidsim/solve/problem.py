@@ -18,6 +18,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
+from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.projection import projected_system
 from rigidsim.solve.sampling import SampleClock
@@ -226,7 +227,7 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     if system.switches:  # whichever side it is on
         outputs.append(hy.par[system.parameters - 1])
         sides["pars"] = precision.array([mpmath.mpf(1)] * system.parameters)
-    rhs = hy.cfunc(outputs, system.variables, compact_mode=True, **precision.options)
+    rhs = compiled_function(outputs, system.variables, compact_mode=True, **precision.options)
     start = precision.number(system.scene.context.ldexp(system.scene.start, -system.scaling.time))
     values = rhs(precision.array(system.initial), time=start, **sides)
     lost = [n for n, v in zip(system.states, values, strict=False) if not math.isfinite(float(v))]

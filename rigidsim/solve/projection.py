@@ -29,6 +29,7 @@ from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.model.two_part import in_two_parts
+from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
@@ -106,7 +107,7 @@ class Projection:
         projected, self.left_out = projected_invariants(wide)
         self.names = [h.name for h in projected]
         n, m = len(wide.states), len(projected)
-        values = hy.cfunc([h.expression for h in projected], wide.variables, **self._options)
+        values = compiled_function([h.expression for h in projected], wide.variables, **self._options)
         self._wide, self._reference = wide, values(self._high.array(wide.initial))
         self._functions: dict[int, tuple[CompiledFunction, CompiledFunction]] = {}
         self.use(0)
@@ -236,7 +237,10 @@ class Projection:
         size = hy.sum([c * c for c in correction])
         outputs = [*correction, *new_integrals, *new_put_back, size]
         inputs = [*x, elapsed, pace, *integrals, *put_back, *then]
-        return hy.cfunc(residuals, x, **self._options), hy.cfunc(outputs, inputs, **self._options)
+        return (
+            compiled_function(residuals, x, **self._options),
+            compiled_function(outputs, inputs, **self._options),
+        )
 
     def _damping(self, context: mpmath.MPContext) -> mpmath.mpf:
         """Square of the sine between gradients below which a direction is left to itself.

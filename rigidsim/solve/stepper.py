@@ -17,6 +17,7 @@ import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.solve.building import interruptible
+from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
@@ -115,18 +116,15 @@ class Stepper:
         """Take note that the state was set from outside."""
 
     def _compiled(self, system: System) -> Integrator:
-        options = dict(self.precision.options)
-        if self.has_events:
-            options["nt_events"] = engine_events(system, self.precision, self.log, start=self._start)
+        options = dict(self.precision.options, time=self._start)
+        options["compact_mode"] = self.precision.compact or system.wide
         if self._tolerance is not None:
             options["tol"] = self._tolerance
-        return hy.taylor_adaptive(
-            system.equations,
-            self.precision.array(system.initial),
-            time=self._start,
-            compact_mode=self.precision.compact or system.wide,
-            **options,
-        )
+        initial = self.precision.array(system.initial)
+        if not self.has_events:
+            return compiled_engine(system.equations, initial, **options)
+        events = engine_events(system, self.precision, self.log, start=self._start)
+        return hy.taylor_adaptive(system.equations, initial, nt_events=events, **options)
 
     def use(self, chart: int) -> None:
         """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""

@@ -27,6 +27,7 @@ from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
 from rigidsim.scene.scene import SampleTimes
+from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.switching_stepper import SwitchingStepper
@@ -119,7 +120,7 @@ class _Plain:
 
     def __init__(self, system: System, *, compact: bool) -> None:
         start = np.zeros(len(system.states))
-        self._engine = hy.taylor_adaptive(system.equations, start, tol=_TOLERANCE, compact_mode=compact)
+        self._engine = compiled_engine(system.equations, start, tol=_TOLERANCE, compact_mode=compact)
 
     def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
         """The states at ascending times (n,), from the first on; None where it comes to no end."""
@@ -224,7 +225,9 @@ class TurnCounter:
         names = system.states[:3] if m.attitude is None else m.attitude.names
         self._two_signs = m.attitude is not None and m.attitude.kind == "quaternion"
         self._watched = [system.states.index(name) for name in names]
-        self._function: CompiledFunction = hy.cfunc([*outputs, squared], system.variables, compact_mode=True)
+        self._function: CompiledFunction = compiled_function(
+            [*outputs, squared], system.variables, compact_mode=True
+        )
         bound = angle_rate(system, self._angles)
         self._source = math.ldexp(bound - float(system.rate_bound), system.scaling.time)
         rate = math.sqrt(3) * bound

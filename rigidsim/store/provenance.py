@@ -6,10 +6,13 @@ import hashlib
 import importlib.metadata
 import platform
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import h5py
 import heyoka as hy
+import mpmath
 import numpy as np
 
 
@@ -26,13 +29,17 @@ def cpu_model() -> str:
 
 def versions() -> dict[str, str]:
     """Of everything that takes part in the numbers."""
-    found = {"python": platform.python_version(), "heyoka": str(hy.__version__), "numpy": np.__version__}
-    for name in ("rigidsim", "mpmath", "h5py"):
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:  # run from a source tree
-            found[name] = "unknown"
-    return found
+    parts = {"heyoka": hy, "numpy": np, "mpmath": mpmath, "h5py": h5py}
+    found = {name: str(module.__version__) for name, module in parts.items()}
+    return {"python": platform.python_version(), "rigidsim": _own_version(), **found}
+
+
+@cache
+def _own_version() -> str:
+    try:
+        return importlib.metadata.version("rigidsim")
+    except importlib.metadata.PackageNotFoundError:  # run from a source tree
+        return "unknown"
 
 
 def code_target(integrator: Any) -> dict[str, str]:

@@ -1,0 +1,83 @@
+"""What is compiled is compiled once, and serves only what asks for the very same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+import pytest
+from support import same_bits
+
+import rigidsim
+from rigidsim.solve.compiled import Kept, compiled_engine, compiled_function
+
+x, v = hy.make_vars("x", "v")
+PENDULUM = [(x, v), (v, -hy.sin(x))]
+
+
+@pytest.mark.parametrize("scalar", [np.float32, float, np.longdouble, hy.real128])
+def test_an_engine_of_ones_own_is_as_if_newly_compiled(scalar: Any) -> None:
+    initial = np.array([scalar(1), scalar(0)])
+    options = {"fp_type": scalar, "time": scalar(2), "tol": scalar(1) / 2**20}
+    first = compiled_engine(PENDULUM, initial, **options)
+    first.propagate_until(scalar(9))
+    second, fresh = (
+        compiled_engine(PENDULUM, initial, **options),
+        hy.taylor_adaptive(PENDULUM, initial, **options),
+    )
+    assert second.time == fresh.time == scalar(2)
+    for engine in (second, fresh):
+        engine.propagate_until(scalar(9))
+    assert (second.state == fresh.state).all()
+    assert (first.state == fresh.state).all()
+    first.state[:] = 0
+    assert (second.state == fresh.state).all()
+
+
+def test_functions_are_told_apart_by_the_sign_of_a_zero() -> None:
+    """Expressions that differ in nothing else count as equal."""
+    zeros = [hy.expression(0.0), hy.expression(-0.0)]
+    assert zeros[0] == zeros[1]
+    signs = [np.signbit(compiled_function([zero], [x])(np.array([1.0]))[0]) for zero in zeros]
+    assert signs == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("expressions", "options"),
+    [([x * v], {}), ([x + v], {"compact_mode": True}), ([x + v], {"fp_type": np.longdouble})],
+)
+def test_other_expressions_and_options_give_other_functions(
+    expressions: list[hy.expression], options: dict[str, Any]
+) -> None:
+    assert compiled_function([x + v], [x, v]) is compiled_function([x + v], [x, v])
+    assert compiled_function(expressions, [x, v], **options) is not compiled_function([x + v], [x, v])
+    assert compiled_function([x + v], [v, x]) is not compiled_function([x + v], [x, v])
+
+
+def test_only_the_latest_are_kept() -> None:
+    made: list[int] = []
+
+    def make(number: int) -> int:
+        made.append(number)
+        return number
+
+    kept: Kept[int] = Kept(2)
+    for number in (1, 2, 1, 3, 1, 2):
+        assert kept.get(number, lambda n=number: make(n)) == number
+    assert made == [1, 2, 3, 2]
+
+
+def test_a_second_run_compiles_nothing_and_is_the_same(
+    monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
+) -> None:
+    experiment = rigidsim.parse(free_body() + "estimate = false\n")
+    first = rigidsim.run(experiment, out=None)
+
+    def compiled(*_: Any, **__: Any) -> None:
+        raise AssertionError("compiled again")
+
+    monkeypatch.setattr(hy, "taylor_adaptive", compiled)
+    monkeypatch.setattr(hy, "cfunc", compiled)
+    same_bits(first, rigidsim.run(experiment, out=None))
