@@ -23,6 +23,7 @@ from rigidsim.scene.toml_text import long_integers, parse_toml
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""
+NEW = "the command rigidsim new lists commented ones to start from"
 _LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
 _EARLIER_MARK = "#:set "
 
@@ -128,6 +129,8 @@ def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Ex
     if problems:
         raise ConfigError(problems, source)
     problems = messages.later_features(table)
+    if not table:
+        problems.append(Problem("config", f"it is empty; {NEW}"))
     model = config_model()
     try:
         config = model.model_validate(table)
@@ -148,6 +151,9 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
         ConfigError: no such file, not text, too large, or a bad config.
     """
     path = Path(path)
+    if path.is_dir() and (path / "config.toml").is_file():
+        what = f"is a run folder; its config is {path / 'config.toml'}"
+        raise ConfigError(Problem("file", what), str(path))
     try:
         size = path.stat().st_size
         if size > _LARGEST_FILE:
@@ -156,7 +162,9 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
             )
         text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise ConfigError(Problem("file", f"can't be read: {error.strerror or error}"), str(path)) from None
+        hint = f"; {NEW}" if isinstance(error, FileNotFoundError) else ""
+        what = f"can't be read: {error.strerror or error}{hint}"
+        raise ConfigError(Problem("file", what), str(path)) from None
     except UnicodeDecodeError as error:
         raise ConfigError(
             Problem("file", f"not UTF-8 text (byte {error.start}); save it as UTF-8"), str(path)

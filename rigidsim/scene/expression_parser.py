@@ -56,7 +56,10 @@ _USAGE = {"atan2": "y, x", "min": "a, b", "max": "a, b", "pulse": "x, begin, end
 _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4, "**": 4}
 _SIGN_BINDS = 3
 _OPERATORS = {"+": "sum", "-": "sum", "*": "product", "/": "quotient"}
-_COMPARISON = "an expression is one value, without comparisons; an event takes the difference of both sides"
+_COMPARISON = (
+    "an expression is one value, without comparisons; an event takes the difference of both sides, and "
+    "step(t - 10), pulse(t, 10, 12), sign, min and max switch"
+)
 _HINTS = {
     "=": "an expression is one value, without assignments; write only what stands right of the =",
     ".": "a point is part of a number only; names have no attributes",

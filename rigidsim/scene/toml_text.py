@@ -45,8 +45,8 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     except RecursionError:
         raise ConfigError(Problem("TOML", "can't be read: nested too deeply"), source) from None
     except ValueError as error:
-        text = re.sub(r"\(('[^()]*'),?\)", _dotted, str(error))
-        raise ConfigError(Problem("TOML", f"can't be read: {text}"), source) from None
+        why = re.sub(r"\(('[^()]*'),?\)", _dotted, str(error))
+        raise ConfigError(Problem("TOML", f"can't be read: {why}{_remedy(text, why)}"), source) from None
 
 
 def long_integers(table: dict[str, Any]) -> list[Problem]:
@@ -64,6 +64,24 @@ def long_integers(table: dict[str, Any]) -> list[Problem]:
             what = f"given {messages.shown(node)}; whole numbers of at most {most} bits are allowed"
             problems.append(Problem(messages.key_path(path), what))
     return problems
+
+
+_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
+_ASSIGNMENT = re.compile(r"\s*[\w.\"'-]+\s*=\s*(?P<value>[^\s#\"'\[{][^#\"'\[{]*?)\s*(?:#.*)?")
+_LONGEST_SHOWN = 60
+
+
+def _remedy(text: str, why: str) -> str:
+    """The line at fault, and what to do where a text or a unit stands without its quotes."""
+    place = _PLACE.search(why)
+    lines = text.split("\n")
+    if place is None or not 0 < int(place[1]) <= len(lines):
+        return ""
+    line = lines[int(place[1]) - 1].strip()
+    match = _ASSIGNMENT.fullmatch(line) if len(line) <= _LONGEST_SHOWN else None
+    if match is None:
+        return f": {line}" if 0 < len(line) <= _LONGEST_SHOWN else ""
+    return f'; texts, and numbers with units, stand in quotes: "{match["value"]}"'
 
 
 def _dotted(key: re.Match[str]) -> str:

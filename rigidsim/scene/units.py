@@ -12,6 +12,8 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any, TypeAlias
 
+from rigidsim.scene.validation_messages import nearest
+
 _DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-
@@ -69,6 +71,7 @@ _LARGEST_EXPONENT = 12
 _TOWER = re.compile(
     r"(?<!\w)\d[\d.]*(?:[eE][+-]?\d+)?[\s)]*(?:\^|\*\*)|[\u00b2\u00b3\u00b9\u2070-\u2079]{2,}"
 )
+_HERTZ = re.compile(r"Hz|hertz")
 _NUMBER = re.compile(r"(?<![\w.])\.?\d")
 
 
@@ -102,7 +105,8 @@ def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
             raise UnitError(f'"{text}" is not a unit')
         quantity = _registry().Quantity(Fraction(1), unit).to_root_units()
     except pint.UndefinedUnitError as error:
-        raise UnitError(f'unknown unit "{error.args[0]}"; {known_units()}') from None
+        near = nearest(str(error.args[0]).lower(), _names())
+        raise UnitError(f'unknown unit "{error.args[0]}"{near}; {known_units()}') from None
     except Exception:  # pint and its tokenizer raise many kinds on malformed text
         raise UnitError(f'"{text}" is not a unit') from None
     powers = {str(name): Fraction(power) for name, power in quantity._units.items()}
@@ -164,6 +168,12 @@ def unit_text(dimension: Powers) -> str:
     return f"{over or '1'}/{under if ' ' not in under else f'({under})'}"
 
 
+def _names() -> list[str]:
+    """All names of units, long and short."""
+    found = [part.strip() for line in _DEFINITIONS for part in line.split("=")]
+    return [name for name in found if re.fullmatch(r"[A-Za-z_]{2,}", name) and name != "pi"]
+
+
 def known_units() -> str:
     """A line that lists the units, for error messages."""
     names = []
@@ -182,6 +192,8 @@ def conversion(text: str, expected: str) -> tuple[Fraction, int]:
         UnitError: unknown unit, or another dimension than ``expected``.
     """
     factor, pi_power, dimensions = _to_si(text)
+    if expected == "rad/s" and _HERTZ.search(text):
+        raise UnitError(f'"{text}" may count turns or radians; write "turn/s" (or "rpm", "deg/s") or "rad/s"')
     wanted_factor, _, wanted = _to_si(expected) if expected != "1" else (Fraction(1), 0, {})
     if dimensions != wanted and expected == "1":
         raise UnitError(f'"{text}" is a unit, where only a number without one is allowed')

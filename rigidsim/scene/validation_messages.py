@@ -29,6 +29,20 @@ _TABLES = (
     "sweep",
 )
 _ARRAYS_OF_TABLES = ("loads", "events")
+_MEANT = {
+    "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
+    "stick": "rod", "pipe": "tube", "rectangle": "plate", "square": "plate", "donut": "torus",
+    "gravity": "uniform_gravity", "weight": "uniform_gravity", "friction": "viscous_torque torque",
+    "damping": "viscous_torque", "drag": "viscous_torque", "thruster": "torque force", "motor": "torque",
+    "spring": "torque force", "magnet": "magnetic_dipole", "tide": "gravity_gradient",
+    "planet": "gravity_gradient central_gravity", "sun": "gravity_gradient", "moon": "gravity_gradient",
+    "spin": "angular_velocity", "omega": "angular_velocity", "w": "angular_velocity",
+    "rates": "angular_velocity", "attitude": "quaternion euler_angles", "inertia": "inertia_tensor",
+    "moments": "principal_moments", "orientation": "quaternion euler_angles", "duration": "end",
+    "stop": "end", "dt": "every", "step": "every", "dimensions": "size", "side": "size",
+    "float": "single", "float32": "single", "float64": "double", "quad": "quadruple",
+}  # fmt: skip
+"""What people call things that have another name here."""
 _MOST_PROBLEMS = 200  # worth telling; a file of a million wrong keys has said enough by then
 _LONGEST_NAME = 60
 LONGEST_INTEGER = 10_000  # bits; Python refuses to write out integers not much longer
@@ -57,8 +71,11 @@ def nearest(given: str, allowed: Iterable[str]) -> str:
     """``; did you mean "x"?`` when something close is allowed, else an empty text."""
     if len(given) > _LONGEST_NAME:  # comparing takes time, and nothing allowed is near
         return ""
-    close = difflib.get_close_matches(given, list(allowed), n=1, cutoff=0.6)
-    return f'; did you mean "{close[0]}"?' if close else ""
+    names = list(allowed)
+    meant = [name for name in _MEANT.get(given.lower(), "").split() if name in names]
+    close = meant or difflib.get_close_matches(given, names, n=1, cutoff=0.6)
+    quoted = " or ".join(f'"{name}"' for name in close)
+    return f"; did you mean {quoted}?" if close else ""
 
 
 def key_path(location: Iterable[str | int]) -> str:
@@ -140,13 +157,14 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         allowed = context.get("expected", context.get("expected_tags", ""))
         allowed = allowed.replace("'", "").replace(" or ", ", ")
         names = [part.strip() for part in allowed.split(",")]
-        return f"given {shown(given)}{nearest(shown(given), names)}; allowed: {', '.join(names)}"
+        near = nearest(given if isinstance(given, str) else shown(given), names)
+        return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
     if kind == "too_short":  # arrays of fixed length report theirs themselves
         return "given an empty array; at least one entry is needed"
     if kind == "kind_of_value":
         return f"given {shown(given)}; {error['msg']}"
     if kind in ("list_type", "model_type", "model_attributes_type"):
-        wanted = "an array" if kind == "list_type" else "a table"
+        wanted = f"an array{_of_how_many(table, location)}" if kind == "list_type" else "a table"
         return f"given {shown(given)}; {wanted} is allowed"
     if kind in ("int_type", "int_from_float"):
         return f"given {shown(given)}; a whole number, without point or exponent, is allowed"
@@ -157,6 +175,20 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
     if kind == "greater_than_equal":
         return f"given {shown(given)}; at least {context['ge']} is allowed"
     return str(error["msg"])
+
+
+def _of_how_many(table: type[BaseModel] | None, location: tuple[str | int, ...]) -> str:
+    """`` of 3`` for an array of fixed length."""
+    names = [key for key in location if isinstance(key, str)]
+    field = table.model_fields.get(names[-1]) if table and names else None
+    waiting = [] if field is None or isinstance(location[-1], int) else [field.annotation, *field.metadata]
+    while waiting:
+        part = waiting.pop(0)
+        count = getattr(part, "max_length", None)
+        if count is not None:
+            return f" of {count}"
+        waiting += [*get_args(part), *getattr(part, "metadata", [])]
+    return ""
 
 
 def config_error(

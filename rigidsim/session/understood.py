@@ -73,6 +73,15 @@ def cautions_of(scene: Scene) -> list[Caution]:
                 "reference or center_of_mass for a top, or [initial] position for free flight",
             )
         )
+    preset = scene.config.body.preset
+    if preset not in (None, "earth") and any(getattr(load, "ephemeris", None) for load in scene.config.loads):
+        found.append(
+            Caution(
+                WarningCode.EPHEMERIS_OF_EARTH,
+                "the ephemerides are those of Sun and Moon as seen from the Earth, while the body is "
+                f"{preset}; give gravity_gradient the orbit of its source instead",
+            )
+        )
     return found
 
 

@@ -265,5 +265,7 @@ def find_run(path: str | Path) -> RunFolder:
     except OSError as error:  # a folder that may not be entered
         raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
     if not there:
-        raise RunFolderError(f"{path}: no run here; give a run folder (runs/NAME) or its dataset.h5")
+        usual = Path("runs") / given
+        hint = f"; did you mean {usual}?" if usual.is_dir() and not given.is_absolute() else ""
+        raise RunFolderError(f"{path}: no run here; give a run folder (runs/NAME) or its dataset.h5{hint}")
     return run

@@ -44,6 +44,7 @@ class WarningCode(Enum):
     BEGUN_ANEW = "begun_anew"
     NOT_CERTIFIED = "not_certified"
     ANGLE_WITHOUT_UNIT = "angle_without_unit"
+    EPHEMERIS_OF_EARTH = "ephemeris_of_earth"
 
 
 @dataclass(frozen=True)

@@ -122,6 +122,23 @@ def test_check_knows_what_will_have_no_effect(config: Config, rigidsim_command: 
     assert found["warning_codes"] == ["no_effect"]
 
 
+def test_a_new_user_is_shown_the_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("empty.toml").touch()
+    folder = Path("runs/coin")
+    folder.mkdir(parents=True)
+    (folder / "config.toml").touch()
+    ways = "the command rigidsim new lists commented ones to start from"
+    assert f"it is empty; {ways}" in rigidsim_command("check", "empty.toml").stderr
+    assert ways in rigidsim_command("run", "missing.toml").stderr
+    found = json.loads(rigidsim_command("check", "missing.toml", "--json").stdout)
+    assert found["problems"][0]["what"].endswith(ways)
+    assert "its config is runs/coin/config.toml" in rigidsim_command("check", "runs/coin").stderr
+    assert "did you mean runs/coin?" in rigidsim_command("info", "coin").stderr
+
+
 # help and completion
 
 

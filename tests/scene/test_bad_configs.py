@@ -272,7 +272,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "rates a word": (
         {"initial": 'angular_velocity = "fast"'},
         "[initial] angular_velocity",
-        ['given "fast"; an array is allowed'],
+        ['given "fast"; an array of 3 is allowed'],
     ),
     "epoch without a scale": (
         {"time": 'end = 1\nepoch = "2029-04-13T21:46:00"'},
@@ -663,6 +663,43 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[body] parts[0].euler_sequence",
         ["given without euler_angles"],
     ),
+    "shape by another name": (
+        {"body": BOX.replace("cuboid", "box")},
+        "[body] shape",
+        ['did you mean "cuboid"?'],
+    ),
+    "load by another name": (
+        {"loads": 'kind = "friction"'},
+        "[[loads]] number 1 kind",
+        ['given "friction"; did you mean "viscous_torque" or "torque"?'],
+    ),
+    "load by half its name": (
+        {"loads": 'kind = "gravity"'},
+        "[[loads]] number 1 kind",
+        ['did you mean "uniform_gravity"?'],
+    ),
+    "key by another name": (
+        {"initial": "omega = [1, 0, 0]"},
+        "[initial] omega",
+        ['did you mean "angular_velocity"?'],
+    ),
+    "hertz of what": (
+        {"initial": 'angular_velocity = ["2 Hz", 0, 0]'},
+        "[initial] angular_velocity[0]",
+        ['"Hz" may count turns or radians; write "turn/s"'],
+    ),
+    "unit in other letters": (
+        {"initial": 'angular_velocity = ["2 Radian/s", 0, 0]'},
+        "[initial] angular_velocity[0]",
+        ['unknown unit "Radian"; did you mean "radian"?'],
+    ),
+    "one number for three": (
+        {"initial": "angular_velocity = 2"},
+        "[initial] angular_velocity",
+        ["given 2; an array of 3 is allowed"],
+    ),
+    "text without quotes": ({"top": "name = box"}, "TOML", ["at line 1", 'stand in quotes: "box"']),
+    "unit without quotes": ({"time": "end = 10 s"}, "TOML", ['numbers with units, stand in quotes: "10 s"']),
     "mass of a preset": (
         {"body": 'preset = "earth"\nmass = 1'},
         "[body] mass",

@@ -59,6 +59,20 @@ def test_degrees_without_their_unit() -> None:
     ]
 
 
+def test_the_suns_place_is_seen_from_the_earth() -> None:
+    text = """
+name = "p"
+body.preset = "{}"
+initial.angular_velocity = [0, 0, "1 turn/day"]
+loads = [{{kind = "gravity_gradient", gravitational_parameter = 1.3e20, ephemeris = "sun"}}]
+time.end = "1 day"
+"""
+    codes = {
+        p: [c.code.value for c in cautions_of(build_scene(parse(text.format(p))))] for p in ("mars", "earth")
+    }
+    assert codes == {"mars": ["ephemeris_of_earth"], "earth": []}
+
+
 def test_it_has_a_code() -> None:
     scene = build_scene(parse(CONFIG.format(angles="[0, 7, 0]", inclination="0", anomaly="0")))
     (caution,) = cautions_of(scene)
