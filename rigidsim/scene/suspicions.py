@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from rigidsim.errors import Problem
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.schema import Config
+from rigidsim.scene.units import time_unit
 from rigidsim.scene.validation_messages import key_path
 
 _TURN = 2 * math.pi
@@ -40,6 +41,26 @@ def suspicious_angles(config: Config) -> list[Problem]:
                 )
             )
     return found
+
+
+def suspicious_end(config: Config) -> list[Problem]:
+    """A bare number, in seconds, as the end of a run whose times are to be shown in a unit that it is less
+    than: meant in that unit?
+    """
+    end, unit = config.time.end, config.time.unit
+    if end is None or unit is None or end.assumed != "s" or end.pi_power:
+        return []
+    size = time_unit(unit)
+    if size < 60 or not 0 < end.rational < size:
+        return []
+    given, converted = f"{float(end):.6g}", f"{float(end.rational / size):.3g} {unit}"
+    return [
+        Problem(
+            "[time] end",
+            f"given {given} without a unit, which is taken as seconds: {converted}; write "
+            f'"{given} {unit}" if that is meant, "{given} s" if not',
+        )
+    ]
 
 
 def _numbers(path: Path, value: object) -> Iterator[tuple[Path, list[ExactNumber]]]:

@@ -20,6 +20,7 @@ from rigidsim.store.variables import Variable
 
 DAY = 86400
 _YEAR = 365.25
+_J2000 = float(J2000.julian_date())
 _BLOCK = 1 << 16
 _SPARE = 17  # bits that products with an index within a block take
 # What xarray turns into datetime64[ns] without the package cftime.
@@ -27,6 +28,7 @@ _FIRST_DATE, _LAST_DATE = parse_epoch("1678-01-01 TT").day, parse_epoch("2262-01
 
 Columns = dict[str, list[np.ndarray]]
 """Parts of each variable, (rows,) float64."""
+Parts = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -113,12 +115,30 @@ class Dates:
         """Julian dates in two doubles and times (s) of the samples of one block that are asked for."""
         origin = block * _BLOCK
         index = np.arange(max(first - origin, 0), min(stop - origin, _BLOCK), dtype=np.float64)
-        begin = self.samples.begin + origin * self.samples.step
-        high, low = _line(self.epoch.julian_date() + begin / DAY, self.samples.step / DAY, index)
-        return high, low, np.add(*_line(begin, self.samples.step, index))
+        days, seconds = self._begins(block)
+        high, low = _line(days, self._steps[0], index)
+        return high, low, np.add(*_line(seconds, self._steps[1], index))
+
+    def _begins(self, block: int) -> tuple[Parts, Parts]:
+        """Julian date and time, s, of the first sample of a block."""
+        if block not in self._known:
+            begin = self.samples.begin + block * _BLOCK * self.samples.step
+            self._known.clear()  # blocks come one after the other
+            self._known[block] = _parts(self.epoch.julian_date() + begin / DAY), _parts(begin)
+        return self._known[block]
+
+    @cached_property
+    def _known(self) -> dict[int, tuple[Parts, Parts]]:
+        return {}
+
+    @cached_property
+    def _steps(self) -> tuple[Parts, Parts]:
+        """From one sample to the next, days and s; products of two parts with an index are exact."""
+        step = self.samples.step
+        return _parts(step / DAY, _SPARE), _parts(step, _SPARE)
 
     def _columns(self, high: np.ndarray, low: np.ndarray, seconds: np.ndarray) -> Columns:
-        year = 2000 + ((high - float(J2000.julian_date())) + low) / _YEAR
+        year = 2000 + ((high - _J2000) + low) / _YEAR
         found = {"year": [year], "julian_date": [high, low]}
         if self.has_dates:
             found["date"] = [self._date(seconds)]
@@ -137,16 +157,19 @@ class Dates:
         dates = seconds + self._reference[1]
         if self.epoch.scale != "UTC":
             return dates
-        days, offsets, _ = leap_seconds()
-        for k in range(1, len(days)):
-            begins = Epoch("UTC", days[k], 0)
-            if begins.day <= self.epoch.day:
-                continue
-            at = float((begins.julian_date() - self.epoch.julian_date()) * DAY)
-            more = offsets[k] - offsets[k - 1]
+        for at, more in self._leaps:
             dates[seconds >= at] -= more
             dates[(seconds >= at - more) & (seconds < at)] = np.nan
         return dates
+
+    @cached_property
+    def _leaps(self) -> list[tuple[float, int]]:
+        """Times (s) after time 0 from which UTC has counted another second, or one less, and which."""
+        days, offsets, _ = leap_seconds()
+        later = [k for k in range(1, len(days)) if days[k] > self.epoch.day]
+        zero = self.epoch.julian_date()
+        begins = [float((Epoch("UTC", days[k], 0).julian_date() - zero) * DAY) for k in later]
+        return [(at, offsets[k] - offsets[k - 1]) for at, k in zip(begins, later, strict=True)]
 
 
 def _last_day_of_utc() -> str:
@@ -155,27 +178,26 @@ def _last_day_of_utc() -> str:
     return f"{date.fromordinal(leap_seconds()[2] - 1)} UTC"
 
 
-def _line(base: Fraction, step: Fraction, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _line(base: Parts, step: Parts, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """base + index * step in two doubles, to 2^-104 of the larger part; the index has at most 16 bits."""
-    a0, a1, a2 = _parts(base, 0, 0, 0)
-    b0, b1, b2 = _parts(step, _SPARE, _SPARE, 0)  # products of the first two with an index are exact
+    (a0, a1, a2), (b0, b1, b2) = base, step
     high, rest = _sum(a0, index * b0)
     middle, rest_of_middle = _sum(a1, index * b1)
     low, rest_of_low = _sum(rest, middle)
     return _sum(high, low + ((rest_of_middle + rest_of_low) + (a2 + index * b2)))
 
 
-def _parts(value: Fraction, *spare: int) -> list[float]:
-    """Doubles, each with so many bits to spare, whose sum is close to a value."""
+def _parts(value: Fraction, spare: int = 0) -> Parts:
+    """Three doubles whose sum is close to a value, the first two with so many bits to spare."""
     parts = []
-    for bits in spare:
+    for bits in (spare, spare, 0):
         part = float(value)
         if bits and part:
             unit = Fraction(2) ** (int(np.frexp(part)[1]) - 53 + bits)
             part = float(round(value / unit) * unit)
         parts.append(part)
         value -= Fraction(part)
-    return parts
+    return parts[0], parts[1], parts[2]
 
 
 def _sum(a: float | np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ import pytest
 
 from rigidsim.scene.config import parse
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.suspicions import suspicious_angles
+from rigidsim.scene.suspicions import suspicious_angles, suspicious_end
 from rigidsim.session.understood import cautions_of
 
 CONFIG = """
@@ -77,3 +77,25 @@ def test_it_has_a_code() -> None:
     scene = build_scene(parse(CONFIG.format(angles="[0, 7, 0]", inclination="0", anomaly="0")))
     (caution,) = cautions_of(scene)
     assert caution.code.value == "angle_without_unit"
+
+
+@pytest.mark.parametrize(
+    ("time", "said"),
+    [
+        ('end = 30\nunit = "day"', 'write "30 day" if that is meant, "30 s" if not'),
+        ('end = 30\nunit = "day"', "taken as seconds: 0.000347 day"),
+        ('end = 31557600\nunit = "yr"', ""),  # a year
+        ('end = "30 s"\nunit = "day"', ""),  # said, so meant
+        ('end = 30\nunit = "ms"', ""),
+        ("end = 30", ""),
+    ],
+)
+def test_an_end_meant_in_the_unit_of_times_is_pointed_out(time: str, said: str) -> None:
+    text = CONFIG.format(angles="[0, 1, 0]", inclination="1", anomaly="0").replace("end = 1", time)
+    experiment = parse(text)
+    problems = [str(problem) for problem in suspicious_end(experiment.config)]
+    assert len(problems) == bool(said)
+    assert all(
+        problem.startswith("[time] end: given 30 without a unit") and said in problem for problem in problems
+    )
+    assert [caution.text for caution in cautions_of(build_scene(experiment))] == problems

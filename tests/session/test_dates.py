@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import h5py
 import mpmath
 import numpy as np
 import pytest
@@ -16,12 +17,15 @@ from hypothesis import strategies as st
 from support import EAGER, config, run_text
 
 import rigidsim
+from rigidsim.errors import RunFolderError
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.session.dates import Dates
+from rigidsim.store.seal import seal
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
 J2000 = Fraction(2451545)
+FLIP = '[[events]]\nname = "flip"\nexpression = "t - 1"\n'
 
 
 def grid(begin: Fraction, step: Fraction, count: int) -> SampleTimes:
@@ -126,7 +130,7 @@ def test_events_and_lists_have_the_dates_of_their_times() -> None:
 def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> None:
     text = config(
         time='end = 60\nsamples = 61\nepoch = "2029-04-13T21:46:00 TDB"\nunit = "min"',
-        more='[[events]]\nname = "flip"\nexpression = "t - 7.5"',
+        more=FLIP.replace("t - 1", "t - 7.5"),
     )
     run = run_text(text, tmp_path / "whole")
     with warnings.catch_warnings():
@@ -161,6 +165,36 @@ def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> Non
     with cut.opened(indexed=False) as bare:
         assert not bare.xindexes
     assert rigidsim.verify(run.folder.path).identical
+
+
+def as_of_schema_3(folder: Path) -> None:
+    """What an earlier version would have written of the same run."""
+    dataset, checkpoint = folder / "dataset.h5", folder / "checkpoint.h5"
+    with h5py.File(dataset, "r+") as file:
+        file.attrs["schema_version"] = 3
+        for name in [n for n in file if "time_scale" in file[n].attrs]:
+            base = name.removesuffix("_lo")
+            del file[name]
+            assert base.endswith(("year", "julian_date", "date"))
+        for name in [n for n in file if n.endswith("julian_date_lo")]:
+            del file[name]
+    previous, _ = seal(dataset)
+    with h5py.File(checkpoint, "r+") as file:
+        file.attrs["previous_seal"], file.attrs["schema_version"] = previous, 3
+    seal(checkpoint)
+    (folder / "summary.json").unlink()
+
+
+@pytest.mark.compact
+def test_earlier_runs_with_an_epoch_lack_dates_and_nothing_else(tmp_path: Path) -> None:
+    """They verify; they can't be resumed, since half of the result would have dates."""
+    text = config(time='end = 2\nsamples = 9\nepoch = "J2000"', more=FLIP)
+    run = run_text(text, tmp_path)
+    as_of_schema_3(run.folder.path)
+    verdict = rigidsim.verify(run.folder.dataset)
+    assert (verdict.differing, verdict.samples) == ([], 9)
+    with pytest.raises(RunFolderError, match=r"only runs of versions 4 to"):
+        rigidsim.resume(run.folder.path, until="3")
 
 
 @pytest.mark.compact

@@ -30,7 +30,7 @@ def run(
     Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
     """
     from rigidsim.scene.config import has_earlier_settings
-    from rigidsim.scene.suspicions import suspicious_angles
+    from rigidsim.scene.suspicions import suspicious_angles, suspicious_end
     from rigidsim.session import progress
     from rigidsim.workflows.read import load
     from rigidsim.workflows.run import run as run_experiment
@@ -49,7 +49,7 @@ def run(
                 "kept there what --set had replaced); write the values where their keys stand",
                 file=sys.stderr,
             )
-        for problem in suspicious_angles(experiment.config):
+        for problem in (*suspicious_angles(experiment.config), *suspicious_end(experiment.config)):
             print(f"rigidsim: warning: {experiment.source}: {problem}", file=sys.stderr)
     worst = 0
     for experiment in experiments:
