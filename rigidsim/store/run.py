@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import sys
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,6 +21,7 @@ from rigidsim.store.variables import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 
 class Run:
@@ -50,6 +52,22 @@ class Run:
     @abstractmethod
     def dataset(self) -> xarray.Dataset:
         """Its labelled numbers."""
+
+    def plot(self, what: str = "overview") -> Figure:
+        """A figure of the run, by default the page that suits the scene; a notebook shows it.
+
+        Args:
+            what: a name of ``rigidsim.look.figures.FIGURES``.
+
+        Raises:
+            ValueError: no such figure, none of this run, or a run without samples.
+        """
+        from rigidsim.look.figures import figure
+
+        if "ipykernel" in sys.modules:
+            import matplotlib.pyplot  # noqa: F401  (it teaches notebooks to show figures)
+        with self.dataset as dataset:
+            return figure(dataset, what)
 
     @abstractmethod
     def view(self, *, web: bool = False) -> int:

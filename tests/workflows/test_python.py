@@ -159,6 +159,13 @@ def test_progress_is_shown_where_asked_for(capsys: pytest.CaptureFixture[str]) -
     assert "top: integrating in memory" in capsys.readouterr().err
 
 
+def test_a_run_draws_its_figures() -> None:
+    run = rigidsim.run(TOP, out=None)
+    assert [type(figure).__name__ for figure in (run.plot(), run.plot("polhode"))] == ["Figure", "Figure"]
+    with pytest.raises(ValueError, match="did you mean 'polhode'"):
+        run.plot("polhod")
+
+
 def test_a_run_in_memory_can_be_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Path] = []
 
