@@ -72,7 +72,7 @@ def time_text(time: Span) -> str:
         f"{number_text(seconds / unit.seconds, _DIGITS)}{'' if seconds == 0 else ' ' + unit.symbol}"
         for seconds in (time.start_s, time.end_s)
     ]
-    every = ", at listed times" if time.every_s is None else f", one every {span_text(time.every_s, _FEWER)}"
+    every = ", at listed times" if time.every_s is None else f", one every {span_text(time.every_s, _DIGITS)}"
     text = f"{ends[0]} to {ends[1]}, {time.samples:,} samples{every if time.samples > 1 else ''}"
     epoch = epoch_of({"epoch": time.epoch})
     if epoch is None:

@@ -16,8 +16,9 @@ def check(
     overrides: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Validate configs, and show what was understood of them; nothing is run or written. Exit code 2 where
-    one can't be run.
+    """Validate configs, and show what was understood of them; nothing is run.
+
+    The exit code is 2 where one of them can't be run.
 
     Example: rigidsim check configs/heavy_top_nutating.toml
     """

@@ -21,7 +21,9 @@ def new(
         typer.Argument(metavar="[NAME]", help="Of the experiment and its file NAME.toml; default SCENE."),
     ] = None,
 ) -> None:
-    """Write a commented config to start from; alone, list the scenes there are. Never replaces a file.
+    """Write a commented config to start from; alone, list the scenes there are.
+
+    An existing file is never replaced.
 
     Example: rigidsim new coin my_coin
     """
