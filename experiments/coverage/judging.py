@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import mpmath
 import numpy as np
@@ -16,7 +15,7 @@ from experiments.coverage.families import SAMPLES, CoverageScene
 from rigidsim.errors import ConfigError
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.statistics import SampleStatistics
-from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
@@ -112,14 +111,16 @@ def judge(scene: CoverageScene) -> Judged:
     try:
         prepared = prepare(rigidsim.parse(scene.text, overrides=asked))
         prepared = replace(prepared, precision=replace(prepared.precision, compact=True))
-        seen, progress, spent, engine = _gone_through(prepared)
+        seen, progress, spent, parts = _gone_through(prepared)
     except ConfigError:
         return replace(begin, cpu_seconds=time.process_time() - started)
     begin = replace(begin, ended=progress.status.value, steps=progress.steps, run_seconds=spent)
     if progress.status is not Status.FINISHED:
         return replace(begin, cpu_seconds=time.process_time() - started)
     before = time.process_time()
-    found = Diagnostics(prepared, progress, seen.statistics).estimated(seen.trail, engine)
+    found = Diagnostics(prepared, progress, seen.statistics).estimated(
+        seen.trail, parts.stepper, parts.corrected.waypoints
+    )
     estimated = time.process_time() - before
     assert found.estimate is not None
     codes = [c.code for c in found.cautions()]
@@ -154,14 +155,14 @@ def _setting(scene: CoverageScene) -> str:
 
 def _gone_through(
     prepared: InitialValueProblem, most: int = MOST_STEPS
-) -> tuple[_Kept, Progress, float, Any]:
+) -> tuple[_Kept, Progress, float, Assembly]:
     parts = assemble(prepared)
     seen = _Kept(prepared, parts.evaluator)
     check: Callable[[Progress], Status | None] = lambda p: Status.MAX_STEPS if p.steps > most else None  # noqa: E731
     loop = sampler(prepared, parts, seen, check)
     before = time.process_time()
     progress = loop.run()
-    return seen, progress, time.process_time() - before, parts.stepper.integrator
+    return seen, progress, time.process_time() - before, parts
 
 
 def _truth(

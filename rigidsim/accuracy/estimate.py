@@ -7,77 +7,25 @@ allows. Where the motion has a closed form, some samples are simply held against
 
 from __future__ import annotations
 
-import copy
 import math
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
 from rigidsim.accuracy.exact_error import ExactError, exact_error
+from rigidsim.accuracy.following import Course, Followed, follow, leading, loose
 from rigidsim.accuracy.growth import exponential_growth, power_of_time
-from rigidsim.model.system import System
-from rigidsim.solve.building import interruptible
-from rigidsim.solve.engine import Integrator
-from rigidsim.solve.lanes import TIGHT, TOLERANCE, BatchLanes, Lanes, OwnLanes, SeriesErrors, SwitchingLanes
-from rigidsim.solve.neighbours import Neighbours, Pushes, Spread
-from rigidsim.solve.precision import precision_of
-from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.trail import Trail
+from rigidsim.accuracy.margins import MARGINS, Margins
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.trail import Trail, Waypoints
 
 _LAST_BITS = 0.5  # of a recorded value, rounded
 _LABEL = 0.25  # of a sample's time, rounded: what is recorded belongs to another moment
 _AS_LARGE = 4.0  # as the whole way: of a place that can't be told
-
-
-@dataclass(frozen=True)
-class Margins:
-    """What the estimate assumes, and how far it looks.
-
-    With the defaults the errors of the campaign's scenes are covered as ``experiments/README.md`` shows
-    (``experiments/error_coverage.py``).
-
-    Attributes:
-        safety: over the root mean square of three neighbours; ``path``: of it, for position and velocity.
-        drifted: growth of a step's error from which a loosely followed motion is another one; ``gone``: over
-            what leaves no digit, from which that doesn't matter; ``tight_steps``: of runs that are followed
-            tightly at most.
-        compared: over the largest difference from a closed form at some samples.
-        angles, angle_series, momentum_series: errors of a step in Euler angles over those in quaternions: of
-            rounding, and of series that a tolerance cuts off; of the latter with canonical momenta.
-        cut_off: of a tolerance, what a step is wrong by in motions with switching surfaces.
-        own_steps: up to which the run's own integrator is good enough, and nothing is compiled.
-        all_steps: that are followed to the end whatever they cost.
-        part: of the steps of a longer run in double precision.
-        dearer: a step in other precisions than one in double precision, roughly.
-        stable: amplification up to which a motion is as stable as the law of rounding takes it to be.
-        power, most_power: of time that errors grow with, at least and at most, where no more was followed.
-        exponential: power of time past which growth is none.
-    """
-
-    safety: float = 3.0
-    drifted: float = 1e6
-    gone: float = 1e6
-    tight_steps: int = 50_000
-    path: float = 0.5
-    compared: float = 3.0
-    angles: float = 4.0
-    angle_series: float = 5.0
-    momentum_series: float = 20.0
-    cut_off: float = 0.1
-    own_steps: int = 3000
-    all_steps: int = 20_000
-    part: float = 0.1
-    dearer: tuple[tuple[str, float], ...] = (("single", 0.3), ("double", 1.0), ("extended", 10.0))
-    stable: float = 4.0
-    power: float = 1.5
-    most_power: float = 2.5
-    exponential: float = 5.0
-
-
-MARGINS = Margins()
 
 
 @dataclass(frozen=True)
@@ -93,7 +41,7 @@ class Estimate:
         growth_rate: 1/s, of exponential growth; 0 where it is none.
         predictable_seconds: after the start, from which digits are gone; None for motions whose errors don't
             grow exponentially.
-        seconds: of the run that neighbours followed.
+        seconds: of the run that neighbours followed from its start on; ``share``: the same as a part of it.
         how: in words.
     """
 
@@ -105,6 +53,7 @@ class Estimate:
     growth_rate: float = 0.0
     predictable_seconds: float | None = None
     seconds: float = 0.0
+    share: float = 1.0
     how: str = ""
 
     @property
@@ -119,8 +68,9 @@ def estimate_errors(
     reached: float,
     *,
     trail: Trail | None = None,
-    integrator: Integrator | None = None,
-    condition: float = 1.0,
+    waypoints: Waypoints | None = None,
+    stepper: Stepper | None = None,
+    nearest: float = 1.0,
     go_on: Callable[[], bool] = lambda: True,
     margins: Margins = MARGINS,
 ) -> Estimate | None:
@@ -130,8 +80,9 @@ def estimate_errors(
         steps: that it took.
         reached: the time that it got to, seconds.
         trail: some of the run's samples, to be held against a closed form.
-        integrator: of the run; a copy of it is used where that is good enough.
-        condition: what canonical momenta make of a rounding error.
+        waypoints: some of its step boundaries, where growth is looked at besides the beginning.
+        stepper: of the run; it is used where that is good enough, and left as it was.
+        nearest: singular factor of the run's chart where it was smallest.
         go_on: asked again and again; False ends it.
 
     Returns:
@@ -150,91 +101,12 @@ def estimate_errors(
             duration = reached - float(scene.start)
             law = round_off_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
             return _by_comparison(prepared, exact_error(prepared, form, trail), law, duration, margins)
-    level = float(prepared.precision.epsilon)
-    part = margins.part * dict(margins.dearer).get(prepared.precision.name, math.inf)
-    part = min(1.0, max(margins.all_steps / max(steps, 1), part))
-    lost = math.pi / level
-
-    def followed(part: float, tolerance: float) -> Spread:
-        neighbours = interruptible(
-            lambda: _neighbours(prepared, start, end, steps, part, tolerance, integrator, condition, margins)
-        )
-        spread = neighbours.follow(start + (end - start) * part if part < 1 else end, go_on, lost)
-        if part < 1 and spread.whole and _suspicious(spread, start, carried, margins):
-            interruptible(lambda: neighbours.prepare_for(steps * (1 - part)))
-            spread = neighbours.follow(end, go_on, lost)
-        return spread
-
-    spread = followed(part, TOLERANCE)
-    far = spread.whole and margins.own_steps < steps < margins.tight_steps and bool(spread.times)
-    far = far and margins.drifted < max(_leading(spread, carried)) < margins.gone * lost
-    if far and go_on() and _suspicious(spread, start, carried, margins):
-        spread = followed(1.0, TIGHT)
+    lost = math.pi / float(prepared.precision.epsilon)
+    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, lost)
+    found = follow(course, margins, go_on)
     if not go_on():
         return None
-    return _conclusion(prepared, spread, end, steps, level, carried, margins)
-
-
-def _neighbours(
-    prepared: InitialValueProblem,
-    start: float,
-    end: float,
-    steps: int,
-    part: float,
-    tolerance: float,
-    integrator: Integrator | None,
-    condition: float,
-    margins: Margins,
-) -> Neighbours:
-    precision, system = prepared.precision, prepared.system
-    series: SeriesErrors | None = None
-    stand_in = False
-    own = steps <= margins.own_steps and precision.name == "double" and not _loose(prepared)
-    own = own and system.partner is None and not system.crossings and not system.switches
-    if own and integrator is not None:
-        lanes: Lanes = OwnLanes(copy.deepcopy(integrator))
-    else:
-        charts = system.requirements.formulation in ("euler_angles", "canonical")
-        # in the run's own states, unless they have singularities that a loose tolerance would run into
-        system = double_twin(prepared) if charts else system.rounded(precision_of("double").number)
-        lanes = _lanes(system, start, end, steps, part, tolerance)
-        stand_in = charts and prepared.system.partner is None
-        if _loose(prepared) and not system.switches:
-            series = SeriesErrors(system, prepared.effective_tolerance)
-    rounded = np.array([precision.exact(precision.number(x)) != x for x in system.initial])
-    pushes = _pushes(prepared, condition if stand_in else None, margins)
-    epsilon = float(precision.epsilon)
-    return Neighbours(system, lanes, start, end, steps, pushes, epsilon, rounded, series)
-
-
-def _lanes(system: System, start: float, end: float, steps: int, part: float, tolerance: float) -> Lanes:
-    if system.switches:
-        return SwitchingLanes(system, start, end, steps)
-    return BatchLanes(system, steps * part, tolerance)
-
-
-def _loose(prepared: InitialValueProblem) -> bool:
-    """Whether the tolerance lets steps be wrong by more than rounding does."""
-    return prepared.effective_tolerance > 2 * float(prepared.precision.epsilon)
-
-
-def _pushes(prepared: InitialValueProblem, condition: float | None, margins: Margins) -> Pushes:
-    """Of a step.
-
-    Args:
-        condition: of canonical momenta whose place quaternions take.
-    """
-    plain, formulation = Pushes(), prepared.system.requirements.formulation
-    if prepared.system.switches and _loose(prepared):
-        plain = replace(
-            plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
-        )
-    if formulation not in ("euler_angles", "canonical"):
-        return plain
-    angles = replace(plain, own=plain.own * margins.angles, series=margins.angle_series)
-    if condition is None:
-        return angles
-    return replace(angles, shared=plain.own * condition, series=margins.momentum_series)
+    return _conclusion(course, found, margins)
 
 
 def _of_closed_form(prepared: InitialValueProblem, error: float, carried: bool) -> Estimate:
@@ -282,26 +154,10 @@ def _size(vector: object) -> float:
     return math.hypot(*(float(x) for x in vector)) if vector is not None else 0.0  # type: ignore[attr-defined]
 
 
-def _leading(spread: Spread, carried: bool) -> np.ndarray:
-    return np.array(spread.attitude if carried else spread.rates)
-
-
-def _suspicious(spread: Spread, start: float, carried: bool, margins: Margins) -> bool:
-    """Whether errors grow faster than those of a stable motion."""
-    return power_of_time(np.array(spread.times) - start, _leading(spread, carried)) > margins.most_power
-
-
-def _conclusion(
-    prepared: InitialValueProblem,
-    spread: Spread,
-    end: float,
-    steps: int,
-    level: float,
-    carried: bool,
-    margins: Margins,
-) -> Estimate:
-    system = prepared.system
-    start, exponent = float(prepared.clock.start), system.scaling.time
+def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimate:
+    prepared, spread, steps, end = course.prepared, followed.spread, course.steps, course.end
+    system, start, exponent = prepared.system, course.start, prepared.system.scaling.time
+    level, carried = float(prepared.precision.epsilon), course.carried
     duration = math.ldexp(end - start, exponent)
     flight = "x" in system.states
     if not spread.times:
@@ -310,40 +166,50 @@ def _conclusion(
             unknown if carried else None, unknown, None, None, how="the motion could not be followed"
         )
     times = np.array(spread.times) - start
-    errors = level * margins.safety * _leading(spread, carried)
+    errors = level * margins.safety * leading(spread, carried)
     power = min(max(power_of_time(times, errors), margins.power), margins.most_power)
     beyond = max((end - start) / times[-1], 1.0) ** power
 
     label = math.ldexp(_label(prepared, duration), -exponent)
     rate = math.ldexp(float(system.rate_bound), exponent)
 
-    def at_end(values: list[float], size: float, most: float, pace: float = 0.0) -> float:
-        found = float(max(values)) * level * margins.safety * beyond
+    def at_end(name: str, size: float, most: float, pace: float = 0.0) -> float:
+        further = beyond * followed.more.get(name, 1.0)
+        found = float(max(getattr(spread, name))) * level * margins.safety * further
         known = spread.whole and math.isfinite(found)
         return float(min(found + _LAST_BITS * level * size + label * pace, most)) if known else most
 
-    lead = at_end(spread.attitude if carried else spread.rates, 1.0, sys.float_info.max, rate)
+    lead = at_end("attitude" if carried else "rates", 1.0, sys.float_info.max, rate)
     law = round_off_law(level, steps, float(system.rate_bound), duration)
     amplification = lead / law if law > 0 else 1.0
     growth, horizon = exponential_growth(times, errors, exponent, margins.power, margins.exponential)
     scaling, size, speed = system.scaling, spread.extent, spread.fastest
-    place = margins.path * at_end(spread.position, size, _AS_LARGE * size, speed)
-    pace = margins.path * at_end(spread.velocity, speed, _AS_LARGE * speed)
+    place = margins.path * at_end("position", size, _AS_LARGE * size, speed)
+    pace = margins.path * at_end("velocity", speed, _AS_LARGE * speed)
     return Estimate(
         attitude=min(lead, math.pi) if carried else None,
-        rates=at_end(spread.rates, 1.0, 2.0),
+        rates=at_end("rates", 1.0, 2.0),
         position=math.ldexp(place, scaling.length) if flight else None,
         velocity=math.ldexp(pace, scaling.speed) if flight else None,
         amplification=amplification if amplification > margins.stable else 1.0,
         growth_rate=growth,
         predictable_seconds=horizon,
         seconds=math.ldexp(float(times[-1]), exponent),
-        how=_words(prepared, beyond > 1),
+        share=followed.share,
+        how=_words(course, followed),
     )
 
 
-def _words(prepared: InitialValueProblem, extrapolated: bool) -> str:
+def _words(course: Course, followed: Followed) -> str:
     what = "neighbours of the motion, pushed at random as rounding does"
-    if _loose(prepared):
+    if loose(course.prepared):
         what += " and as the tolerance lets the series do"
-    return what + (", over the run's beginning, whose growth goes on" if extrapolated else ", over the run")
+    if followed.share >= 1:
+        return what + ", over the run"
+    what += f", over the first {100 * followed.share:.2g} % of the run"
+    spread = followed.spread
+    if not spread.whole or max(leading(spread, course.carried)) >= course.lost:
+        return what + ", after which no digit is left"
+    if followed.windows:
+        what += f" and in {followed.windows} windows beyond ({100 * followed.in_windows:.2g} %)"
+    return what + "; errors are taken to go on growing so, and growth that sets in elsewhere isn't seen"

@@ -184,6 +184,10 @@ def _print_accuracy(accuracy: Accuracy, out: Console) -> None:
         unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 else ""
         size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
         _line(out, "attitude", size if estimate < math.pi else "unknown at the end")
+        share = accuracy.examined_share
+        if share is not None and share < 1 and estimate < math.pi:
+            seen = f"the growth of errors was followed over the first {100 * share:.2g} % of the run"
+            _line(out, "examined", f"{seen} (estimated_how in the summary says more)")
     elif accuracy.amplification is None:
         _line(out, "errors", accuracy.estimated_how)
     if accuracy.certified_position is not None:
@@ -251,6 +255,12 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         out.print(
             f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
         )
+        seen = predicted["growth_seconds"]
+        if seen:
+            out.print(
+                f"           if errors go on growing as in the first {duration(seen)}; what sets in later "
+                "isn't seen here, but by the run"
+            )
 
 
 def print_scenes(described: dict[str, str]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -14,10 +13,10 @@ from rigidsim.accuracy.growth import LOST
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.understood import time_words
-from rigidsim.solve.engine import Integrator
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.trail import Trail
+from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.trail import Trail, Waypoints
 from rigidsim.store.summary import Caution, WarningCode
 
 NEAR_SINGULAR = 1e-3
@@ -46,14 +45,16 @@ class Diagnostics:
     def estimated(
         self,
         trail: Trail | None = None,
-        integrator: Integrator | None = None,
+        stepper: Stepper | None = None,
+        waypoints: Waypoints | None = None,
         go_on: Callable[[], bool] = lambda: True,
     ) -> Diagnostics:
         """With an estimate of the errors.
 
         Args:
             trail: some of the run's samples.
-            integrator: of the run.
+            stepper: of the run; left as it was.
+            waypoints: some of its step boundaries.
             go_on: asked again and again; False ends it, without a result.
         """
         progress = self.progress
@@ -62,8 +63,9 @@ class Diagnostics:
             progress.steps,
             min(progress.time, float(self.prepared.scene.samples.last)),
             trail=trail,
-            integrator=integrator,
-            condition=self._condition(),
+            waypoints=waypoints,
+            stepper=stepper,
+            nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
             go_on=go_on,
         )
         return replace(self, estimate=found)
@@ -159,18 +161,6 @@ class Diagnostics:
         system = self.prepared.system
         shortest = math.ldexp(self.progress.smallest_step, system.scaling.time)
         return shortest * float(system.rate_bound) * _STEPS_TO_SINGULARITY
-
-    def _condition(self) -> float:
-        """What the formulation itself makes of a rounding error.
-
-        Rates from canonical momenta are I^-1 K^T p: a rounded momentum is of the size of the largest moment
-        and is divided by the smallest, and K has the inverse of the singular factor in it.
-        """
-        if self.prepared.system.requirements.formulation != "canonical":
-            return 1.0
-        moments = [m for m in self.prepared.scene.body.principal_moments if m != 0]
-        nearest = min(self.statistics.nearest_singularity, self._passed(), 1.0)
-        return float(max(moments) / min(moments)) / max(nearest, sys.float_info.min)
 
 
 def largest_spacing(prepared: InitialValueProblem) -> float:

@@ -109,7 +109,10 @@ class Session:
                 self.observer.phase("estimate")
                 with suppress(KeyboardInterrupt):  # while neighbours were compiled
                     found = found.estimated(
-                        recorder.trail, stepper.integrator, lambda: not interruption.requested
+                        recorder.trail,
+                        stepper,
+                        corrected.waypoints,
+                        lambda: not interruption.requested,
                     )
                 clock.next("estimate")
                 if interruption.requested:

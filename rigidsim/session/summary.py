@@ -211,6 +211,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         error_growth_rate=estimate.growth_rate,
         predictable_seconds=estimate.predictable_seconds,
         amplification_seconds=estimate.seconds,
+        examined_share=estimate.share,
         amplification_how="of the estimated error over the round-off law "
         "(tolerance/2) sqrt(steps) |w| t / sqrt 3; 1 for a stable motion",
         certified=None,

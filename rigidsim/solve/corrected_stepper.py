@@ -21,6 +21,7 @@ from rigidsim.solve.charts import Charts
 from rigidsim.solve.projection import Projection
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.trail import Waypoints
 
 STRIDE = 1024
 """Natural steps between two corrections where only time is corrected: half a millisecond, so that the calls
@@ -56,6 +57,7 @@ class CorrectedStepper:
             surfaces are looked for: a step back could cross one twice.
         charts: of a run in Euler angles; None without.
         collapsed: whether steps have become too small to ever arrive.
+        waypoints: some of the boundaries after corrections.
 
     Args:
         stride: natural steps between corrections at most; results depend on it, within rounding.
@@ -79,6 +81,7 @@ class CorrectedStepper:
             self.stride = min(self.stride, projection_interval)
         self.whole_times = not (stepper.has_events or stepper.single_steps)
         self._stuck = False
+        self.waypoints = Waypoints()
         self.charts: Charts | None = None
         system = stepper.system
         if system.partner is not None:
@@ -158,6 +161,13 @@ class CorrectedStepper:
             self.projection.project(self.stepper.state, self.stepper.time)
         if change and self.charts is not None:
             self._change_chart(self.charts)
+        if due:
+            self._note()
+
+    def _note(self) -> None:
+        stepper, chart = self.stepper, 0 if self.charts is None else self.charts.chart
+        number = stepper.steps // self.stride
+        self.waypoints.note(number, stepper.steps, stepper.time, stepper.state, chart)
 
     def _change_chart(self, charts: Charts) -> None:
         state = charts.change(self.stepper.state)

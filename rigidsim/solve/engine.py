@@ -19,7 +19,8 @@ class Integrator(Protocol):
     Attributes:
         time, dtime: where it stands, internal units; the second as two numbers whose sum it is.
         state: (states,), a view that can be assigned to; pars: likewise, up to the last that is read.
-        order: of the Taylor series.
+        order: of the Taylor series; tol: their tolerance.
+        decomposition: terms that a step's derivatives are made of.
     """
 
     time: Scalar
@@ -27,6 +28,8 @@ class Integrator(Protocol):
     state: np.ndarray
     pars: np.ndarray
     order: int
+    tol: Scalar
+    decomposition: list[Any]
 
     def step(self, max_delta_t: Scalar, *, write_tc: bool = False) -> tuple[Any, Scalar]:
         """One step: its outcome and size."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import heyoka as hy
 import numpy as np
@@ -11,21 +14,49 @@ import numpy as np
 from rigidsim.model.system import System
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.switching_stepper import SwitchingStepper
 
 NEIGHBOURS = 3
 TOLERANCE, TIGHT = 1e-8, 1e-14
 """The tight one where errors grow so much that a loosely followed motion is soon another one."""
-_UNROLLED_FROM = 200_000
-"""Steps to be taken from which code that takes longer to compile pays."""
+_TIGHT_UNTIL = 50_000
+UNROLLED_FROM = 30_000
+"""Steps to be taken from which code pays that takes ten times as long to compile (5 ms for each term of the
+equations' decomposition in place of 0.4 ms) and a tenth of the time to run."""
 _HOPELESS_STEPS = 32_768
 """In one stretch: the motion comes to no end, say towards a collision."""
 _LEAST_TOLERANCE = 1e-11
 """Whose errors in a step still stand out of rounding in double precision; others' are in proportion."""
 
+_PARTS = 4
+"""Of a step, whose errors are a thousandth of its own or less: the power of 4 that is the series' order."""
+
+
+@contextmanager
+def borrowed(stepper: Stepper | None) -> Iterator[None]:
+    """What is done with a run's stepper, or with copies of its engine, leaves no trace."""
+    if stepper is None:
+        yield
+        return
+    log = stepper.log
+    mark, found, muted = stepper.mark(), list(log.found), log.muted
+    log.muted = True
+    try:
+        yield
+    finally:
+        log.muted, log.found[:] = muted, found
+        stepper.back_to(mark)
+
 
 class Lanes(Protocol):
-    """The motion and its neighbours, side by side."""
+    """The motion and its neighbours, side by side.
+
+    Attributes:
+        tolerance: of their steps.
+    """
+
+    tolerance: float
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
@@ -33,6 +64,9 @@ class Lanes(Protocol):
         """States (states, lanes) at the ends of intervals of time (lanes,), and steps that the first lane
         took; None where one isn't finite or takes steps without end.
         """
+
+    def again(self, steps: float) -> Lanes:
+        """For so many steps more."""
 
 
 class BatchLanes:
@@ -43,18 +77,19 @@ class BatchLanes:
     """
 
     def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
-        self._system, self._tolerance = system, tolerance
+        self._system, self.tolerance = system, tolerance
+        self._unrolled = steps >= UNROLLED_FROM
         initial = np.repeat(np.array([[float(x)] for x in system.initial]), NEIGHBOURS + 1, axis=1)
-        self._integrator = hy.taylor_adaptive_batch(
-            system.equations,
-            initial,
-            tol=tolerance,
-            compact_mode=steps < _UNROLLED_FROM or system.wide,
-        )
+        options: dict[str, Any] = {"compact_mode": True, "opt_level": 0}
+        if self._unrolled:
+            options = {"compact_mode": system.wide, "opt_level": 1}
+        self._integrator = hy.taylor_adaptive_batch(system.equations, initial, tol=tolerance, **options)
 
-    def again(self, steps: float) -> BatchLanes:
-        """For more steps."""
-        return self if steps < _UNROLLED_FROM else BatchLanes(self._system, steps, self._tolerance)
+    def again(self, steps: float) -> Lanes:
+        """As of ``Lanes``."""
+        if self._unrolled or steps < UNROLLED_FROM:
+            return self
+        return BatchLanes(self._system, steps, self.tolerance)
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
@@ -71,14 +106,22 @@ class BatchLanes:
 
 
 class OwnLanes:
-    """One after the other, by an integrator that is there already: for short motions.
+    """One after the other, by an integrator that is there already: nothing has to be compiled.
 
     Args:
-        integrator: in double precision; a copy of its own.
+        integrator: of the system, in double precision; what is used is a copy.
     """
 
-    def __init__(self, integrator: Integrator) -> None:
-        self._integrator = integrator
+    def __init__(self, system: System, integrator: Integrator) -> None:
+        self._system = system
+        self._integrator = copy.deepcopy(integrator)
+        self.tolerance = float(integrator.tol)
+
+    def again(self, steps: float) -> Lanes:
+        """As of ``Lanes``."""
+        if steps < UNROLLED_FROM:
+            return self
+        return BatchLanes(self._system, steps, TIGHT if steps < _TIGHT_UNTIL else TOLERANCE)
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
@@ -101,14 +144,24 @@ class SwitchingLanes:
     Args:
         start, end: internal units.
         steps: of the motion between these.
+        stepper: of the system in double precision, borrowed; without one it is compiled.
     """
 
-    def __init__(self, system: System, start: float, end: float, steps: int) -> None:
-        precision = replace(precision_of("double"), compact=True)
-        self._stepper = stepper_of(system, precision, None, precision.scalar(start))
-        self._begin = self._stepper.mark()
+    def __init__(
+        self, system: System, start: float, end: float, steps: int, stepper: SwitchingStepper | None = None
+    ) -> None:
+        if stepper is None:
+            precision = replace(precision_of("double"), compact=True)
+            stepper = SwitchingStepper(system, precision, None, precision.scalar(start))
+        self._stepper = stepper
+        self.tolerance = float(stepper.integrator.tol)
+        self._begin = stepper.begun
         self._reached = {start: self._begin}  # by the motion itself, which may slide
         self._pace = steps / (end - start)
+
+    def again(self, steps: float) -> Lanes:
+        """As of ``Lanes``."""
+        return self
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
@@ -134,24 +187,35 @@ class SwitchingLanes:
 
 
 class SeriesErrors:
-    """What a tolerance lets a step be wrong by, held against double precision at its epsilon."""
+    """What a tolerance lets a step be wrong by, held against the same step in parts.
 
-    def __init__(self, system: System, tolerance: float) -> None:
-        self._tried = max(tolerance, _LEAST_TOLERANCE)
-        self._share = tolerance / self._tried
+    Args:
+        integrator: of the system and the tolerance, in double precision; without one it is compiled.
+    """
+
+    def __init__(self, system: System, tolerance: float, integrator: Integrator | None = None) -> None:
+        tried = max(tolerance, _LEAST_TOLERANCE)
+        self._share = tolerance / tried
+        if integrator is not None and tried == tolerance:
+            self._integrator: Integrator = copy.deepcopy(integrator)
+            return
         initial = [float(x) for x in system.initial]
-        self._loose, self._exact = (
-            hy.taylor_adaptive(system.equations, initial, compact_mode=True, **options)
-            for options in ({"tol": self._tried}, {})
+        self._integrator = hy.taylor_adaptive(
+            system.equations, initial, tol=tried, compact_mode=True, opt_level=0
         )
 
     def rate(self, state: np.ndarray, time: float) -> np.ndarray:
         """Error (states,) for each unit of time, internal units."""
-        for integrator in (self._loose, self._exact):
-            integrator.time = time
-            integrator.state[:] = state
-        _, size = self._loose.step(2.0**10)
-        self._exact.propagate_until(self._loose.time, max_steps=64)
-        wrong = np.array(self._loose.state) - np.array(self._exact.state)
+        engine = self._integrator
+        engine.time = time
+        engine.state[:] = state
+        _, size = engine.step(2.0**10)
+        whole, end = np.array(engine.state), engine.time
+        if not (size and np.isfinite(whole).all()):
+            return np.zeros_like(whole)
+        engine.time = time
+        engine.state[:] = state
+        engine.propagate_until(end, max_steps=64, max_delta_t=float(size) / _PARTS)
+        wrong = whole - np.array(engine.state)
         wrong[np.abs(wrong) < 2.0**-50 * np.abs(state)] = 0.0  # rounding
-        return self._share * wrong / size if size and np.isfinite(wrong).all() else np.zeros_like(wrong)
+        return self._share * wrong / size if np.isfinite(wrong).all() else np.zeros_like(wrong)

@@ -12,6 +12,7 @@ off from the series is a smooth function of the state and nearly the same in all
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,7 +22,7 @@ import numpy as np
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function
-from rigidsim.solve.lanes import NEIGHBOURS, BatchLanes, Lanes, SeriesErrors
+from rigidsim.solve.lanes import NEIGHBOURS, Lanes, SeriesErrors
 
 _LARGEST = 2.0**-24
 """Distance from which neighbours are drawn in. A chord that is drawn in leaves the surfaces on which the
@@ -31,9 +32,11 @@ _SATURATED = 2.0**-14
 """Distance that isn't small: the stretch is gone through once more, in two or from nearer."""
 _FIRST_PUSHES = 2.0**-40
 """Distance that stands for one epsilon, at first."""
-_STEPS_AT_ONCE = 64.0
-_FEWEST_STRETCHES, _MOST_STRETCHES = 32, 512
+_STEPS_AT_ONCE = 192.0
+_FEWEST_STRETCHES, _MOST_STRETCHES, _FEWEST_OF_WINDOW = 32, 512, 12
 """Between pushes where growth is slow: so many steps, or so many stretches of the whole."""
+_FEWEST_STEPS, _FEWEST_OF_ALL = 6.0, 12
+"""In a stretch, whose last one is cut short, of the shortest motions; but so many stretches at any rate."""
 _MOST_STEPS_AT_ONCE = 4096
 _CALM, _WILD = 4.0, 16.0
 """Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
@@ -95,7 +98,7 @@ def _function(expressions: list[Symbolic], variables: list[Symbolic]) -> Callabl
     if all(x in variables for x in expressions):
         places = [variables.index(x) for x in expressions]
         return lambda states: states[places]
-    return compiled_function(expressions, variables, compact_mode=True)
+    return compiled_function(expressions, variables, compact_mode=True, opt_level=0)
 
 
 class Neighbours:
@@ -104,8 +107,8 @@ class Neighbours:
     Args:
         system: built for double precision, without a partner chart.
         lanes: of it.
-        start: internal units.
-        steps: that the motion is expected to take; decides how far apart pushes are.
+        start, end: of what is to be followed, internal units.
+        steps: that the motion is expected to take there; decides how far apart pushes are.
         epsilon: what pushes are counted in.
         rounded: (states,) bool, which of the initial values were.
         series: of a tolerance far above epsilon.
@@ -117,7 +120,7 @@ class Neighbours:
         lanes: Lanes,
         start: float,
         end: float,
-        steps: int,
+        steps: float,
         pushes: Pushes,
         epsilon: float,
         rounded: np.ndarray,
@@ -138,26 +141,53 @@ class Neighbours:
         alone = [[i] for i, n in enumerate(names) if i not in grouped and n not in _APART]
         self._groups = [*filter(None, self._places.values()), *alone]
         self._felt = np.array([n not in _APART for n in names])
+        exponents = system.state_exponents
+        self._units = np.ldexp(1.0, np.array([exponents[i] for i in self._places["rates"][:3]], np.int32))
+        self._angles = list(system.angle_states)
         initial = np.array([float(x) for x in system.initial])
+        self._begin(initial, start, end, steps, _FEWEST_STRETCHES)
+        self._push(pushes.first, np.abs(initial), rounded)
+
+    def _begin(self, initial: np.ndarray, start: float, end: float, steps: float, fewest: int) -> None:
         self._states = np.repeat(initial[:, None], NEIGHBOURS + 1, axis=1)
         self._random = np.random.default_rng(0)  # the same pushes each time
         self._factor = _FIRST_PUSHES  # distance for one epsilon
         self._largest = np.abs(initial)
-        self._start, self._end, self._time, self.steps = start, end, start, 0
-        stretches = min(max(_FEWEST_STRETCHES, steps / _STEPS_AT_ONCE), _MOST_STRETCHES)
-        stretches = max(stretches, steps / _MOST_STEPS_AT_ONCE)
-        self._longest = (end - start) / stretches
+        self._time, self.steps = start, 0
+        self._pace(end, steps, fewest)
         self._stretch = self._longest
-        self._push(pushes.first, np.abs(initial), rounded)
         self.spread = Spread()
 
-    def prepare_for(self, steps: float) -> None:
-        """More steps than were expected follow."""
-        if isinstance(self._lanes, BatchLanes):
-            self._lanes = self._lanes.again(steps)
+    def _pace(self, end: float, steps: float, fewest: float) -> None:
+        """Set how far apart pushes are, to a time that takes so many steps."""
+        fewest = max(_FEWEST_OF_ALL, min(fewest, steps / _FEWEST_STEPS))
+        stretches = min(max(fewest, steps / _STEPS_AT_ONCE), _MOST_STRETCHES)
+        stretches = max(stretches, steps / _MOST_STEPS_AT_ONCE)
+        self._longest = (end - self._time) / stretches
+
+    def elsewhere(self, state: np.ndarray, start: float, end: float, steps: float) -> Neighbours:
+        """Of a part of the motion that begins in another state (states,), in the same lanes.
+
+        Args:
+            steps: that the part is expected to take.
+        """
+        other = copy.copy(self)
+        other._begin(state, start, end, steps, _FEWEST_OF_WINDOW)
+        other._push(self._pushes.first, np.abs(state), state != 0)
+        return other
+
+    @property
+    def tolerance(self) -> float:
+        """Of their steps."""
+        return self._lanes.tolerance
+
+    def prepare_for(self, steps: float, end: float) -> None:
+        """So many more steps than were expected follow, to another end."""
+        self._lanes = self._lanes.again(steps)
+        self._pace(end, steps, _FEWEST_STRETCHES)
 
     def follow(self, until: float, go_on: Callable[[], bool], lost: float = math.inf) -> Spread:
-        """Go on to a time.
+        """Go on to a time, unless all is lost before.
 
         Args:
             until: internal units.
@@ -165,15 +195,15 @@ class Neighbours:
             lost: spread of the attitude (or the rates) past which nothing more is to be learnt.
         """
         spread = self.spread
-        while spread.whole and self._time < until and go_on():
+        while spread.whole and self._time < until and go_on() and not self.all_lost(lost):
             spread.whole = self._go(until)
-            if spread.times and self._all_lost(lost):
-                break
         return spread
 
-    def _all_lost(self, lost: float) -> bool:
+    def all_lost(self, lost: float) -> bool:
         """Whether neither the attitude (or the rates) nor the place can be told any more."""
         spread = self.spread
+        if not spread.times:
+            return False
         if (spread.rates if self._quaternion is None else spread.attitude)[-1] < lost:
             return False
         return not self._places["position"] or spread.position[-1] * self._epsilon > spread.extent
@@ -210,7 +240,7 @@ class Neighbours:
         self._largest = np.maximum(self._largest, largest)
         moved = before[:, 0] != self._states[:, 0]  # what stands still isn't rounded
         self._push(self._pushes.own * math.sqrt(taken), largest, moved, elapsed)
-        angles = list(self._system.angle_states)  # which grow, and step control with them
+        angles = self._angles  # which grow, and step control with them
         self._states[angles] -= 2 * np.pi * np.rint(self._states[angles, :1] / (2 * np.pi))
         far = float(self._distances(self._states).max())
         if far > _LARGEST:
@@ -257,7 +287,7 @@ class Neighbours:
         for places in self._groups:
             size = max(float(np.linalg.norm(states[places, 0])), float(self._largest[places].max()))
             if size > 0:
-                found = np.maximum(found, np.linalg.norm(apart[places], axis=0) / size)
+                found = np.maximum(found, np.sqrt((apart[places] ** 2).sum(axis=0)) / size)
         return found
 
     def _note(self) -> None:
@@ -269,8 +299,7 @@ class Neighbours:
 
         spread.times.append(self._time)
         spread.steps.append(self.steps)
-        rates = self._places["rates"][:3]
-        units = np.ldexp(1.0, np.array([self._system.state_exponents[i] for i in rates], dtype=np.int32))
+        rates, units = self._places["rates"][:3], self._units
         size = float(np.linalg.norm(units * self._states[rates, 0]))
         wrong = float(np.linalg.norm(units[:, None] * apart[rates])) / math.sqrt(NEIGHBOURS)
         spread.rates.append(wrong / size if size > 0 else 0.0)

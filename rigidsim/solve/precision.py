@@ -94,6 +94,10 @@ class Precision:
             raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the range of single precision")
         return -total if sign else total
 
+    def of_double(self, value: float) -> Scalar:
+        """The scalar of a double's value, or nearest to it where that is narrower; zero without a sign."""
+        return self._scalar(value + 0.0)
+
     def _scalar(self, value: float) -> Scalar:
         return hy.real(value, self.bits) if self.scalar is hy.real else self.scalar(value)
 

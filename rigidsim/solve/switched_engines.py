@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import heyoka as hy
-import mpmath
 import numpy as np
 
 from rigidsim.model.system import System
@@ -164,7 +163,10 @@ class SwitchedEngines(Stepper):
     def _pars(self, turns: list[float], sign: float, over: dict[int, int] | None = None) -> np.ndarray:
         sides = [float((over or {}).get(j, mode) or 1) for j, mode in enumerate(self._modes)]
         numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
-        return np.array([self.precision.number(mpmath.mpf(x)) for x in numbers], dtype=self.precision.scalar)
+        return self._array(numbers)
+
+    def _array(self, numbers: list[float]) -> np.ndarray:
+        return np.array([self.precision.of_double(x) for x in numbers], dtype=self.precision.scalar)
 
     def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
         """At this boundary; turns and sign go on from the latest step."""
@@ -214,7 +216,7 @@ class SwitchedEngines(Stepper):
             moved.append(mode * noise if abs(float(look.u[j])) <= noise else 0.0)
         if self.has_events:
             moved += [self._beside(*found) for found in self._probe.crossings(self.state, self.time, pars)]
-        offsets = self.precision.array([mpmath.mpf(x) for x in moved])
+        offsets = self._array(moved)
         everything = np.concatenate([pars, offsets])
         engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
 
@@ -238,7 +240,7 @@ class SwitchedEngines(Stepper):
         """A time shortly after a step's beginning at which an argument has the sign of its side, if any."""
         end = self._integrator.time
         for power in range(1, self.precision.bits // 2):
-            then = begin + (end - begin) * self.precision.number(mpmath.ldexp(1, -power))
+            then = begin + (end - begin) * self.precision.of_double(2.0**-power)
             if self._modes[j] * float(self._values(self._integrator.update_d_output(then), then)[j]) > 0:
                 return then
         return None

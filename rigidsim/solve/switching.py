@@ -64,7 +64,7 @@ class Probe:
     """Compiled functions of a system that say where its surfaces are."""
 
     def __init__(self, system: System, precision: Precision) -> None:
-        self._precision = precision
+        self._epsilon = float(precision.epsilon)
         self.surfaces, self._states = len(system.surfaces), len(system.states)
         self.angles, self.signed = len(system.turning), bool(system.signed)
         self.parameters = self.surfaces + self.angles + self.signed
@@ -98,7 +98,7 @@ class Probe:
     def crossings(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[tuple[float, float]]:
         """Values of the events' expressions, and what rounding of the states, of order one, makes of them."""
         found = [float(x) for x in self._crossings(np.array(state), pars=pars, time=time)[:-2]]
-        noise, half = _RATE_ROUNDINGS * float(self._precision.epsilon), len(found) // 2
+        noise, half = _RATE_ROUNDINGS * self._epsilon, len(found) // 2
         return [(value, noise * size) for value, size in zip(found[:half], found[half:], strict=True)]
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
@@ -111,11 +111,11 @@ class Probe:
 
     def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
         """Below which an argument is zero, as far as rounding lets it be known."""
-        return _ROUNDINGS * float(self._precision.epsilon) * look.size(j, states)
+        return _ROUNDINGS * self._epsilon * look.size(j, states)
 
     def rate_noise(self, look: Look, j: int) -> float:
         """Likewise of its rate."""
-        return _RATE_ROUNDINGS * float(self._precision.epsilon) * look.rate_size(j)
+        return _RATE_ROUNDINGS * self._epsilon * look.rate_size(j)
 
 
 @dataclass(frozen=True)

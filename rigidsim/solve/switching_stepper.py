@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import heyoka as hy
-import mpmath
 import numpy as np
 
 from rigidsim.model.system import System
@@ -36,6 +35,7 @@ class SwitchingStepper(SwitchedEngines):
 
     Attributes:
         switches: how often it came to a surface so far, in this process.
+        begun: the boundary at which the motion begins, on the sides that it goes to.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class SwitchingStepper(SwitchedEngines):
         self.switches = 0
         self._unsettled = ""
         self._begin()
+        self.begun = self.mark()
 
     # --- steps ----------------------------------------------------------------------------------------------
 
@@ -77,7 +78,7 @@ class SwitchingStepper(SwitchedEngines):
         for _ in range(100_000):
             high, low = self._integrator.dtime
             left = (time - high) - low
-            if left <= abs(time) * float(self.precision.epsilon):
+            if left <= abs(time) * self._epsilon:
                 return True
             if not self._step(min(left, self._longest))[0]:
                 break
@@ -142,8 +143,8 @@ class SwitchingStepper(SwitchedEngines):
         return True, on
 
     def _width(self, time: Scalar) -> Scalar:
-        size = _WIDTH * float(self.precision.epsilon) * max(abs(float(time)), 1.0)
-        return self.precision.number(mpmath.mpf(size))
+        size = _WIDTH * self._epsilon * max(abs(float(time)), 1.0)
+        return self.precision.of_double(size)
 
     def _quieten(self) -> None:
         """Events at the surface that the latest step ended on were found by it."""
@@ -153,7 +154,7 @@ class SwitchingStepper(SwitchedEngines):
     def _again(self, root: Root, time: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar:
         """The step up to a root, once more nearer to it; returns its size."""
         engine, size = self._integrator, root[0] - time[0] - time[1]
-        self.log.muted = True
+        muted, self.log.muted = self.log.muted, True
         try:
             for attempt in range(2):
                 engine.dtime = time
@@ -170,7 +171,7 @@ class SwitchingStepper(SwitchedEngines):
                     break
                 size = size - correction
         finally:
-            self.log.muted = False
+            self.log.muted = muted
         return size
 
     def _first_root(self, begin: Scalar, before: np.ndarray) -> Root | None:
@@ -223,7 +224,7 @@ class SwitchingStepper(SwitchedEngines):
     @property
     def _window(self) -> float:
         """Internal units of time within which ``_MOST_SWITCHES`` are an accumulation."""
-        return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * float(self.precision.epsilon)) ** 0.5)
+        return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * self._epsilon) ** 0.5)
 
     def _arrive(self, root: Root, states: list[np.ndarray]) -> bool:
         """Go on from a surface; False where that can't be."""
@@ -322,17 +323,17 @@ class SwitchingStepper(SwitchedEngines):
         engine = self._integrator
         time, before = engine.dtime, np.array(engine.state)
         self._set(engine)
-        self.log.muted = True
+        muted, self.log.muted = self.log.muted, True
         engine.step(self._longest, write_tc=True)
         end, after = engine.time, np.array(engine.state)
         found = 0
         for part in (1 / 16, 1 / 2, 1.0):
-            then = time[0] + self.precision.number(mpmath.mpf(part)) * (end - time[0])
+            then = time[0] + self.precision.of_double(part) * (end - time[0])
             look = self._look(engine.update_d_output(then), then)
             if abs(float(look.u[j])) > self._probe.noise(look, j, [before, after]):
                 found = 1 if look.u[j] > 0 else -1
                 break
-        self.log.muted = False
+        self.log.muted = muted
         self._roots.clear()
         engine.dtime = time
         engine.state[:] = before

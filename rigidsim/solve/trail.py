@@ -1,4 +1,6 @@
-"""A few of a run's samples, spread evenly over it and kept in memory, by which its errors are told later."""
+"""A few of a run's samples and of its step boundaries, spread evenly over it and kept in memory: by the ones
+its errors are told later, from the others its neighbours begin.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +11,7 @@ import numpy as np
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 
+_MOST_WAYPOINTS = 32
 _MOST = {True: 64, False: 16}  # of narrow precisions, whose closed forms take arrays, and of others
 
 
@@ -46,3 +49,36 @@ class Trail:
     @staticmethod
     def _sample(block: SampleBlock, row: int) -> tuple[int, Scalar, np.ndarray, int]:
         return block.first + row, block.times[row], np.array(block.states[row]), int(block.chart[row])
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A step boundary, internal units."""
+
+    steps: int
+    time: float
+    state: np.ndarray
+    chart: int
+
+
+@dataclass
+class Waypoints:
+    """Boundaries of every so many corrections; which ones depends on the steps alone."""
+
+    _kept: dict[int, Waypoint] = field(default_factory=dict)
+    _spacing: int = 1
+
+    def note(self, number: int, steps: int, time: Scalar, state: np.ndarray, chart: int) -> None:
+        """The boundary of correction ``number``; one that is come to again is the same again."""
+        if number % self._spacing:
+            return
+        self._kept[number] = Waypoint(steps, float(time), np.array([float(x) for x in state]), chart)
+        if len(self._kept) > _MOST_WAYPOINTS:
+            self._spacing *= 2
+            self._kept = {n: kept for n, kept in self._kept.items() if n % self._spacing == 0}
+
+    def between(self, first: float, last: float) -> list[Waypoint]:
+        """Those between two counts of steps, in order."""
+        return sorted(
+            (kept for kept in self._kept.values() if first <= kept.steps < last), key=lambda kept: kept.steps
+        )

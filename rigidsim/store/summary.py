@@ -121,6 +121,8 @@ class Accuracy(Part):
         amplification: of rounding errors by the motion; None where nothing was estimated.
         error_growth_rate: 1/s; 0 where errors don't grow exponentially.
         predictable_seconds: from the start, after which no digit is left; None where that is never.
+        examined_share: of the run, over which the growth of errors was followed without a gap from its start;
+            1 for all of it.
         how: the certificate came about.
         chosen, chosen_why, forecast: the setting that was chosen for ``requested``, and its forecast.
     """
@@ -136,6 +138,7 @@ class Accuracy(Part):
     error_growth_rate: FiniteNumber | None = None
     predictable_seconds: FiniteNumber | None = None
     amplification_seconds: FiniteNumber | None = None
+    examined_share: FiniteNumber | None = None
     amplification_how: Text = ""
     certified: FiniteNumber | None
     how: Text

@@ -132,6 +132,7 @@ def plan(
             if system.requirements.formulation == "rates"
             else attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth),
             "amplification": growth.at(duration),
+            "growth_seconds": growth.seconds,
         },
         "warnings": [text for _, text in warnings],
         "warning_codes": [code for code, _ in warnings],

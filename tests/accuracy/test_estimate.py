@@ -11,6 +11,7 @@ from support import IMPATIENT, angles_between, config, run_text
 
 import rigidsim
 from rigidsim.accuracy.estimate import estimate_errors
+from rigidsim.accuracy.margins import Margins
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.solve.problem import prepare
@@ -46,6 +47,13 @@ gravitational_parameter = 1
 orbit = {semi_major_axis = 1, eccentricity = 0.1, inclination = 0.5}"""
 LATE = scene("[1, 1.1, 1.3]", "[0.5, 0.5, 1.5]", "4000", GRADIENT)
 PASSAGES = scene("[1, 1.0005, 1.01]", "[1e-4, 10, 1e-4]", "2500")
+DESPUN = scene(
+    "[1, 1.1, 1.3]",
+    "[0.1, 0.1, 8]",
+    "14000",
+    GRADIENT + '\n[[loads]]\nkind = "viscous_torque"\ncoefficients = [2e-4, 2e-4, 2e-4]',
+)
+"""Regular while it spins eight times as fast as it revolves; after some 7000 s it doesn't any more."""
 COMET = config(
     "principal_moments = [1, 1.3, 1.6]\nmass = 1",
     "angular_velocity = [1e-3, 2e-3, 3e-3]\nposition = [100, 0, 0]\nvelocity = [0, 0.022, 0.008]",
@@ -61,6 +69,41 @@ def test_chaos_that_sets_in_late_leaves_no_digits(runs: Path) -> None:
     assert accuracy["estimated_attitude_error"] == pytest.approx(np.pi)
     assert 100 < accuracy["predictable_seconds"] < 2000
     assert "attitude_uncertain" in run.summary["warning_codes"]
+
+
+def test_an_instability_that_sets_in_after_half_of_a_long_run_is_seen(runs: Path) -> None:
+    """In 85,000 steps, of which the first tenth shows nothing: announced at 4.4e-9 by that."""
+    run = run_text(DESPUN, runs)
+    accuracy = run.summary["accuracy"]
+    assert run.summary["cost"]["steps"] > 60_000
+    assert accuracy["estimated_attitude_error"] == pytest.approx(np.pi)
+    assert accuracy["predictable_seconds"] > 2000
+    assert 0.2 < accuracy["examined_share"] < 1
+    assert "no digit is left" in accuracy["estimated_how"]
+    assert "attitude_uncertain" in run.summary["warning_codes"]
+
+
+def test_what_part_of_a_long_run_was_examined_is_said(runs: Path) -> None:
+    """A slow push leaves no closed form, and nothing amplifies errors; windows show that they are made ever
+    faster, as the body spins up.
+    """
+    push = 'kind = "torque"\ncomponents = ["0", "0", "1e-4"]'
+    text = scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "12000", push)
+    run = run_text(text, runs)
+    accuracy = run.summary["accuracy"]
+    assert 0 < accuracy["examined_share"] < 0.5
+    assert " windows beyond" in accuracy["estimated_how"]
+    true = true_error(run, text)
+    assert true <= COVERED * accuracy["estimated_attitude_error"] <= COVERED * HONEST * true
+    whole = estimate_errors(
+        prepare(rigidsim.parse(text)),
+        run.summary["cost"]["steps"],
+        12000.0,
+        margins=Margins(at_any_rate=10**9),
+    )
+    assert whole is not None
+    assert whole.share == 1
+    assert whole.how.endswith(", over the run")
 
 
 def test_errors_grow_in_a_passage_that_no_beginning_shows(runs: Path) -> None:

@@ -181,6 +181,9 @@ def test_plan_json(config: Config, rigidsim_command: Command) -> None:
     assert len(plan["equations"]) == 12
     assert {"time", "angular_velocity", "rotation_matrix", "energy_drift"} <= set(plan["recorded"])
     assert plan["predicted"]["dataset_bytes"] > 0
+    assert plan["predicted"]["growth_seconds"] > 0
+    told = rigidsim_command("plan", config()).stdout
+    assert "if errors go on growing as in the first" in told
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,74 @@
+"""What the estimate of a run's errors assumes, and how far it looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What the estimate assumes, and how far it looks.
+
+    With the defaults the errors of the campaign's scenes are covered as ``experiments/README.md`` shows
+    (``experiments/error_coverage.py``).
+
+    Attributes:
+        safety: over the root mean square of three neighbours; ``path``: of it, for position and velocity.
+        drifted: growth of a step's error from which a loosely followed motion is another one; ``gone``: over
+            what leaves no digit, from which that doesn't matter; ``tight_steps``: of runs that are followed
+            tightly at most.
+        compared: over the largest difference from a closed form at some samples.
+        angles, angle_series, momentum_series: errors of a step in Euler angles over those in quaternions: of
+            rounding, and of series that a tolerance cuts off; of the latter with canonical momenta.
+        near, very_near: singular factors below which canonical momenta lose more than elsewhere.
+        cut_off: of a tolerance, what a step is wrong by in motions with switching surfaces.
+        at_any_rate: steps times terms of the equations' decomposition (to which a step's cost is in
+            proportion) that are followed whatever they cost: some 30 ms by the run's own integrator, or by
+            code that is compiled in 25 ms, on a machine that takes 1.9 us for a step of 66 terms.
+        all_steps: that are followed whatever they cost of flights, whose close passages windows would miss,
+            and where there are no windows.
+        share: of the run's cost that may be spent, where errors grow as those of stable motions do.
+        lane: cost of a step of all neighbours, unrolled, over one of the run in double precision;
+            ``unrolling``: of compiling that, in such steps.
+        switching_steps, switching_share: of a motion with switching surfaces, whose neighbours cost as much
+            as itself each: steps that are followed whatever they cost, and share of the run's.
+        dearer: a step in other precisions than one in double precision, roughly.
+        windows: through the rest of the run, at most; ``window``: steps of each at least; ``beginning``:
+            part of the steps that are followed from the start on, where there are windows.
+        stable: amplification up to which a motion is as stable as the law of rounding takes it to be.
+        wary_power: of time that errors grow with in the beginning, from which ``all_steps`` are followed.
+        power, most_power: of time that errors grow with, at least and at most, where no more was followed.
+        exponential: power of time past which growth is none.
+    """
+
+    safety: float = 3.0
+    drifted: float = 1e6
+    gone: float = 1e6
+    tight_steps: int = 50_000
+    path: float = 0.5
+    compared: float = 3.0
+    angles: float = 4.0
+    angle_series: float = 5.0
+    momentum_series: float = 20.0
+    near: float = 0.2
+    very_near: float = 0.01
+    cut_off: float = 0.1
+    at_any_rate: int = 250_000
+    all_steps: int = 20_000
+    share: float = 0.05
+    lane: float = 0.3
+    unrolling: float = 1e5
+    switching_steps: int = 1000
+    switching_share: float = 0.25
+    windows: int = 16
+    window: int = 256
+    beginning: float = 0.6
+    dearer: tuple[tuple[str, float], ...] = (("single", 0.3), ("double", 1.0), ("extended", 10.0))
+    stable: float = 4.0
+    wary_power: float = 2.0
+    power: float = 1.5
+    most_power: float = 2.5
+    exponential: float = 5.0
+
+
+MARGINS = Margins()
