@@ -258,7 +258,7 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         seen = predicted["growth_seconds"]
         if seen:
             out.print(
-                f"           if errors go on growing as in the first {duration(seen)}; what sets in later "
+                f"           if errors go on growing as in the first {span_text(seen)}; what sets in later "
                 "isn't seen here, but by the run"
             )
 
