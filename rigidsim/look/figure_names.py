@@ -9,7 +9,7 @@ FIGURES: dict[str, str] = {
     "pole_path": "path of the figure axis in space, and about its mean motion where that precesses",
     "nutation": "nutation ellipse: the pole about its mean motion",
     "obliquity": "obliquity and longitude of the node, each less its mean or secular part",
-    "libration": "roll, pitch and yaw over time, pitch against roll, phase planes",
+    "libration": "libration, or roll, pitch and yaw, over time; the source seen from the body",
     "tip": "trace of a top's tip seen from above, its tilt and precession over time",
     "polhode": "polhode on the surfaces of energy and momentum, separatrix, Poinsot's rolling",
     "herpolhode": "path of the angular velocity on the invariable plane",

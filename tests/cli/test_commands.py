@@ -271,7 +271,10 @@ def test_plot_by_name(config: Config, rigidsim_command: Command, tmp_path: Path)
             ["--what", "polhodes"],
             "none of that name; did you mean 'polhode'? Available: overview, polar_motion",
         ),
-        (["--what", "libration"], "needs roll_pitch_yaw recorded, which this run hasn't; it has overview, "),
+        (
+            ["--what", "libration"],
+            "needs libration, roll_pitch_yaw or nadir recorded, which this run hasn't; it has overview, ",
+        ),
         (["--what", "all", "--out", "x.png"], "x.png: several figures need a folder that is there"),
     ):
         result = rigidsim_command("plot", "runs/free", *options)

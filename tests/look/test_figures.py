@@ -135,8 +135,14 @@ def satellite(count: int = 801) -> xarray.Dataset:
     """A satellite that librates by a few degrees."""
     time = np.linspace(0.0, DAY, count)
     angles = np.deg2rad([3.0, 5.0, 1.0]) * np.sin(np.outer(time, [2.2e-3, 1.9e-3, 1.1e-3]) + np.arange(3))
+    nadir = np.stack([np.sin(angles[:, 1]), np.sin(angles[:, 0]), np.ones(count)], axis=1)
+    nadir /= -np.linalg.norm(nadir, axis=1, keepdims=True)
     return xarray.Dataset(
-        {"roll_pitch_yaw": (("time", "angle"), angles, {"units": "rad"})},
+        {
+            "roll_pitch_yaw": (("time", "angle"), angles, {"units": "rad"}),
+            "libration": (("time", "libration_angle"), angles[:, [1, 0]] + [np.pi, 0], {"units": "rad"}),
+            "nadir": (("time", "body_axis"), nadir, {"units": "1"}),
+        },
         coords={"time": ("time", time, {"units": "s"}), "angle": ["roll", "pitch", "yaw"]},
         attrs={"title": "satellite", "config": '[[loads]]\nkind = "gravity_gradient"\n'},
     )
@@ -229,13 +235,23 @@ def test_tip_of_a_top_is_seen_from_above_with_its_first_turn() -> None:
 def test_libration_in_time_and_in_planes() -> None:
     dataset = satellite()
     page = figures.figure(dataset, "libration")
-    for line, name in zip(page.axes[0].get_lines(), ("roll", "pitch", "yaw"), strict=True):
+    for line, name in zip(page.axes[1].get_lines(), ("roll", "pitch", "yaw"), strict=True):
         assert line.get_label() == name
         np.testing.assert_allclose(
             line.get_ydata(), np.rad2deg(dataset["roll_pitch_yaw"].sel(angle=name).values)
         )
-    assert page.axes[1].get_xlabel() == "roll [deg]"
+    inside, outside = page.axes[0].get_lines()
+    assert (inside.get_label(), outside.get_label()) == ("in the orbit's plane − 180°", "out of it")
+    np.testing.assert_allclose(
+        inside.get_ydata(), np.rad2deg(dataset["roll_pitch_yaw"].values[:, 1]), atol=1e-9
+    )
+    assert page.axes[2].get_xlabel() == "towards −x [deg]"
+    assert titles(page)[2:] == ["The source seen from the body (+: −z axis)", "Phase planes"]
     assert titles(figures.figure(dataset))[0].startswith("Libration")
+    # pitched by a right angle roll and yaw are undefined, and the source still where it is
+    steep = dataset[["nadir", "roll_pitch_yaw"]].assign_attrs(dataset.attrs)
+    steep["roll_pitch_yaw"] = steep["roll_pitch_yaw"] + np.array([0, np.pi / 2, 0])
+    assert titles(figures.figure(steep, "libration")) == ["The source seen from the body (+: −z axis)"]
 
 
 def test_polhode_lies_on_both_surfaces_and_the_separatrix_on_its_plane(symmetric_top: Build) -> None:
@@ -343,7 +359,8 @@ def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetr
     ):
         figures.figure(symmetric_top(), "polhod")
     with pytest.raises(
-        ValueError, match="needs roll_pitch_yaw recorded, which this run hasn't; it has overview"
+        ValueError,
+        match="needs libration, roll_pitch_yaw or nadir recorded, which this run hasn't; it has overview",
     ):
         figures.figure(symmetric_top(), "libration")
     rates = symmetric_top()[["angular_velocity"]].assign_attrs(symmetric_top().attrs)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-Test = Callable[["xarray.Dataset"], bool]
+_STEEP = 1.5  # rad of pitch, near which roll and yaw are ill-defined
 
 
 def _has_rates_on_surfaces(dataset: xarray.Dataset) -> bool:
@@ -53,10 +53,6 @@ def is_top(dataset: xarray.Dataset) -> bool:
     )
 
 
-def _has_tip(dataset: xarray.Dataset) -> bool:
-    return has("tip")(dataset) or is_top(dataset)
-
-
 def _has_wobble(dataset: xarray.Dataset) -> bool:
     return has("nutation_angle")(dataset) or (
         signals.pole(dataset, "figure") is not None and signals.pole(dataset, "momentum") is not None
@@ -64,9 +60,23 @@ def _has_wobble(dataset: xarray.Dataset) -> bool:
 
 
 def librates(dataset: xarray.Dataset) -> bool:
-    """Whether the body keeps an attitude to its orbit: roll, pitch and yaw stay within a right angle."""
+    """Whether the body keeps an attitude to its orbit: the source stays near one body direction."""
+    nadir = signals.values(dataset, "nadir")
+    if nadir is None:
+        return has("libration")(dataset)
+    finite = nadir[np.isfinite(nadir).all(axis=1)]
+    mean = finite.mean(axis=0) if len(finite) else np.zeros(3)
+    return bool(np.linalg.norm(mean) > 0.5 and (finite @ mean).min() > 0.5 * np.linalg.norm(mean))
+
+
+def _regular(dataset: xarray.Dataset) -> bool:
+    """Whether roll and yaw are defined: away from a pitch of a right angle."""
     table = signals.values(dataset, "roll_pitch_yaw")
-    return table is not None and bool(np.nanmax(np.abs(table)) < np.pi / 2)
+    return table is not None and bool(np.nanmax(np.abs(table[:, 1])) < _STEEP)
+
+
+def _swings(dataset: xarray.Dataset) -> bool:
+    return has("libration")(dataset) or _regular(dataset)
 
 
 RATES = Panel(has("angular_velocity"), timelines.rates, begins=True)
@@ -77,7 +87,8 @@ POLAR_MOTION = Panel(
 )
 OBLIQUITY = Panel(_has_orientation, timelines.obliquity)
 LONGITUDE = Panel(_has_orientation, timelines.longitude)
-LIBRATION = Panel(has("roll_pitch_yaw"), timelines.libration)
+LIBRATION = Panel(has("libration"), timelines.libration)
+ROLL_PITCH_YAW = Panel(_regular, timelines.roll_pitch_yaw)
 TILT = Panel(lambda dataset: has("tilt")(dataset) or is_top(dataset), timelines.tilt, begins=True)
 PRECESSION = Panel(has("precession_angle"), timelines.precession, begins=True)
 WOBBLE = Panel(_has_wobble, timelines.wobble)
@@ -85,9 +96,9 @@ WOBBLE = Panel(_has_wobble, timelines.wobble)
 CIRCLE = Panel(signals.near_axis, poles.polar_motion_panel)
 PATH = Panel(_has_pole, poles.pole_path_panel)
 NUTATION = Panel(_precesses, poles.nutation_panel)
-TIP = Panel(_has_tip, poles.tip_panel)
-ROLL_PITCH = Panel(has("roll_pitch_yaw"), poles.roll_pitch_panel)
-PHASES = Panel(has("roll_pitch_yaw"), poles.phase_panel)
+TIP = Panel(is_top, poles.tip_panel)
+NADIR = Panel(has("nadir"), poles.nadir_panel)
+PHASES = Panel(_swings, poles.phase_panel)
 POLHODE = Panel(has("angular_velocity"), polhode.polhode_panel)
 HERPOLHODE = Panel(_has_herpolhode, polhode.herpolhode_panel)
 POINSOT = Panel(_rolls, polhode.poinsot_panel)
@@ -109,8 +120,8 @@ class Kind:
     planes: Sequence[Panel] = ()
 
     def shows(self, rows: xarray.Dataset) -> bool:
-        """Whether a dataset (in memory) has what its first plane, or curve, needs."""
-        return [*self.planes, *self.curves][0].shows(rows)
+        """Whether a dataset (in memory) has what one of its planes needs, or where it has none, a curve."""
+        return any(panel.shows(rows) for panel in self.planes or self.curves)
 
 
 _TURNS, _ATTITUDE = "angular_velocity recorded", "an attitude recorded"
@@ -119,7 +130,9 @@ KINDS: dict[str, Kind] = {
     "pole_path": Kind(_ATTITUDE, (), (PATH, NUTATION)),
     "nutation": Kind("a pole that a torque moves", (), (NUTATION,)),
     "obliquity": Kind(_ATTITUDE, (OBLIQUITY, LONGITUDE)),
-    "libration": Kind("roll_pitch_yaw recorded", (LIBRATION,), (ROLL_PITCH, PHASES)),
+    "libration": Kind(
+        "libration, roll_pitch_yaw or nadir recorded", (LIBRATION, ROLL_PITCH_YAW), (NADIR, PHASES)
+    ),
     "tip": Kind("a top: a body on a fixed point under uniform gravity", (TILT, PRECESSION), (TIP,)),
     "polhode": Kind(_TURNS, (), (POLHODE, POINSOT)),
     "herpolhode": Kind("an attitude and a momentum that stays put", (), (HERPOLHODE,)),
@@ -183,12 +196,12 @@ def overview(dataset: xarray.Dataset) -> Figure:
 def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     moving = (FLIGHT,) if FLIGHT.shows(rows) else ()
     if librates(rows):
-        return (LIBRATION, RATES), (ROLL_PITCH, *moving)
+        return (LIBRATION, ROLL_PITCH_YAW), (NADIR, *(moving or (PHASES,)))
     if is_top(rows):
         return (TILT, PRECESSION if PRECESSION.shows(rows) else ATTITUDE), (TIP,)
     if signals.near_axis(rows):
         if _precesses(rows) and not moving:
-            return (OBLIQUITY, LONGITUDE, POLAR_MOTION), (NUTATION, PATH)
+            return (OBLIQUITY, LONGITUDE), (NUTATION, PATH)
         return (POLAR_MOTION,), (CIRCLE, *moving)
     if moving:
         return (RATES, ATTITUDE), (*moving, POLHODE)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.figures import fits, signals
+from rigidsim.look.figures import fits, signals, timelines
 from rigidsim.look.figures.scales import angle_scale, angle_text, si_scale
 from rigidsim.look.figures.style import (
     BLUE,
@@ -22,7 +22,6 @@ from rigidsim.look.figures.style import (
     titled,
     trace,
 )
-from rigidsim.look.figures.timelines import AXIS_COLORS
 from rigidsim.look.readable_time import span_text
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ def pole_path_panel(axes: Axes, dataset: xarray.Dataset) -> None:
         if name == "figure" or len(shown) == 1:
             trace(axes, x, y)
         else:
-            color = AXIS_COLORS[name]
+            color = timelines.AXIS_COLORS[name]
             curve(axes, x, y, in_plane=True, color=color, lw=0.7, alpha=0.6, zorder=1, label=f"{name} axis")
     points = np.vstack(everything)
     reach = float(np.nanmax(np.abs(points - np.nanmean(points, axis=0))))
@@ -201,34 +200,45 @@ def tip(dataset: xarray.Dataset) -> tuple[Array, str, str]:
     return direction, "", "Figure axis"
 
 
-def roll_pitch_panel(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Pitch against roll: where the body's lower side points about the nadir."""
-    table = signals.values(dataset, "roll_pitch_yaw")
-    assert table is not None
-    scale, unit = angle_scale(table[:, :2])
-    x, y = (table[:, :2] / scale).T
+def nadir_panel(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Where the source stands in body axes, about its mean direction there."""
+    directions = signals.values(dataset, "nadir")
+    assert directions is not None
+    mean = np.nanmean(directions, axis=0)
+    k = int(np.abs(mean).argmax())  # the body axis that it is near to
+    way = np.sign(mean[k])
+    plane = directions[:, [(k + 1) % 3, (k + 2) % 3]] * way
+    size = np.linalg.norm(plane, axis=1)
+    angle = np.arctan2(size, directions[:, k] * way)
+    plane = plane * np.divide(angle, size, out=np.ones_like(size), where=size > 1e-12)[:, None]
+    scale, unit = angle_scale(plane)
+    x, y = (plane / scale).T
     trace(axes, x, y)
     axes.plot(0, 0, "+", color=INK, ms=10, mew=1.3)
     square(axes, np.append(x, 0), np.append(y, 0))
-    axes.set_xlabel(f"roll [{unit}]")
-    axes.set_ylabel(f"pitch [{unit}]")
-    titled(axes, "Pitch against roll (+: nadir)")
+    sign = "" if way > 0 else "−"
+    axes.set_xlabel(f"towards {sign}{'xyz'[(k + 1) % 3]} [{unit}]")
+    axes.set_ylabel(f"towards {sign}{'xyz'[(k + 2) % 3]} [{unit}]")
+    key(axes, f"The source seen from the body (+: {sign}{'xyz'[k]} axis)")
 
 
 def phase_panel(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Rates of roll, pitch and yaw against the angles: libration closes about the centre."""
-    table = signals.values(dataset, "roll_pitch_yaw")
-    assert table is not None
-    seconds = signals.seconds(dataset)
-    rate = np.gradient(table, seconds, axis=0)
+    """Rates of libration, else of roll, pitch and yaw, against the angles: what librates closes."""
+    if signals.values(dataset, "libration") is not None:
+        table = timelines.swings(dataset)[0]
+        names = ["in the orbit's plane", "out of it"]
+    else:
+        found = signals.values(dataset, "roll_pitch_yaw")
+        assert found is not None
+        table, names = found, ["roll", "pitch", "yaw"]
+    rate = np.gradient(table, signals.seconds(dataset), axis=0)
     scale, unit = angle_scale(table)
     speed, speed_unit = si_scale(rate, "rad/s")
-    hues = (BLUE, ORANGE, VIOLET)
-    for k, name in enumerate(("roll", "pitch", "yaw")):
-        curve(axes, table[:, k] / scale, rate[:, k] / speed, in_plane=True, color=hues[k], lw=0.8, label=name)
+    for k, (name, hue) in enumerate(zip(names, (BLUE, ORANGE, VIOLET), strict=False)):
+        curve(axes, table[:, k] / scale, rate[:, k] / speed, in_plane=True, color=hue, lw=0.8, label=name)
     axes.set_xlabel(f"angle [{unit}]")
     axes.set_ylabel(f"rate [{speed_unit}]")
-    key(axes, "Libration in its phase planes")
+    key(axes, "Phase planes")
 
 
 def _level(up: Array) -> tuple[Array, Array]:

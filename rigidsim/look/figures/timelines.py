@@ -180,18 +180,38 @@ def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
         if name == first
         or (
             float(np.nanmax(np.abs(pair[0] - found[first][0]))) > 0.01 * reach
-            and float(np.ptp(pair[1] - found[first][1])) < np.pi  # else it goes about another pole
+            and float(np.nanmax(pair[1] - found[first][1]) - np.nanmin(pair[1] - found[first][1]))
+            < np.pi  # else it goes about another pole
         )
     }
 
 
 def libration(axes: Axes, dataset: xarray.Dataset) -> None:
+    """The long axis about the direction to the source, in the orbit's plane and out of it."""
+    table, turned = swings(dataset)
+    scale, unit = angle_scale(table)
+    labels = ["in the orbit's plane", "out of it"]
+    labels = [label + (f" − {180 * k}°" if k else "") for label, k in zip(labels, turned, strict=True)]
+    lines(axes, dataset, table / scale, labels, (BLUE, ORANGE))
+    key(axes, "Libration: the long axis from the direction to the source")
+    axes.set_ylabel(f"libration [{unit}]")
+
+
+def swings(dataset: xarray.Dataset) -> tuple[Array, list[int]]:
+    """Libration angles (rows, 2), rad, less so many half turns that they swing about zero, and these."""
+    table = signals.values(dataset, "libration")
+    assert table is not None
+    turned = [int(np.round(np.nanmean(column) / np.pi)) for column in table.T]
+    return table - np.pi * np.array(turned), turned
+
+
+def roll_pitch_yaw(axes: Axes, dataset: xarray.Dataset) -> None:
     """Roll, pitch and yaw against the local frame of the orbit."""
     table = signals.values(dataset, "roll_pitch_yaw")
     assert table is not None
     scale, unit = angle_scale(table)
     lines(axes, dataset, table / scale, ["roll", "pitch", "yaw"], (BLUE, ORANGE, VIOLET))
-    key(axes, "Libration: attitude against the local frame of the orbit")
+    key(axes, "Attitude against the local frame of the orbit")
     axes.set_ylabel(f"angle [{unit}]")
 
 
