@@ -118,6 +118,7 @@ def compose(
         figure = _side_by_side(shown.rows, planes) if planes and not curves and not table else None
         if figure is None:
             figure = _two_columns(shown, curves, planes, table)
+        figure.draw_without_rendering()  # the layout finds its sizes in this round and that of drawing
     return figure
 
 

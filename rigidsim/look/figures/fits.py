@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 _TURN = 2 * np.pi
+_LINES, _ENOUGH = 4, 64  # sinusoids that are fitted beside a straight line, to so many samples or more
 _UNIFORM = 0.1  # by which the rates of both halves of a run may differ: swings within a turn do so, too
 
 
@@ -29,7 +30,10 @@ class Line:
 
 
 def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
-    """Straight line through an angle (rows,), weighted by a Hann window, which whole swings leave alone.
+    """Straight line through an angle (rows,) that swings about it.
+
+    Evenly sampled, its strongest sinusoids of at least 1.5 periods are fitted with it, so that a broken swing
+    at the ends doesn't tilt it; all is weighted by a Hann window.
 
     Args:
         level: only the mean, without a rate.
@@ -41,10 +45,40 @@ def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
     s = (t - t[0]) / (t[-1] - t[0])
     weight = np.sin(np.pi * s) ** 2 * np.gradient(s)
     weight /= weight.sum()
-    middle, mean = float(weight @ s), float(weight @ y)
-    slope = 0.0 if level else float(weight @ ((s - middle) * (y - mean)) / (weight @ (s - middle) ** 2))
+    columns = [np.ones_like(s)] if level else [np.ones_like(s), s - 0.5]
+    root = np.sqrt(weight)
+    middle = float(y[len(y) // 2])  # large angles lose fewer digits
+    found = _solve(columns, y - middle, root)
+    if len(t) >= _ENOUGH and np.ptp(np.diff(t)) < 1e-3 * (s[1] * (t[-1] - t[0])):
+        for _ in range(_LINES):
+            rest = y - middle - np.stack(columns, axis=1) @ found
+            cycles = _peak(rest * weight)
+            if cycles is None:
+                break
+            columns += [np.cos(2 * np.pi * cycles * s), np.sin(2 * np.pi * cycles * s)]
+            found = _solve(columns, y - middle, root)
+    slope = 0.0 if level else float(found[1])
     rate = slope / (t[-1] - t[0])
-    return Line(mean - slope * middle + rate * (time[0] - t[0]), rate, float(time[0]))
+    return Line(middle + float(found[0]) - slope * 0.5 + rate * (time[0] - t[0]), rate, float(time[0]))
+
+
+def _solve(columns: list[Array], values: Array, root: Array) -> Array:
+    return np.asarray(
+        np.linalg.lstsq(np.stack(columns, axis=1) * root[:, None], values * root, rcond=None)[0]
+    )
+
+
+def _peak(windowed: Array) -> float | None:
+    """Cycles over the whole of the strongest sinusoid, None where it has less than 1.5."""
+    padded = 8 * len(windowed)
+    power = np.abs(np.fft.rfft(windowed, padded)) ** 2
+    k = int(power[1:-1].argmax()) + 1
+    if k < 12 or power[k] == 0:
+        return None
+    left, mid, right = np.log(power[k - 1 : k + 2] + 1e-300)
+    bend = left - 2 * mid + right
+    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
+    return (k + float(np.clip(shift, -0.5, 0.5))) * (len(windowed) - 1) / padded
 
 
 def circulation(time: Array, plane: Array) -> float | None:

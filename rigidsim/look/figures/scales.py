@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look.angle_units import ANGLE_UNITS, angle_unit
+
 Array = NDArray[np.float64]
 
 _PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f", 3: "k", 6: "M", 9: "G", 12: "T"}
-_DEGREE = math.pi / 180
-_ANGLES = ((_DEGREE, "deg"), (_DEGREE / 3600, "arcsec"), (_DEGREE / 3600e3, "mas"), (_DEGREE / 3600e6, "µas"))
-TURN = 2 * math.pi
+_MAS = math.pi / 180 / 3600e3
 
 
 def largest(values: Array) -> float:
@@ -32,29 +32,23 @@ def si_scale(values: Array, unit: str) -> tuple[float, str]:
     return 10.0**exponent, f"1e{exponent} {unit}"
 
 
-def angle_scale(values: Array, *, turns: bool = False) -> tuple[float, str]:
-    """Divisor and unit for angles in rad: the largest of deg, arcsec, mas and µas of which there is one.
-
-    Args:
-        turns: whether angles of many turns are counted in turns.
-    """
-    size = largest(values)
-    if size == 0:
-        return _ANGLES[0]
-    if turns and size > 20 * TURN:
-        return TURN, "turns"
-    for scale, unit in _ANGLES:
-        if size >= 0.5 * scale * (1 if unit != "deg" else 0.4):
-            return scale, unit
-    exponent = 3 * math.floor(math.log10(size) / 3 + 1e-9)
-    return 10.0**exponent, f"1e{exponent} rad"
+def angle_scale(values: Array) -> tuple[float, str]:
+    """Divisor and unit for angles in rad: deg, arcsec and mas as in tables, and µas and less below."""
+    unit, size = angle_unit(largest(values)), largest(values)
+    if unit.name == "turns":
+        unit = ANGLE_UNITS["deg"]
+    if 0 < size < 0.1 * _MAS:
+        exponent = 3 * math.floor(math.log10(size / _MAS) / 3 + 1e-9)
+        return _MAS * 10.0**exponent, {-3: "µas", -6: "nas"}.get(exponent, f"1e{exponent} mas")
+    return 1 / unit.per_radian, unit.name
 
 
 def angle_text(value: float, digits: int = 4) -> str:
     """An angle in rad with its unit: ``206.3 mas``, ``23.44°``."""
     scale, unit = angle_scale(np.array([value]))
     text = number(value / scale, digits)
-    return {"deg": f"{text}°", "arcsec": f"{text}″"}.get(unit, f"{text} {unit}")
+    symbol = ANGLE_UNITS[unit].symbol if unit in ANGLE_UNITS else unit
+    return f"{text}{'' if symbol in '°″' else ' '}{symbol}"
 
 
 def number(value: float, digits: int = 4) -> str:

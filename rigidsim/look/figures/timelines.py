@@ -12,7 +12,7 @@ from rigidsim.look.figures import signals
 from rigidsim.look.figures.fits import secular
 from rigidsim.look.figures.scales import angle_scale, angle_text, number, si_scale
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key, titled
-from rigidsim.look.readable_time import TimeAxis, span_text, time_axis_of
+from rigidsim.look.readable_time import TimeAxis, span_text, time_axis_of, unit_for
 from rigidsim.look.solids import rotation_matrix
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def without_growth(dataset: xarray.Dataset, angles: Array) -> tuple[Array, list[
 
     Otherwise one fast spin would press the others flat. The labels say what was taken off.
     """
-    seconds, axis = signals.seconds(dataset), time_axis_of(dataset)
+    seconds = signals.seconds(dataset)
     shown, labels = angles.copy(), ["φ", "θ", "ψ"]
     for k, symbol in enumerate(labels):
         finite = np.flatnonzero(np.isfinite(angles[:, k]))
@@ -120,9 +120,14 @@ def without_growth(dataset: xarray.Dataset, angles: Array) -> tuple[Array, list[
         first, last = finite[0], finite[-1]
         rate = (angles[last, k] - angles[first, k]) / (seconds[last] - seconds[first])
         shown[:, k] = angles[:, k] - angles[first, k] - rate * (seconds - seconds[first])
-        per = number(rate * axis.unit.seconds / 360)
-        labels[k] = f"{symbol} − {per} turns/{axis.unit.symbol}"
+        labels[k] = f"{symbol} − {turning(np.deg2rad(rate))}"
     return shown, labels
+
+
+def turning(rate: float) -> str:
+    """A rate (rad/s) in turns a unit of time, so that there are some of them: ``0.6702 turns/s``."""
+    unit = unit_for(20 * 2 * np.pi / rate if rate else 0.0)
+    return f"{number(rate * unit.seconds / (2 * np.pi))} turns/{unit.symbol}"
 
 
 def polar_motion(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -179,7 +184,7 @@ def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
         for name, pair in found.items()
         if name == first
         or (
-            float(np.nanmax(np.abs(pair[0] - found[first][0]))) > 0.01 * reach
+            float(np.nanmax(np.abs(pair[0] - found[first][0]))) > 0.03 * reach
             and float(np.nanmax(pair[1] - found[first][1]) - np.nanmin(pair[1] - found[first][1]))
             < np.pi  # else it goes about another pole
         )
@@ -219,13 +224,12 @@ def one_angle(axes: Axes, dataset: xarray.Dataset, name: str, title: str, symbol
     """A recorded angle, less its mean motion where it goes through more than a turn."""
     angle = signals.values(dataset, name)
     assert angle is not None
-    seconds, axis = signals.seconds(dataset), time_axis_of(dataset)
+    seconds = signals.seconds(dataset)
     label = symbol
     if np.nanmax(angle) - np.nanmin(angle) > 2 * np.pi:
         trend = secular(seconds, angle)
         angle = angle - trend.at(seconds)
-        title += f" less its mean motion, {number(trend.rate * axis.unit.seconds / (2 * np.pi), 5)} turns"
-        title += f"/{axis.unit.symbol}"
+        title += f" less its mean motion, {turning(trend.rate)}"
         label = f"{symbol} − line"
     scale, unit = angle_scale(angle)
     lines(axes, dataset, angle[:, None] / scale, [name], (hue,))
