@@ -69,6 +69,7 @@ def root_attributes(
         axes=scene.axes,
         epoch=None if scene.epoch is None else str(scene.epoch),
         time_unit=scene.config.time.unit,
+        recorded=" ".join(variable.name for variable in system.recorded),
         python_loads=" ".join(type(load).__name__ for load in prepared.python_loads),
         cpu_model=provenance.cpu_model(),
         started_at=provenance.now(),

@@ -35,6 +35,8 @@ class RootAttributes(BaseModel):
         tolerance: effective.
         unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back: JSON.
         principal_moments, inertia_tensor: kg m^2.
+        recorded: names of what is recorded along time, drifts and residuals apart: where the config names
+            none, a later version may record more by default.
         python_loads: names of classes.
         axes: what the space axes are, where that is known.
         epoch: time 0, where that is known: date, time and scale.
@@ -83,6 +85,7 @@ class RootAttributes(BaseModel):
     axes: str | None = None
     epoch: str | None = None
     time_unit: str | None = None
+    recorded: str | None = None
     python_loads: str = ""
     cpu_model: Annotated[str, Use.REPEATED]
     started_at: Annotated[str, Use.REPEATED]

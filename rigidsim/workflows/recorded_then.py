@@ -13,17 +13,25 @@ from rigidsim.store import netcdf
 from rigidsim.store.attributes import read_attributes
 
 _WITHOUT_DIRECTIONS = 4
-"""Schema versions below this one recorded neither axes and their angles nor polar motion by default."""
+"""Schema versions below this one recorded neither axes and their angles nor polar motion by default, and don't
+say what they record."""
 
 
 def as_recorded(experiment: Experiment, saved: Path) -> Experiment:
-    """The experiment that records what a file of its run holds, where its config names nothing and the file
-    is of an earlier version; the text stays as it is.
+    """The experiment that records what its run does, where its config names nothing; the text stays as it is.
+
+    Args:
+        saved: a file of the run, which says so, or of an earlier version, which holds it.
     """
-    output = experiment.config.output
-    if output.record is not None or read_attributes(saved).schema_version >= _WITHOUT_DIRECTIONS:
+    output, found = experiment.config.output, read_attributes(saved)
+    if output.record is not None:
         return experiment
-    with netcdf.reading(saved) as file:
-        names = [name for name in OBSERVABLES if isinstance(file.get(name), h5py.Dataset)]
+    if found.recorded:
+        names = [name for name in found.recorded.split() if name in OBSERVABLES]
+    elif found.schema_version < _WITHOUT_DIRECTIONS:
+        with netcdf.reading(saved) as file:
+            names = [name for name in OBSERVABLES if isinstance(file.get(name), h5py.Dataset)]
+    else:
+        return experiment
     config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})
     return replace(experiment, config=config)
