@@ -42,8 +42,8 @@ def event_variables(
             values |= dates.of_times([_exactly(row) for row in zip(*values["time"], strict=True)])
         for variable in variables:
             empty = [np.zeros((0, int(np.prod(variable.shape))))] * variable.parts
-            wrapped = not evaluator.dense and "angle" in variable.attributes
-            more = {"turns": "within one turn"} if wrapped else {}
+            wrapped = "angle" in variable.attributes
+            more = dict.fromkeys(("turns", "angle"), "within one turn") if wrapped else {}
             extras += _extras(crossing.name, variable, values.get(variable.name, empty), count, more)
     return extras
 

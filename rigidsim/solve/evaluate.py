@@ -234,11 +234,10 @@ class Evaluator:
 
     def evaluate_apart(self, block: SampleBlock) -> RecordedParts:
         """As ``evaluate``, for states that aren't among the samples: nothing is joined to them later, and
-        angles that aren't states are within one turn where samples are too sparse to tell their turns.
+        angles that aren't states are within one turn, since what lies between two of them isn't known.
         """
         before = copy.deepcopy(self.continuity)
-        if not self._angles.dense:
-            self.continuity.wrapped_from = -math.inf
+        self.continuity.wrapped_from = -math.inf
         try:
             return self.evaluate(block)
         finally:

@@ -36,7 +36,7 @@ class Continuity:
             before the first block.
         last_time, last_state: of the latest sample, float64, internal units, where turns are counted from it.
         wrapped_from: time (internal units) of the first sample whose turns aren't known: from there on angles
-            are recorded within one turn; nan where all are known.
+            are recorded within one turn; nan where all are known, and -inf apart from the samples.
     """
 
     turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
@@ -127,7 +127,9 @@ class JoinedAngles:
         plain, size = angles.astype(np.float64), np.sqrt(squared)
         times, states = samples.times.astype(np.float64), self._followed.states(samples)
         block = _Block(times, states, plain, size)
-        if self.dense:
+        if known.wrapped_from == -math.inf:  # apart from the samples
+            turns, wrapped_from = np.zeros(angles.shape, dtype=np.int64), known.wrapped_from
+        elif self.dense:
             turns = known.turns[: len(self.columns)] + np.cumsum(self._nearest(known, block), axis=0)
             wrapped_from = known.wrapped_from
         else:
@@ -207,7 +209,7 @@ class JoinedAngles:
         others, steady = self._columns_of(self._others), self._columns_of(self._steady_variables)
         if len(others):
             turns[:, others], wrapped_from = self._counted(known, block, others)
-        if self._steady is not None and known.wrapped_from != -math.inf:
+        if self._steady is not None:
             turns[:, steady] = known.turns[steady] + np.cumsum(self._advanced(known, block, steady), axis=0)
         return turns, wrapped_from
 

@@ -13,7 +13,7 @@ from rigidsim.store import netcdf
 from rigidsim.store.attributes import read_attributes
 
 _WITHOUT_DIRECTIONS = 4
-"""Schema versions below this one recorded neither axes and their angles nor polar motion by default, and don't
+"""Schema versions below this one recorded no axes, angles of axes and polar motion by default, and don't
 say what they record."""
 
 

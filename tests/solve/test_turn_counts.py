@@ -122,6 +122,18 @@ def test_turns_that_nobody_knows_are_not_shown(runs: Path) -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["φ", "θ", "ψ"]
 
 
+def test_angles_at_events_are_within_one_turn_and_say_so(runs: Path) -> None:
+    """Nobody follows the motion from event to event; phi = 0.3 + 2 t."""
+    event = '[[events]]\nname = "level"\nexpression = "wx"'
+    run = run_text(config(SYMMETRIC, PRECESSING, (), "end = 30\nsamples = 301", "", ANGLES, event), runs)
+    found = run.dataset["level_euler_angles"]
+    assert found.sizes["level"] == 3
+    assert found.attrs["turns"] == found.attrs["angle"] == "within one turn"
+    off = found.values[:, 0] - 0.3 - 2 * run.dataset["level_time"].values
+    np.testing.assert_allclose(off, 2 * np.pi * np.rint(off / (2 * np.pi)), atol=1e-10)
+    assert np.abs(found.values).max() <= np.pi
+
+
 def test_turns_of_a_motion_with_switching_surfaces(runs: Path) -> None:
     """Coulomb friction brings the body to rest after 40 turns; a switched torque turns it back and forth."""
     body, start = SYMMETRIC, "angular_velocity = [0, 0, 10]\neuler_angles = [0.2, 1, 0]"
