@@ -71,6 +71,10 @@ TOP = {
     "angular_momentum_axial": ((), "kg m2 s-1", "body axes", True),
     "energy": ((), "J", None, True),
     "potential_energy": ((), "J", None, False),
+    "tilt": ((), "rad", None, False),
+    "precession_angle": ((), "rad", "space axes", False),
+    "spin_angle": ((), "rad", None, False),
+    "tip": (("space_axis",), "m", "space axes", False),
 }
 LABELS = {
     "body_axis": ["x", "y", "z"],
