@@ -6,12 +6,14 @@ from fractions import Fraction
 
 import numpy as np
 
-from rigidsim.session.variables import dates_of, recorded_variables
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.session.lyapunov import LYAPUNOV_NAMES
+from rigidsim.session.variables import dataset_variables, dates_of, recorded_variables
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import EventTimes
-from rigidsim.store.variables import Extra, Variable
+from rigidsim.store.variables import LABELS, Extra, Variable
 
 
 def event_variables(
@@ -46,6 +48,31 @@ def event_variables(
             more = dict.fromkeys(("turns", "angle"), "within one turn") if wrapped else {}
             extras += _extras(crossing.name, variable, values.get(variable.name, empty), count, more)
     return extras
+
+
+def refuse_taken_names(prepared: InitialValueProblem) -> None:
+    """Before a run whose dataset would need one name twice.
+
+    Raises:
+        ConfigError: an event's dimension or variables would be called like something else.
+    """
+    taken = {name for variable in dataset_variables(prepared) for name in variable.part_names()}
+    taken |= {*LABELS, *LYAPUNOV_NAMES, "checkpoint", "events"}
+    dates, variables = dates_of(prepared), recorded_variables(prepared)
+    if dates is not None:
+        variables += dates.variables
+    for crossing in prepared.system.crossings:
+        names = [f"{crossing.name}_{name}" for variable in variables for name in variable.part_names()]
+        double = next((name for name in (crossing.name, *names) if name in taken), None)
+        if double is not None:
+            events = [table.name for table in prepared.scene.config.events]
+            problem = Problem(
+                f"[[events]] number {events.index(crossing.name) + 1} name",
+                f'given "{crossing.name}", by which the dataset would need the name "{double}" twice; choose '
+                "another",
+            )
+            raise ConfigError(problem, prepared.experiment.source)
+        taken.update((crossing.name, *names))
 
 
 def _exactly(parts: tuple[np.ndarray, ...]) -> Fraction:

@@ -77,6 +77,10 @@ def _saved(path: Path, run_id: str) -> Convergence | None:
         return None
 
 
+LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
+"""Of variables and dimensions."""
+
+
 def lyapunov_variables(spectrum: LyapunovSpectrum | None) -> list[Extra]:
     """The convergence of the exponents, as variables of the dataset."""
     if spectrum is None:
@@ -87,7 +91,8 @@ def lyapunov_variables(spectrum: LyapunovSpectrum | None) -> list[Extra]:
         "long_name": "Lyapunov exponents of the scaled states so far, largest first",
         "states": " ".join(spectrum.states),
     }
+    time, index, exponents = LYAPUNOV_NAMES
     return [
-        Extra("lyapunov_time", ("lyapunov_time",), spectrum.times, along),
-        Extra("lyapunov_exponents", ("lyapunov_time", "lyapunov_index"), spectrum.exponents, what),
+        Extra(time, (time,), spectrum.times, along),
+        Extra(exponents, (time, index), spectrum.exponents, what),
     ]

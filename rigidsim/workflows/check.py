@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.solve.problem import prepare
 from rigidsim.store.summary import Caution
@@ -59,6 +60,7 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
     """
     try:
         prepared = prepare(load(path, overrides=overrides))
+        refuse_taken_names(prepared)
     except ConfigError as error:
         return Checked(error.source or str(path), problems=tuple(error.problems))
     scene = prepared.scene

@@ -14,6 +14,7 @@ from rigidsim.accuracy.choice import chosen
 from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
+from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.storage import storage
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.session.variables import dataset_variables
@@ -56,6 +57,7 @@ def plan(
     """
     experiment, choice = chosen(as_experiment(experiment, changes), loads=loads)
     prepared = prepare(experiment, loads=loads)
+    refuse_taken_names(prepared)
     closed, why_not = closed_form_if_any(prepared.scene, driven=bool(loads))
     started = time.perf_counter()
     parts = assemble(prepared)

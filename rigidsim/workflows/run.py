@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 from rigidsim.accuracy.choice import chosen, leaves_choice
 from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import ConfigError
+from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.guards import Observer
 from rigidsim.session.session import Session
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
@@ -113,6 +114,7 @@ def _run(
         if choice is not None:
             session.phases.next("choose")
         prepared = prepare(setting, loads=loads)
+        refuse_taken_names(prepared)
         with _place(prepared, out, setting.text, force=force or beyond is not None) as folder:
             result = session.execute(prepared, folder)
             result, kept = certified(result, setting, choice, session, loads)

@@ -17,10 +17,12 @@ from hypothesis import strategies as st
 from support import EAGER, config, run_text
 
 import rigidsim
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.session.dates import Dates
+from rigidsim.session.event_variables import refuse_taken_names
+from rigidsim.solve.problem import prepare
 from rigidsim.store.seal import seal
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
@@ -195,6 +197,27 @@ def test_earlier_runs_with_an_epoch_lack_dates_and_nothing_else(tmp_path: Path) 
     assert (verdict.differing, verdict.samples) == ([], 9)
     with pytest.raises(RunFolderError, match=r"only runs of versions 4 to"):
         rigidsim.resume(run.folder.path, until="3")
+
+
+@pytest.mark.parametrize(
+    ("events", "double"),
+    [
+        (["julian"], "julian_date"),
+        (["energy"], "energy"),
+        (["time"], "time"),
+        (["body_axis"], "body_axis"),
+        (["flip_time", "flip"], "flip_time"),
+        (["angular"], None),
+    ],
+)
+def test_events_whose_names_are_taken_are_refused(events: list[str], double: str | None) -> None:
+    tables = "".join(FLIP.replace("flip", name) for name in events)
+    prepared = prepare(rigidsim.parse(config(time='end = 2\nepoch = "J2000"', more=tables)))
+    if double is None:
+        refuse_taken_names(prepared)
+        return
+    with pytest.raises(ConfigError, match=f'given "{events[-1]}", by which .* the name "{double}" twice'):
+        refuse_taken_names(prepared)
 
 
 @pytest.mark.compact
