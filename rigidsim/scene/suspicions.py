@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from pydantic import BaseModel
 
 from rigidsim.errors import Problem
+from rigidsim.scene.events import Event
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions import Constant, Name, Operation
 from rigidsim.scene.schema import Config
 from rigidsim.scene.units import time_unit
 from rigidsim.scene.validation_messages import key_path
@@ -24,9 +26,7 @@ def suspicious_angles(config: Config) -> list[Problem]:
     """
     found = []
     for path, numbers in _numbers((), config):
-        beyond = [
-            x for x in numbers if x.assumed == "rad" and not x.pi_power and abs(x.rational) > 2 * math.pi
-        ]
+        beyond = [x for x in numbers if x.assumed == "rad" and not x.pi_power and abs(x.rational) > _TURN]
         if beyond:
             given, degrees = (
                 ", ".join(f"{value:.6g}" for value in values)
@@ -61,6 +61,26 @@ def suspicious_end(config: Config) -> list[Problem]:
             f'"{given} {unit}" if that is meant, "{given} s" if not',
         )
     ]
+
+
+def unreachable_events(events: Sequence[Event]) -> list[Problem]:
+    """Events that can't happen, since the middle Euler angle, from 0 to pi or -pi/2 to pi/2, is compared with
+    a number beyond that: meant in degrees?
+    """
+    found = []
+    for number, event in enumerate(events):
+        root = event.expression.root
+        parts = root.operands if isinstance(root, Operation) and root.operator == "sum" else ()
+        constants = [float(part.value) for part in parts if isinstance(part, Constant)]
+        names = [part.name for part in parts if isinstance(part, Name)]
+        if len(parts) == 2 and names == ["theta"] and constants and abs(constants[0]) > math.pi:
+            where = f"[[events]] number {number + 1} expression"
+            what = (
+                f'given "{event.expression.text}", which is never zero: theta is from 0 to pi rad, or from '
+                f'-pi/2 to pi/2; write "{abs(constants[0]):.6g} deg" if degrees are meant'
+            )
+            found.append(Problem(where, what))
+    return found
 
 
 def _numbers(path: Path, value: object) -> Iterator[tuple[Path, list[ExactNumber]]]:

@@ -8,7 +8,7 @@ from rigidsim.look.readable_time import TimeWords
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.suspicions import suspicious_angles, suspicious_end
+from rigidsim.scene.suspicions import suspicious_angles, suspicious_end, unreachable_events
 from rigidsim.store.summary import Caution, WarningCode
 from rigidsim.store.summary_fields import Three
 from rigidsim.store.understood import Body, Span, Start
@@ -66,6 +66,7 @@ def cautions_of(scene: Scene) -> list[Caution]:
     """What may be meant otherwise than it was understood, known before anything is run."""
     found = [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(p)) for p in suspicious_angles(scene.config)]
     found += [Caution(WarningCode.TIME_WITHOUT_UNIT, str(p)) for p in suspicious_end(scene.config)]
+    found += [Caution(WarningCode.NEVER_HAPPENS, str(p)) for p in unreachable_events(scene.events)]
     if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
         found.append(
             Caution(

@@ -45,6 +45,7 @@ class WarningCode(Enum):
     NOT_CERTIFIED = "not_certified"
     ANGLE_WITHOUT_UNIT = "angle_without_unit"
     EPHEMERIS_OF_EARTH = "ephemeris_of_earth"
+    NEVER_HAPPENS = "never_happens"
     TIME_WITHOUT_UNIT = "time_without_unit"
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from rich.console import Console
 
-from rigidsim.cli.understood import body_text, start_text, time_text
+from rigidsim.cli import tables
+from rigidsim.cli.understood import body_text, start_text, time_text, understood
 from rigidsim.scene.config import parse
 from rigidsim.scene.scene import build_scene
 from rigidsim.session.understood import body_of, span_of, start_of
@@ -89,3 +92,20 @@ def test_run_and_info_and_plan_say_it(degrees: str, rigidsim_command: Command) -
         "start_s": 0.0, "end_s": 3.0, "samples": 49, "every_s": 0.0625, "epoch": "", "unit": ""
     }  # fmt: skip
     assert of_run["warning_codes"][0] == of_plan["warning_codes"][0] == "angle_without_unit"
+
+
+def test_it_reads_well_at_80_columns_without_colour() -> None:
+    text = (
+        'name = "w"\nbody = {points = [{mass = 1, position = [1, 2, 3]}, {mass = 2, position = [-3, 1, 1]}, '
+        "{mass = 3, position = [0, 1, -2]}]}\ninitial = {angular_velocity = [0.123456, 1, 2], "
+        "position = [7e6, 1, 2]}\ntime.end = 1\n"
+    )
+    scene = build_scene(parse(text))
+    out = io.StringIO()
+    parts = body_of(scene), start_of(scene), span_of(scene)
+    tables.print_understood(*parts, Console(file=out, width=80, highlight=False))
+    lines = out.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "\x1b" not in out.getvalue()
+    words = [word for _, told in understood(*parts) for word in told.split()]
+    assert [word for line in lines for word in line[9:].split()] == words  # beside the labels

@@ -99,3 +99,20 @@ def test_an_end_meant_in_the_unit_of_times_is_pointed_out(time: str, said: str) 
         problem.startswith("[time] end: given 30 without a unit") and said in problem for problem in problems
     )
     assert [caution.text for caution in cautions_of(build_scene(experiment))] == problems
+
+
+@pytest.mark.parametrize(
+    ("expression", "codes"),
+    [
+        ("theta - 90", ["never_happens"]),
+        ("-90 + theta", ["never_happens"]),
+        ("theta - 90 deg", []),
+        ("theta - 3", []),
+        ("psi - 90", []),  # outer angles keep their turns
+        ("theta*t - 90", []),
+    ],
+)
+def test_events_that_never_happen(expression: str, codes: list[str]) -> None:
+    text = CONFIG.format(angles="[0, 1, 0]", inclination="0", anomaly="0")
+    scene = build_scene(parse(f'{text}\n[[events]]\nname = "level"\nexpression = "{expression}"\n'))
+    assert [caution.code.value for caution in cautions_of(scene)] == codes
