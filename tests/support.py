@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,11 +46,20 @@ EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadru
 
 
 def run_text(
-    text: str, out: Path, *overrides: str, timeline: bool = False, tuning: Tuning | None = None
+    text: str,
+    out: Path,
+    *overrides: str,
+    timeline: bool = False,
+    estimate: bool = False,
+    tuning: Tuning | None = None,
 ) -> rigidsim.SavedRun:
-    """Run a config text, without drawing unless asked for."""
-    settings = [f"output.timeline={str(timeline).lower()}", *overrides]
+    """Run a config text, without drawing, and without estimating its errors, unless asked for."""
+    asked = {"timeline": timeline, "estimate": estimate}
+    settings = [*(f"output.{key}={str(value).lower()}" for key, value in asked.items()), *overrides]
     return rigidsim.run(rigidsim.parse(text, overrides=settings), out=out, force=True, tuning=tuning)
+
+
+run_estimated = partial(run_text, estimate=True)
 
 
 def tried(text: str, given: str | int = "double", formulation: str = "quaternion", *overrides: str) -> Trial:
@@ -134,6 +144,7 @@ def config(
     more: str = "",
     *,
     name: str = "scene",
+    estimate: bool = False,
 ) -> str:
     """The text of a config, without a timeline; by default of an asymmetric free body.
 
@@ -141,7 +152,10 @@ def config(
         body: the lines of ``[body]``; ``initial``, ``time``, ``integrator`` and ``output`` likewise.
         loads: of one load, or of each.
         more: further tables as they stand.
+        estimate: whether its errors are estimated, which is the larger part of short runs.
     """
+    if "estimate" not in output + more:
+        output = f"estimate = {str(estimate).lower()}\n{output}"
     tables = "".join(
         f"[[loads]]\n{load}\n" for load in ([loads] if isinstance(loads, str) else loads) if load
     )

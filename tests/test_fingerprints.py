@@ -13,7 +13,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -41,17 +40,16 @@ def shortened(path: Path) -> list[str]:
     spacing = f"time.samples={ROWS}"
     if config.config.time.every is not None:
         spacing = f"time.every={(end - start) / (ROWS - 1)!r}"
-    return [f"time.end={end!r}", spacing, "output.timeline=false", "output.lyapunov=false"]
+    return [f"time.end={end!r}", spacing, "output.estimate=false", "output.lyapunov=false"]
 
 
 def numbers(path: Path) -> dict[str, np.ndarray]:
     """Every variable of a shortened run."""
-    with tempfile.TemporaryDirectory() as folder:
-        run = rigidsim.run(rigidsim.load(path, overrides=shortened(path)), out=folder)
-        assert run.status == "finished"
-        with run.dataset as dataset:
-            names = [str(n) for n in dataset.variables if dataset[n].dtype == np.float64]
-            return {name: np.asarray(dataset[name].values) for name in names if "time" in dataset[name].dims}
+    run = rigidsim.run(rigidsim.load(path, overrides=shortened(path)), out=None)
+    assert run.status == "finished"
+    dataset = run.dataset
+    names = [str(n) for n in dataset.variables if dataset[n].dtype == np.float64]
+    return {name: np.asarray(dataset[name].values) for name in names if "time" in dataset[name].dims}
 
 
 def fingerprint(path: Path) -> dict[str, list[str]]:

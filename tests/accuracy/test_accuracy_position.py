@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import config, run_text
+from support import config
+from support import run_estimated as run_text
 
 import rigidsim
 from rigidsim.accuracy.choice import wanted

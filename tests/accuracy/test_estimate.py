@@ -7,7 +7,8 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from support import IMPATIENT, angles_between, config, run_text
+from support import IMPATIENT, angles_between, config
+from support import run_estimated as run_text
 
 import rigidsim
 from rigidsim.accuracy.estimate import estimate_errors

@@ -6,7 +6,8 @@ import math
 from pathlib import Path
 
 import pytest
-from support import config, run_text
+from support import config
+from support import run_estimated as run_text
 
 import rigidsim
 from rigidsim.accuracy.error_law import motion_growth

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
-from support import run_text
+from support import run_estimated as run_text
 
 pytestmark = pytest.mark.compact
 

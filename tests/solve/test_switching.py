@@ -304,7 +304,7 @@ def test_the_announced_error_knows_the_sides(runs: Path) -> None:
         f'kind = "torque"\ncomponents = [{torque}]',
         "end = 20\nsamples = 3",
     )
-    run = run_text(text, runs)
+    run = run_text(text, runs, estimate=True)
     truth = try_setting(rigidsim.parse(text), Setting("extended"), compact=True)
     dataset = run.dataset
     error = angles_between([dataset["quaternion"].values], truth.attitudes)[-1]
