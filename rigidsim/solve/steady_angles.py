@@ -62,4 +62,4 @@ class SteadyAngles:
             found = [r.steady for r in system.recorded if r.name in names]
             rates = [rate for steady in found if steady is not None for rate in steady.rates]
             self._function = hy.cfunc(rates, system.variables, compact_mode=True)
-        return np.asarray(self._function(place.state, time=place.time))
+        return np.asarray(self._function(np.ascontiguousarray(place.state), time=place.time))
