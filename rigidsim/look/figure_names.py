@@ -3,6 +3,9 @@
 OVERVIEW = "overview"
 """The page that suits the scene."""
 
+SPECTRUM = "spectrum"
+"""Drawn of a run's analysis: ``rigidsim.look.spectrum``."""
+
 FIGURES: dict[str, str] = {
     OVERVIEW: "the page that suits the scene: its leading figures, drifts and a table (the default)",
     "polar_motion": "the spin axis about the figure axis: circle, period, m1 and m2 over time",
@@ -16,5 +19,6 @@ FIGURES: dict[str, str] = {
     "path": "path of the centre of mass",
     "rates": "angular velocity over time",
     "attitude": "Euler angles, or the body's z axis in space, over time",
+    SPECTRUM: "amplitude spectra of what the scene is about, their lines labelled (analyses the run first)",
     "drift": "drifts of invariants over the band that rounding explains",
 }

@@ -365,6 +365,8 @@ def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetr
         match="needs libration, roll_pitch_yaw or nadir recorded, which this run hasn't; it has overview",
     ):
         figures.figure(symmetric_top(), "libration")
+    with pytest.raises(ValueError, match=r"spectrum_figure\(rigidsim\.analyse\(run\)\.dataset\)"):
+        figures.figure(symmetric_top(), "spectrum")
     rates = symmetric_top()[["angular_velocity"]].assign_attrs(symmetric_top().attrs)
     assert figures.available(rates) == ["overview", "polhode", "rates"]
 

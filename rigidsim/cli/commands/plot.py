@@ -9,7 +9,7 @@ import typer
 
 from rigidsim.cli.options import RunPath
 from rigidsim.errors import RigidsimError
-from rigidsim.look.figure_names import FIGURES, OVERVIEW
+from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
 
 ALL = "all"
 
@@ -33,8 +33,10 @@ def plot(
 ) -> None:
     """Draw the page that suits the scene, or the figures named."""
     from rigidsim.look.figures import available, check_name, figure_format, save_figure
+    from rigidsim.look.spectrum import save_spectrum
     from rigidsim.store import atomic
     from rigidsim.store.run import open_run
+    from rigidsim.workflows.analyse import analyse
 
     opened = open_run(run_path)
     wanted = list(dict.fromkeys(what or [OVERVIEW]))
@@ -58,7 +60,10 @@ def plot(
                     target = target if out is None else out / target.name
                 file_format = figure_format(target)
                 with atomic.replacing(target) as new:
-                    save_figure(dataset, new, name, file_format=file_format)
+                    if name == SPECTRUM:
+                        save_spectrum(analyse(opened).dataset, new, file_format=file_format)
+                    else:
+                        save_figure(dataset, new, name, file_format=file_format)
                 print(target)
         except ValueError as error:
             raise RigidsimError(str(error)) from None

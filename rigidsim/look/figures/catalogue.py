@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.look.figure_names import FIGURES, OVERVIEW
+from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
 from rigidsim.look.figures import drift, flight, poles, polhode, signals, timelines
 from rigidsim.look.figures.composing import Panel, compose, has, shown_rows
 from rigidsim.look.roles import drifts
@@ -162,6 +162,11 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     check_name(what)
     if what == OVERVIEW:
         return overview(dataset)
+    if what == SPECTRUM:
+        raise ValueError(
+            "figure 'spectrum': is drawn of an analysis: rigidsim.look.spectrum.spectrum_figure("
+            "rigidsim.analyse(run).dataset)"
+        )
     kind = KINDS[what]
     if not kind.shows(shown_rows(dataset).rows):
         raise ValueError(

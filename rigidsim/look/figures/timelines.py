@@ -163,7 +163,7 @@ def longitude(axes: Axes, dataset: xarray.Dataset) -> None:
     scale, unit = angle_scale(table)
     hues = [AXIS_COLORS[name] for name in shown]
     lines(axes, dataset, table / scale, [f"{name} axis" for name in shown], hues)
-    rate = angle_text(trend.rate * axis.unit.seconds, 5)
+    rate = angle_text(trend.rate * axis.unit.seconds, 3)
     key(axes, f"Longitude of the node less its mean motion, {rate}/{axis.unit.symbol}")
     axes.set_ylabel(f"longitude − line [{unit}]")
 
