@@ -217,9 +217,13 @@ class JoinedBlocks(Mapping[str, Sequence[np.ndarray]]):
         self._parts = {v.name: v.parts for v in variables}
 
     def __getitem__(self, name: str) -> list[np.ndarray]:
-        return [
-            np.concatenate([block[name][part] for block in self._blocks]) for part in range(self._parts[name])
-        ]
+        return [self._column(name, part) for part in range(self._parts[name])]
+
+    def _column(self, name: str, part: int) -> np.ndarray:
+        """Row by row in memory, as it stands in a file; blocks come column by column."""
+        pieces = [block[name][part] for block in self._blocks]
+        rows = sum(len(piece) for piece in pieces)
+        return np.concatenate(pieces, out=np.empty((rows, *pieces[0].shape[1:])))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._parts)
