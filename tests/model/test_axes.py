@@ -162,3 +162,31 @@ def test_axes_and_planes_that_a_scene_has_not_are_refused(
     (problem,) = refused.value.problems
     assert problem.where == where
     assert what in problem.what
+
+
+def test_a_source_of_an_ephemeris_lends_the_ecliptic_of_date(runs: Path) -> None:
+    """It turns towards the equator of J2000 by 46.81 arcsec a century (IAU 2006: Q_A's first term)."""
+    load = 'kind = "gravity_gradient"\ngravitational_parameter = "1.327e20 m^3/s^2"\nephemeris = "sun"\n'
+    start = 'angular_velocity = [0, 0, "1e-3 rad/s"]\neuler_angles = [0, "-84381.406 arcsec", 0]'
+    text = config("principal_moments = [1, 1, 1.000000001]", start, load, 'end = "1 day"\nsamples = 2', "",
+                  'record = ["obliquity"]\nestimate = false\n[frame]\nreference = "orbit"')  # fmt: skip
+    obliquity = np.degrees(run_text(text, runs).dataset["obliquity"].values[:, 0]) * 3600
+    assert obliquity[0] == pytest.approx(84381.406, abs=1e-9)
+    assert np.diff(obliquity)[0] * 36525 == pytest.approx(-46.811, abs=1e-3)
+
+
+def test_a_body_in_flight_has_the_plane_of_its_own_path(runs: Path) -> None:
+    body = "principal_moments = [1, 1.2, 1.5]\nmass = 1"
+    start = "angular_velocity = [0.1, 0.2, 0.3]\nposition = [10, 0, 0]\nvelocity = [0, 0.2, 0.25]"
+    load = 'kind = "central_gravity"\ngravitational_parameter = 1'
+    names = 'record = ["obliquity", "andoyer_momenta", "position", "velocity", "angular_momentum"]'
+    found = run_text(
+        config(body, start, load, "end = 5\nsamples = 3", "", f'{names}\n[frame]\nreference = "orbit"'), runs
+    ).dataset
+    normal = np.cross(found["position"].values, found["velocity"].values)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    along = (normal * found["angular_momentum"].values).sum(axis=1)
+    momenta = found["andoyer_momenta"].values
+    np.testing.assert_allclose(momenta[:, 2], along, rtol=1e-13)
+    tilt = found["obliquity"].sel(axis="momentum").values
+    np.testing.assert_allclose(np.cos(tilt), along / momenta[:, 1], rtol=1e-12)

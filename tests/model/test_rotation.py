@@ -136,3 +136,24 @@ def test_what_is_recorded_by_default() -> None:
     assert not names(body, "angular_velocity = [0.5, 0, 1]") & (axial | planet)
     assert not names(body, "angular_velocity = [0, 0, 1]") & (axial | planet)
     assert not names(body, "angular_velocity = [0, 0, 0.001]", sun) & (axial | planet)
+
+
+def test_turns_go_on_where_a_run_is_resumed(runs: Path) -> None:
+    """Told by rates, and counted along the motion: the same bits as in one go."""
+    body, start = "principal_moments = [1, 1.02, 1.04]", 'angular_velocity = ["0.01", 0, 1]'
+    start += '\neuler_angles = [0.2, "23 deg", 0]'
+    load = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 100}'
+    output = 'record = ["node_longitude", "rotation_angle", "andoyer_angles"]'
+    text = config(body, start, load, "end = 3000\nsamples = 31", "", output)
+    whole = loaded(run_text(text, runs, 'name="whole"'))
+    part = run_text(text, runs, 'name="part"', "limits.max_steps=1000")
+    assert part.status == "stopped: max_steps"
+    resumed = loaded(rigidsim.resume(part.folder.path, overrides=["limits.max_steps=100000"]))
+    for name in ("node_longitude", "rotation_angle", "andoyer_angles"):
+        np.testing.assert_array_equal(resumed[name].values, whole[name].values)
+    assert whole["rotation_angle"].values[-1] > 2900
+    prepared = prepare(rigidsim.parse(text))
+    evaluator = assemble(prepared).evaluator
+    assert evaluator.sparse  # g and l are followed
+    dense = loaded(run_text(text, runs, 'name="dense"', "time.samples=6001"))
+    np.testing.assert_array_equal(dense["rotation_angle"].values[::200], whole["rotation_angle"].values)
