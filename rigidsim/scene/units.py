@@ -12,7 +12,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any, TypeAlias
 
-from rigidsim.scene.validation_messages import nearest
+from rigidsim.scene.validation_messages import nearest, shown
 
 _DEFINITIONS = """
 yocto- = 1e-24 = y-
@@ -98,17 +98,17 @@ def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
     factors = any(not start.endswith(("^", "**")) for start in before)  # a unit has numbers as exponents only
     unusual = not _UNIT_TEXT.fullmatch(text) or _TOWER.search(text) or factors
     if unusual or any(e > _LARGEST_EXPONENT for e in exponents):
-        raise UnitError(f'"{text}" is not a unit')
+        raise UnitError(f"{shown(text)} is not a unit")
     try:
         unit = _registry().parse_units(text.replace("·", "*"))
         if any(abs(power) > _LARGEST_EXPONENT for power in unit._units.values()):  # such as m^1e9
-            raise UnitError(f'"{text}" is not a unit')
+            raise UnitError(f"{shown(text)} is not a unit")
         quantity = _registry().Quantity(Fraction(1), unit).to_root_units()
     except pint.UndefinedUnitError as error:
         near = nearest(str(error.args[0]).lower(), _names())
         raise UnitError(f'unknown unit "{error.args[0]}"{near}; {known_units()}') from None
     except Exception:  # pint and its tokenizer raise many kinds on malformed text
-        raise UnitError(f'"{text}" is not a unit') from None
+        raise UnitError(f"{shown(text)} is not a unit") from None
     powers = {str(name): Fraction(power) for name, power in quantity._units.items()}
     pi_power = powers.pop("pi", Fraction(0))
     powers.pop("radian", None)
