@@ -30,6 +30,8 @@ STUDIES = (
     "free_flight_energy",
     "bodies_table",
     "luni_solar_precession",
+    "precession_and_nutation",
+    "spectral_lines",
     "hyperion",
 )
 

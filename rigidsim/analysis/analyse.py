@@ -98,7 +98,7 @@ def analyse_dataset(
 
 
 def _raw(signal: Signal, clock: Clock, lines: int, floor: float, order: int | None) -> _Raw:
-    samples = signal.samples(clock.context)
+    samples = signal.samples(clock)
     found = decompose(samples, lines, signal.degree, floor, order)
     per_sample = 2 * clock.context.pi / clock.spacing
     finest = 2.0**-clock.bits  # of the spacing

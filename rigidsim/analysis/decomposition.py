@@ -39,12 +39,15 @@ class Samples:
         real: whether imaginary parts are zero by nature.
         bits: of the precision.
         context: mpmath context with more digits than that.
+        late: by how much of a spacing samples are later than equidistant ones, (n,): times are rounded, in a
+            pattern that would show up as lines.
     """
 
     parts: tuple[tuple[Reals, Reals], ...]
     real: bool
     bits: int
     context: Any
+    late: Reals | None = None
 
     @property
     def count(self) -> int:
@@ -206,7 +209,10 @@ def mirrored(total: Sum, real: bool) -> Sum:
 
 def remainder(samples: Samples, total: Sum) -> Complexes:
     """What is left of a signal, in double precision."""
-    left = mirrored(total, samples.real).left_of(samples.parts, samples.bits)
+    whole = mirrored(total, samples.real)
+    left = whole.left_of(samples.parts, samples.bits)
+    if samples.late is not None and samples.bits <= 53 and (whole.frequencies or whole.polynomial):
+        left = left - samples.late * whole.slope().values()
     return np.asarray(left.real + 0j if samples.real else left, dtype=np.complex128)
 
 

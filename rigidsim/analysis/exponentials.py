@@ -112,6 +112,18 @@ class Sum:
             flat = flat + np.polynomial.polynomial.polyval(x, [complex(c) for c in self.polynomial])
         return np.asarray(flat)
 
+    def slope(self) -> Sum:
+        """The derivative, per sample."""
+        context = self.context
+        turn = context.mpc(0, 2 * context.pi)
+        return Sum(
+            context,
+            self.count,
+            tuple(2 * m * c / self.count for m, c in enumerate(self.polynomial) if m),
+            self.frequencies,
+            tuple(turn * f * a for f, a in zip(self.frequencies, self.amplitudes, strict=True)),
+        )
+
     def left_of(self, parts: Sequence[tuple[Reals, Reals]], bits: int) -> Complexes:
         """A signal less this sum, in double precision.
 

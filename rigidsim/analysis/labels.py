@@ -166,12 +166,16 @@ class _Candidates:
         ranking = np.argsort(cost, kind="stable")
         found, cost = found[ranking], cost[ranking]
         best = found[0]
+        if blended:  # a blend lies next to the strongest of its lines
+            simple = found[cost <= cost[0] + _RIVALS]
+            best = simple[np.argmin(np.abs(self.observed[simple] - frequency))]
         if self._by_chance(frequency, float(allowed[best]), int(cost[0])) > _CHANCE:
             return Label()
         rivals = [
             n
-            for n, c in zip(found[1:], cost[1:], strict=True)
-            if not _same(vectors[n], vectors[best], real)
+            for n, c in zip(found, cost, strict=True)
+            if n != best
+            and not _same(vectors[n], vectors[best], real)
             and (c <= cost[0] + _RIVALS if turns[n] != turns[best] else c == cost[0] and not blended)
         ]
         others = tuple(named(vectors[n].tolist(), known) for n in rivals[:4])

@@ -50,6 +50,7 @@ class Clock:
         start, spacing: mpf, s.
         count: how many.
         bits: of the precision of the times.
+        late: what their rounding adds to equidistant times, in spacings, (n,); None beyond double precision.
     """
 
     start: Any
@@ -57,6 +58,7 @@ class Clock:
     count: int
     bits: int
     context: Any
+    late: Reals | None = None
 
     @property
     def middle(self) -> Any:
@@ -99,7 +101,21 @@ def clock_of(dataset: xarray.Dataset) -> Clock:
     first, last = (sum((context.mpf(float(p[n])) for p in parts), context.zero) for n in (0, -1))
     spacing = (last - first) / (count - 1)
     _refuse_uneven(parts[0], float(first), float(spacing))
-    return Clock(first, spacing, count, bits, context)
+    late = _late(parts[0], first, spacing) if len(parts) == 1 else None
+    return Clock(first, spacing, count, bits, context, late)
+
+
+def _late(times: Reals, first: Any, spacing: Any) -> Reals:
+    """By how much of a spacing each time is later than ``first + n spacing``, to some digits."""
+    # of the spacing's 53 bits the first 28 times any number of samples are exact, the others are small
+    exponent = 28 - math.frexp(float(spacing))[1]
+    head = math.ldexp(round(math.ldexp(float(spacing), exponent)), -exponent)
+    number = np.arange(len(times), dtype=np.float64)
+    elapsed = times - float(first)
+    # what the subtraction rounds off (Moller & Knuth)
+    back = elapsed - times
+    lost = (times - (elapsed - back)) - (float(first) + back)
+    return ((elapsed - number * head) + lost - number * float(spacing - head)) / float(spacing)
 
 
 def _refuse_uneven(times: Reals, first: float, spacing: float) -> None:
@@ -148,7 +164,7 @@ class Signal:
     dataset: xarray.Dataset
     components: tuple[dict[str, Any], ...]
 
-    def samples(self, context: Any) -> Samples:
+    def samples(self, clock: Clock) -> Samples:
         """All values.
 
         Raises:
@@ -167,7 +183,7 @@ class Signal:
                 f"{self.name}: not all samples are finite; analyse needs a part without gaps, for instance "
                 "dataset.isel(time=slice(0, 1000))"
             )
-        return Samples(tuple(parts), self.real, bits_of(self.dataset, len(parts)), context)
+        return Samples(tuple(parts), self.real, bits_of(self.dataset, len(parts)), clock.context, clock.late)
 
     @property
     def in_body(self) -> bool:

@@ -183,17 +183,19 @@ def _annotate(axes: Any, x: np.ndarray, y: np.ndarray, texts: Sequence[str], unf
     frame = axes.get_window_extent()
     points = axes.transData.transform(np.column_stack([x, y])) if len(x) else np.empty((0, 2))
     for n in np.argsort(-y)[:_MOST_LABELS].tolist():
+        label = axes.annotate(
+            texts[n], (x[n], y[n]), xytext=(0, 0), textcoords="offset points", ha="center", va="bottom",
+            fontsize=7.5, color=_FOLDED if unfolded[n] else "#1b2733", linespacing=1.05,
+        )  # fmt: skip
+        lowest = label.get_window_extent().expanded(1.03, 1.06)
         for lift in range(4, 160, 4):
-            label = axes.annotate(
-                texts[n], (x[n], y[n]), xytext=(0, lift), textcoords="offset points", ha="center",
-                va="bottom", fontsize=7.5, color=_FOLDED if unfolded[n] else "#1b2733", linespacing=1.05,
-            )  # fmt: skip
-            box = label.get_window_extent().expanded(1.03, 1.06)
+            box = lowest.translated(0, lift * figure.dpi / 72)
             inside = box.x0 >= frame.x0 and box.x1 <= frame.x1 and box.y1 <= frame.y1
-            hits_line = any(
+            covers = any(
                 box.x0 <= px <= box.x1 and py >= box.y0 for k, (px, py) in enumerate(points) if k != n
             )
-            if inside and not hits_line and not any(box.overlaps(other) for other in taken):
+            if inside and not covers and not any(box.overlaps(other) for other in taken):
+                label.xyann = (0, lift)
                 taken.append(box)
                 if lift > 14:
                     axes.annotate(
@@ -201,4 +203,5 @@ def _annotate(axes: Any, x: np.ndarray, y: np.ndarray, texts: Sequence[str], unf
                         arrowprops={"arrowstyle": "-", "color": "#b0b7be", "linewidth": 0.6},
                     )  # fmt: skip
                 break
+        else:
             label.remove()

@@ -7,7 +7,9 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+import xarray
 
+import rigidsim
 from rigidsim.analysis.decomposition import Found, Samples, decompose
 from rigidsim.analysis.exponentials import Sum
 
@@ -100,6 +102,16 @@ def test_beyond_double_precision_as_many_digits_are_right_as_samples_have(real: 
     assert max(row[0] for row in rows[:5]) < 1e-28
     assert max(row[1] for row in rows) < 1e-33
     assert abs(found.sum.polynomial[1].real - 3) < 1e-32
+
+
+def test_rounded_sample_times_make_no_lines() -> None:
+    # multiples of 0.1237 as doubles are off by a pattern of up to 1e-16 of the time: 1e-12 of a phase
+    time = np.arange(60000) * 0.1237
+    values = np.cos(8.1 * np.asarray(time, dtype=np.longdouble)).astype(float)
+    dataset = xarray.Dataset({"angle": ("time", values)}, coords={"time": time})
+    signal = rigidsim.analyse(dataset, lines=10)["angle"]
+    assert len(signal.lines) == 1
+    assert abs(signal.lines[0].frequency - 8.1) < 1e-15 * 8.1
 
 
 def test_quadruple_samples_of_few_periods() -> None:

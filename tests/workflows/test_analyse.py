@@ -14,22 +14,22 @@ from support import config, run_text
 from typer.testing import CliRunner
 
 import rigidsim
-from experiments.closed_forms import free_top
+from experiments.spectral_lines import Case, free
 from rigidsim.analysis.result import Analysis
 from rigidsim.cli.app import app
 from rigidsim.errors import RigidsimError
 
-MOMENTS, RATES = (3, 2, 1), ("0.3", "0.2", "1")
+MOMENTS, RATES = ["3", "2", "1"], ["0.3", "0.2", "1"]
 
 
-def tumbling(periods: float, precision: str, every: str, tmp_path: Path) -> tuple[rigidsim.Run, Any]:
+def tumbling(periods: float, precision: str, every: str, tmp_path: Path) -> tuple[rigidsim.Run, Case]:
     """A free asymmetric body in closed form, and its elliptic functions by mpmath."""
     with mpmath.workdps(60):
-        exact = free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(w) for w in RATES])
+        exact = free("tumbling", MOMENTS, RATES, "", 1)
         end = mpmath.nstr(periods * exact.period, 12)
         text = config(
-            f"principal_moments = {list(MOMENTS)}",
-            f"angular_velocity = {[*map(str, RATES)]}".replace("'", '"'),
+            exact.body,
+            exact.initial,
             time=f"end = {end}\nevery = {every}",
             integrator=f'precision = "{precision}"\nmethod = "closed_form"',
             output='record = ["angular_velocity", "quaternion"]\nestimate = false',
@@ -37,9 +37,9 @@ def tumbling(periods: float, precision: str, every: str, tmp_path: Path) -> tupl
         return run_text(text, tmp_path), exact
 
 
-def wrong(analysis: Analysis, exact: Any, share: float) -> list[float]:
+def wrong(analysis: Analysis, exact: Case, share: float) -> list[float]:
     """Relative errors of the frequencies of lines above a share of their signal's strongest, by labels."""
-    rates = {"wobble": 2 * mpmath.pi / exact.period, "precession": exact.precession}
+    rates = exact.exact
     errors = []
     for signal in analysis.signals:
         for line in signal.lines:
