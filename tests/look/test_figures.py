@@ -501,3 +501,5 @@ def test_figure_axis_is_that_of_symmetry_or_of_the_largest_moment(symmetric_top:
     np.testing.assert_array_equal(
         signals.figure_direction(dataset.assign_attrs(principal_axes=turned)), [1.0, 0.0, 0.0]
     )
+    asked = dataset.assign_attrs(config='[frame]\nfigure_axis = "y"\n')
+    np.testing.assert_array_equal(signals.figure_direction(asked), [0.0, 1.0, 0.0])

@@ -97,15 +97,16 @@ def near_axis(dataset: xarray.Dataset) -> bool:
 
 
 def figure_direction(dataset: xarray.Dataset) -> Array:
-    """Unit vector (3,) of the figure axis in body axes: of symmetry, else of the largest moment."""
-    said = _attribute(dataset, "figure_axis_direction")
-    if said is not None and said.shape == (3,):
-        return said
+    """Unit vector (3,) of the figure axis in body axes: as asked, else of symmetry or the largest moment."""
+    frame: Any = read_config(dataset).get("frame", {})
+    asked = frame.get("figure_axis") if isinstance(frame, dict) else None
+    if asked in ("x", "y", "z"):
+        return np.asarray(np.eye(3)["xyz".index(asked)])
     found = moments(dataset)
     if found is None:
         return np.array([0.0, 0.0, 1.0])
     axes = principal_axes(dataset)
-    return np.asarray(axes[figure_index(found)])
+    return np.asarray(axes[int(found.argmax()) if asked == "largest" else figure_index(found)])
 
 
 def figure_index(found: Array) -> int:
