@@ -184,6 +184,7 @@ def _line(base: Parts, step: Parts, index: np.ndarray) -> tuple[np.ndarray, np.n
     high, rest = _sum(a0, index * b0)
     middle, rest_of_middle = _sum(a1, index * b1)
     low, rest_of_low = _sum(rest, middle)
+    high, low = _sum(high, low)  # before: the second is up to 2^-36 of the first, whose bits it shares
     return _sum(high, low + ((rest_of_middle + rest_of_low) + (a2 + index * b2)))
 
 
