@@ -172,9 +172,16 @@ def _line(raw: _Raw, clock: Clock, known: Sequence[Known], n: int) -> Line:
     real = raw.signal.real
     if real and observed < 0:
         observed, amplitude = -observed, context.conj(amplitude)
-    blend = _BLEND * 2 * math.pi / float(clock.length)
+    resolution = 2 * math.pi / float(clock.length)
     name = label(
-        float(observed), error, known, clock.nyquist, real=real, in_body=raw.signal.in_body, blend=blend
+        float(observed),
+        error,
+        known,
+        clock.nyquist,
+        real=real,
+        in_body=raw.signal.in_body,
+        blend=_BLEND * resolution,
+        resolution=resolution,
     )
     frequency = observed + 2 * name.folds * context.pi / clock.spacing
     phase = context.arg(amplitude) - frequency * clock.middle

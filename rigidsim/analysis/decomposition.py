@@ -25,6 +25,7 @@ _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
 _SEARCH_ORDERS = (3, 1)  # of the window while lines are looked for; the second where some are close
 _NEAREST = 1.0  # bins between lines that can be told apart
 _MOST_CANDIDATES = 40  # peaks that may be no lines, before there are none
+_CLOSEST = 0.6  # bins to which they may move
 _STEPS = 3  # of Newton's method after each new line
 _MOST_STEPS = 25
 _HIGHEST_ORDER = 10
@@ -103,6 +104,15 @@ def decompose(samples: Samples, lines: int, degree: int, floor: float, order: in
     total = search.total
     final = order or _final_order(total, samples.real)
     total = refined(double, total, final)
+    while (weaker := _merged(total, samples.real)) is not None:
+        search.close.append(float(total.frequencies[weaker]))
+        kept = [n for n in range(len(total.frequencies)) if n != weaker]
+        total = replace(
+            total,
+            frequencies=tuple(total.frequencies[n] for n in kept),
+            amplitudes=tuple(total.amplitudes[n] for n in kept),
+        )
+        total = refined(double, total, final)
     if samples.bits > 53:
         total = refined(samples, total, final)
     return _judged(samples, total, final, search)
@@ -123,6 +133,20 @@ def _places(total: Sum, real: bool) -> Reals:
     """Frequencies in bins, mirror images among them."""
     own = np.array([float(f) for f in total.frequencies]) * total.count
     return np.concatenate([own, -own]) if real else own
+
+
+def _merged(total: Sum, real: bool) -> int | None:
+    """The weaker of two lines that have moved to one place, or one that has moved to the secular part."""
+    lines = len(total.frequencies)
+    places = _places(total, real)
+    sizes = np.array([abs(complex(a)) for a in total.amplitudes] * (2 if real else 1))
+    for n in np.argsort(sizes[:lines]).tolist():
+        others = np.delete(places, [n, n + lines] if real else [n])
+        if total.polynomial:
+            others = np.append(others, 0.0)
+        if len(others) and np.abs(others - places[n]).min() < _CLOSEST:
+            return int(n)
+    return None
 
 
 class _Search:
@@ -153,7 +177,14 @@ class _Search:
             if len(self.total.frequencies) == lines:
                 self.exhausted = True
                 return
+            before = self.total
             self._add(frequency, found.amplitude(at))
+            if (
+                _merged(self.total, self.samples.real) is not None
+            ):  # two have moved together to fit what neither is
+                self.total = before
+                self.close.append(frequency)
+                hidden.append(frequency)
 
     def _strongest(self, found: Spectrum, hidden: Sequence[float], floor: float) -> int | None:
         """The largest point that stands out of what is beside it."""

@@ -104,6 +104,7 @@ def label(
     real: bool,
     in_body: bool = False,
     blend: float = 0.0,
+    resolution: float = math.inf,
 ) -> Label:
     """The combination that a line is.
 
@@ -113,7 +114,10 @@ def label(
         in_body: whether the signal is in body axes.
         blend: rad/s, far less than a bin: where nothing fits within the error, combinations that near do:
             a line can have absorbed others that are too close to be told apart.
+        resolution: rad/s, a bin: where the error is about as large there is no name.
     """
+    if _SIGMAS * error > resolution:
+        return Label()
     if not known:
         return Label((), "0", 0) if abs(frequency) <= _SIGMAS * error else Label()
     seen = [n for n, k in enumerate(known) if k.where in ("", "body" if in_body else "space")]

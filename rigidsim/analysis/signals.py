@@ -36,8 +36,8 @@ _IN_BODY = (
     "roll_pitch_yaw", "nadir",
 )  # fmt: skip
 FIRST = (
-    "polar_motion", "obliquity", "node_longitude", "roll_pitch_yaw", "tilt", "precession_angle", "spin_angle",
-    "figure_axis", "momentum_axis", "andoyer_angles", "wobble_angle", "nutation_angle",
+    "polar_motion", "obliquity", "node_longitude", "libration", "roll_pitch_yaw", "tilt", "precession_angle",
+    "spin_angle", "figure_axis", "momentum_axis", "andoyer_angles", "wobble_angle", "nutation_angle",
 )  # fmt: skip
 """Variables that are analysed where none is named; else the angular velocity, else all."""
 

@@ -67,6 +67,9 @@ def test_nothing_fits_by_chance() -> None:
     # with an error of a twentieth of the band some combination always fits
     assert label(1.9, math.pi / 20, KNOWN, math.pi, real=False) == Label()
     assert label(0.1234, 1e-9, KNOWN, math.pi, real=False) == Label()
+    # nor is a line called constant whose error is as large as a bin
+    assert label(1e-3, 1e-3, KNOWN, math.pi, real=False, resolution=1e-3) == Label()
+    assert label(1e-6, 1e-6, KNOWN, math.pi, real=False, resolution=1e-3).text == "0"
 
 
 def test_signals_in_space_know_nothing_of_a_spin_about_an_axis_of_symmetry() -> None:
