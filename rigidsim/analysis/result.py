@@ -15,6 +15,7 @@ from rigidsim.store.variables import part_name
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 TURN = 2 * np.pi
 
@@ -141,6 +142,12 @@ class Analysis:
         have residuals ``_lo``, ``_lo2``, as runs have them.
         """
         return _dataset(self)
+
+    def figure(self) -> Figure:
+        """Spectra with their lines marked and named, as a matplotlib figure."""
+        from rigidsim.look.spectrum import spectrum_figure
+
+        return spectrum_figure(self.dataset)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

@@ -141,6 +141,9 @@ def test_any_dataset_with_frequencies_of_ones_own() -> None:
     assert float(signal.lines[0].phase) == pytest.approx(0.3, abs=1e-9)
     assert float(signal.rate.real) == pytest.approx(1e-3, rel=1e-10)
     assert [s.name for s in rigidsim.analyse(made_up()).signals] == ["obliquity"]
+    figure = rigidsim.analyse(made_up(), "obliquity", known={"swing": 0.7}).figure()
+    drawn = [text.get_text() for text in figure.axes[0].texts]
+    assert [text.split("\n")[0] for text in drawn[:2]] == ["swing", "2 swing"]
     assert all(not line.label.text for line in rigidsim.analyse(made_up()).signals[0].lines)
 
 
