@@ -170,8 +170,9 @@ def _of_spin(scene: Scene) -> list[Known]:
         a, b, c = moments[across[0]], moments[across[1]], moments[axis]
         if abs(third) <= 3 * context.hypot(rates[across[0]], rates[across[1]]):
             continue
-        # loads that leave a symmetric body its axial rate hardly change its wobble
-        symmetric = abs(a - b) <= 1e-12 * c and all(getattr(load, "orbit", None) for load in scene.loads)
+        # gravity gradients leave a symmetric body its axial rate, and hardly change its wobble
+        pulled = all(getattr(load, "title", "") == "gravity_gradient" for load in scene.loads)
+        symmetric = abs(a - b) <= 1e-12 * c and pulled
         source = "initial rate about the principal axis"
         body = "body" if symmetric else ""
         found = [Known("spin", abs(third), 0.0 if symmetric else _SPIN, source, 0.0, body)]
