@@ -156,7 +156,7 @@ def test_what_no_setting_reaches_is_refused_with_what_can_be_met(tmp_path: Path)
     assert "[integrator] accuracy" in text
     assert "given 1e-09 rad at the end, which no setting open to it reaches" in text
     assert "would be right to about" in text
-    assert " s; ask for less, or leave precision, tolerance and method open" in text
+    assert "s; ask for less, or leave precision, tolerance and method open" in text
     assert not list(tmp_path.iterdir())
 
 

@@ -72,7 +72,7 @@ def test_only_the_latest_are_kept() -> None:
 def test_a_second_run_compiles_nothing_and_is_the_same(
     monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
 ) -> None:
-    experiment = rigidsim.parse(free_body() + "estimate = false\n")
+    experiment = rigidsim.parse(free_body())
     first = rigidsim.run(experiment, out=None)
 
     def compiled(*_: Any, **__: Any) -> None:
