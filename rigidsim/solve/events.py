@@ -17,6 +17,7 @@ from rigidsim.errors import StoppedError
 from rigidsim.model.system import System
 from rigidsim.solve.angle_wrapping import AngleState, AngleWrapping
 from rigidsim.solve.engine import Integrator
+from rigidsim.solve.event_units import of_order_one
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 
@@ -148,14 +149,17 @@ def engine_events(
         return called
 
     at_zero = [False] * len(system.crossings) if start is None else _zero_at(system, start)
-    events = []
-    for i, c in enumerate(system.crossings):
-        expression = c.expression if offsets is None else c.expression + hy.par[offsets + i]
-        if at_zero[i]:
-            expression = expression + 2.0 ** (-precision.bits - BESIDE)
-        way = _DIRECTIONS[c.direction]
-        events.append(hy.nt_event(expression, callback(i), direction=way, fp_type=precision.scalar))
-    return events
+    meant = [c.expression for c in system.crossings]
+    expressions = []
+    for i, expression in enumerate(meant):
+        shifted = expression if offsets is None else expression + hy.par[offsets + i]
+        expressions.append(shifted + 2.0 ** (-precision.bits - BESIDE) if at_zero[i] else shifted)
+    return [
+        hy.nt_event(expression, callback(i), direction=_DIRECTIONS[c.direction], fp_type=precision.scalar)
+        for i, (c, expression) in enumerate(
+            zip(system.crossings, of_order_one(system, expressions, meant), strict=True)
+        )
+    ]
 
 
 def _zero_at(system: System, start: Scalar) -> list[bool]:

@@ -17,6 +17,7 @@ import numpy as np
 from rigidsim.model.system import System
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import Integrator
+from rigidsim.solve.event_units import of_order_one
 from rigidsim.solve.events import BESIDE, EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sliding import sliding
@@ -124,9 +125,10 @@ class SwitchedEngines(Stepper):
     def _compiled(self, system: System, along: tuple[int, ...] = ()) -> Integrator:
         options = dict(self.precision.options)
         equations, kind = system.equations, self.precision.scalar
+        shifted = [u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
         events = [
-            hy.nt_event(u + hy.par[system.parameters + j], self._noting(j), fp_type=kind)
-            for j, u in enumerate(system.surfaces)
+            hy.nt_event(u, self._noting(j), fp_type=kind)
+            for j, u in enumerate(of_order_one(system, shifted, system.surfaces))
             if j not in along
         ]
         if along:

@@ -11,8 +11,9 @@ import mpmath
 import numpy as np
 import pytest
 from rich.console import Console
-from support import config, run_text
+from support import EPSILON, amplification, angle_between, cases, config, law, run_text, wide
 
+import rigidsim
 from rigidsim.cli.tables import print_summary
 from rigidsim.errors import ConfigError
 from rigidsim.session.tuning import Tuning
@@ -233,3 +234,25 @@ def test_a_throw_from_the_ground_comes_down_within_the_first_step(
     times = run_text(text, runs).dataset["ground_time"].values
     assert len(times) == count
     assert all(abs(times - 6 / 9.75) <= 4 * 2.0**-52)
+
+
+@pytest.mark.parametrize("precision", cases(["double", "extended"], ["double"]))
+def test_events_of_large_values_cost_the_motion_no_digits(precision: str, runs: Path) -> None:
+    """The engine's steps are relative to the largest of states and events: here a billion times looser."""
+    text = config(time="end = 200\nsamples = 41", integrator=f'precision = "{precision}"')
+    event = '[[events]]\nname = "late"\nexpression = "1e9*(t - 150)"\n'
+    plain, watched = run_text(text, runs), run_text(text + event, runs, 'name="watched"')
+    assert watched.summary["cost"]["steps"] == pytest.approx(plain.summary["cost"]["steps"], abs=3)
+    assert watched.dataset["late_time"].values == pytest.approx([150], rel=4 * EPSILON["double"])
+    bound = 6 * law(EPSILON[precision], plain.summary["cost"]["steps"], 1.2, 200)  # three times for each run
+    apart = angle_between(wide(plain.dataset, "quaternion"), wide(watched.dataset, "quaternion"))
+    assert apart.max() <= bound * amplification(rigidsim.parse(text)) / 200
+
+
+def test_surfaces_of_large_values_cost_the_motion_no_digits(runs: Path) -> None:
+    ends = []
+    for size in ("1", "1e9"):
+        load = f'kind = "torque"\ncomponents = ["0", "0.1*sign({size}*(t - 5.3))", "0"]'
+        run = run_text(config(loads=load, time="end = 60\nsamples = 2"), runs, f'name="s{size}"')
+        ends.append(run.dataset["quaternion"].values[-1])
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=200 * EPSILON["double"])

@@ -1,0 +1,66 @@
+"""Units in which events' expressions are of order one, as the states are.
+
+heyoka's control of the step is relative to the largest of the states and of the expressions of events. An
+event such as ``t - 7e7``, or a height of thousands of kilometres, would loosen it by as much: the motion
+would lose those digits. So the engine is given such an expression times a power of two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.system import System
+
+_STATES = 64
+_TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the run
+_WORTH_A_UNIT = 1  # bits above one; what is smaller loosens nothing
+
+
+def of_order_one(
+    system: System, expressions: Sequence[hy.expression], meant: Sequence[hy.expression]
+) -> list[hy.expression]:
+    """Expressions as the engine is to see them: their zeros are the same.
+
+    Args:
+        expressions: of the states, the time and parameters.
+        meant: the same without the small offsets that keep them off a zero.
+    """
+    if not expressions:
+        return []
+    return [
+        expression if not bits else expression * 2.0**-bits
+        for expression, bits in zip(expressions, _bits(system, meant), strict=True)
+    ]
+
+
+def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
+    """Binary exponents of the largest values, over the run's time and states of order one; from 0."""
+    scene, scaling = system.scene, system.scaling
+    start, end = (math.ldexp(float(t), -scaling.time) for t in (scene.start, scene.samples.last))
+    random = np.random.default_rng(0)
+    states = random.uniform(-1.0, 1.0, (_STATES, len(system.states)))
+    states[0] = [float(x) for x in system.initial]
+    compiled = hy.cfunc(list(expressions), system.variables, compact_mode=True)
+    parameters = random.uniform(-1.0, 1.0, (_STATES, compiled.nparams))
+    sides = len(system.surfaces)
+    parameters[:, sides : sides + len(system.turning)] *= end - start  # full turns, of rates of order one
+    largest = np.zeros(len(expressions))
+    for part in _TIMES:
+        values = _evaluated(compiled, states, parameters, start + part * (end - start))
+        largest = np.fmax(largest, np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=1))
+    exponents = [math.frexp(value)[1] for value in largest]
+    return [bits if bits > _WORTH_A_UNIT else 0 for bits in exponents]
+
+
+def _evaluated(compiled: hy.cfunc, states: np.ndarray, parameters: np.ndarray, time: float) -> np.ndarray:
+    """Values of shape (expressions, states)."""
+    inputs = np.ascontiguousarray(states.T)
+    options = {"pars": np.ascontiguousarray(parameters.T)} if compiled.nparams else {}
+    if compiled.is_time_dependent:
+        options["time"] = np.full(len(states), time)
+    with np.errstate(all="ignore"):
+        return np.asarray(compiled(inputs, **options))
