@@ -85,6 +85,7 @@ def test_every_ready_scene_has_a_fingerprint() -> None:
     assert sorted(json.loads(FILE.read_text())) == [path.stem for path in CONFIGS]
 
 
+@pytest.mark.slow
 def test_the_bits_are_those_of_every_process() -> None:
     """Two fresh processes, with other hash seeds and in another order."""
     chosen = [p for p in CONFIGS if p.stem in ("asymmetric_top", "heavy_top_nutating")]

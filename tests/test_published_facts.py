@@ -192,6 +192,7 @@ def needle_error(out: Path, end: str) -> float:
     return float(angle_between(quaternions, wide(exact.dataset, "quaternion")).max())
 
 
+@pytest.mark.slow
 def test_needle_top_whose_spin_dwarfs_its_other_rates_a_million_times(runs: Path) -> None:
     """Step control must see every component: each has a unit of its own."""
     assert needle_error(runs, '"2^-4"') < 1e-12

@@ -77,7 +77,7 @@ def true_error(run: rigidsim.Run, of: rigidsim.Experiment) -> float:
 SURE = [kind for kind in KINDS if kind != "plunge"]
 
 
-@pytest.mark.parametrize("number", cases(range(len(SURE)), range(0, len(SURE), 3)), ids=SURE)
+@pytest.mark.parametrize("number", cases(range(len(SURE)), range(0, len(SURE), 5)), ids=SURE)
 def test_every_kind_of_scene_is_certified_to_what_is_true(number: int, tmp_path: Path) -> None:
     scene = random_scene(number, seed=1)
     asked = 10 ** (-5 - number % 6)
@@ -192,7 +192,11 @@ def turned(angle: float, rows: slice) -> Any:
     return change
 
 
-@pytest.mark.parametrize("rows", [slice(None), slice(1234, 1235)], ids=["all", "one sample of 2000"])
+@pytest.mark.parametrize(
+    "rows",
+    [pytest.param(slice(None), marks=pytest.mark.slow), slice(1234, 1235)],
+    ids=["all", "one sample of 2000"],
+)
 def test_a_wrong_run_gets_no_certificate(rows: slice, tmp_path: Path) -> None:
     of = experiment(FREE, 1e-9, 60, samples=2000)
     run = rigidsim.run(of, out=tmp_path)
@@ -237,7 +241,7 @@ def test_a_pulse_that_the_beginning_knows_nothing_of_is_in_the_certificate(tmp_p
         ["time.samples=2"],
         ["time.times=[0, 7, 19.3]"],
         ['integrator.precision="single"', "integrator.accuracy=1e-3"],
-        ["integrator.precision=40", "integrator.accuracy=1e-30"],
+        pytest.param(["integrator.precision=40", "integrator.accuracy=1e-30"], marks=pytest.mark.slow),
         ['events=[{name = "flip", expression = "wz"}]'],
         ['events=[{name = "flip", expression = "wy - 0.99", action = "stop"}]'],
     ],

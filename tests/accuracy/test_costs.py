@@ -113,6 +113,7 @@ def test_the_summary_table_tells_of_each_phase(tmp_path: Path) -> None:
         assert phase in line
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_remembers_what_choosing_took(tmp_path: Path) -> None:
     run = rigidsim.run(
         scene("integrator.accuracy=1e-9", "time.end=4000", "limits.max_steps=500"),
@@ -127,6 +128,7 @@ def test_an_interrupted_run_remembers_what_choosing_took(tmp_path: Path) -> None
     assert cost["cpu_seconds"] > 1.0  # of all sessions
 
 
+@pytest.mark.slow
 def test_an_attempt_that_did_not_keep_the_accuracy_is_part_of_the_cost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -72,6 +72,7 @@ def test_chaos_that_sets_in_late_leaves_no_digits(runs: Path) -> None:
     assert "attitude_uncertain" in run.summary["warning_codes"]
 
 
+@pytest.mark.slow
 def test_an_instability_that_sets_in_after_half_of_a_long_run_is_seen(runs: Path) -> None:
     """In 85,000 steps, of which the first tenth shows nothing: announced at 4.4e-9 by that."""
     run = run_text(DESPUN, runs)
@@ -120,6 +121,7 @@ def test_errors_grow_in_a_passage_that_no_beginning_shows(runs: Path) -> None:
     assert true <= COVERED * followed.attitude < 1e-3
 
 
+@pytest.mark.slow
 def test_the_path_past_a_close_pericentre_is_estimated_too(runs: Path) -> None:
     run = run_text(COMET, runs)
     better = run_text(COMET, runs, 'integrator.precision="extended"', 'name="better"')

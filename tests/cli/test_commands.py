@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import same_bits
+from support import cases, same_bits
 
 import rigidsim
 from rigidsim.look import viewer
@@ -244,7 +244,7 @@ def test_a_damaged_dataset_is_a_message(config: Config, rigidsim_command: Comman
     ("out", "path", "begins"),
     [
         ([], "runs/free/figure.png", b"\x89PNG\r\n"),
-        (["--out", "x.png"], "x.png", b"\x89PNG\r\n"),
+        pytest.param(["--out", "x.png"], "x.png", b"\x89PNG\r\n", marks=pytest.mark.slow),
         (["--out", "x.svg"], "x.svg", b"<?xml"),
     ],
 )
@@ -375,7 +375,7 @@ GUARDS = {
 }
 
 
-@pytest.mark.parametrize("guard", GUARDS)
+@pytest.mark.parametrize("guard", cases(GUARDS, ["max_steps"]))
 def test_a_guard_ends_the_run_and_keeps_the_samples(
     guard: str, config: Config, rigidsim_command: Command
 ) -> None:

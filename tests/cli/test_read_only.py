@@ -114,6 +114,7 @@ def test_what_has_to_be_written_there_is_refused(
     assert "nothing is left to do: the run reached its last sample" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_partial_run_is_read_and_gone_on_with_later(
     config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import OFTEN, same_bits
+from support import OFTEN, cases, same_bits
 
 import rigidsim
 
@@ -58,7 +58,7 @@ def test_a_dataset_is_enough(config: Config, rigidsim_command: Command) -> None:
     assert Path("again/free/config.toml").read_text() == Path("free.toml").read_text()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", cases([signal.SIGINT, signal.SIGTERM, signal.SIGKILL], [signal.SIGKILL]))
 def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start: Start) -> None:
     """With the bits of a run in one go."""
     time_table = "end = 40000\nsamples = 4001"

@@ -39,6 +39,7 @@ def test_table_dataset_and_figure(config: Callable[..., str], rigidsim_command: 
         assert ran.exit_code == 0, ran.stderr
 
 
+@pytest.mark.slow
 def test_the_printed_table_says_what_was_measured(
     config: Callable[..., str], rigidsim_command: Callable[..., Any]
 ) -> None:

@@ -83,6 +83,7 @@ def test_a_certificate_that_lies_fails_the_study(tmp_path: Path, monkeypatch: py
     assert not check.passed
 
 
+@pytest.mark.slow
 def test_a_campaign_goes_on_where_it_was_and_can_be_shared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

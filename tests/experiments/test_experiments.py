@@ -45,6 +45,7 @@ def test_every_study_of_the_folder_is_in_the_list() -> None:
     assert found == set(everything.STUDIES)
 
 
+@pytest.mark.slow
 def test_a_wrong_expected_value_makes_the_exit_code_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -68,6 +69,7 @@ def test_a_study_that_breaks_down_makes_the_exit_code_1(
     assert "Traceback" in captured.err
 
 
+@pytest.mark.slow
 def test_a_study_runs_as_a_script(tmp_path: Path) -> None:
     script = ROOT / "experiments" / "earth_free_nutation.py"
     done = subprocess.run(

@@ -93,6 +93,7 @@ def test_starts_differ_and_are_near(measured: dict[tuple[str, bool], xarray.Data
         assert all(float(np.float32(x)) == x or abs(x) < 1 for x in r)
 
 
+@pytest.mark.slow
 def test_figure_and_table_hold_every_series(
     measured: dict[tuple[str, bool], xarray.Dataset], tmp_path: Path
 ) -> None:

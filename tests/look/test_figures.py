@@ -371,6 +371,7 @@ def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetr
     assert figures.available(rates) == ["overview", "polhode", "rates"]
 
 
+@pytest.mark.slow
 def test_png_and_svg_are_files_of_their_kind(symmetric_top: Build, tmp_path: Path) -> None:
     assert figures.save_figure(symmetric_top(), tmp_path / "f.png") == tmp_path / "f.png"
     assert min(imread(tmp_path / "f.png").shape[:2]) > 600

@@ -77,6 +77,7 @@ def test_the_torque_of_the_ephemeris_is_that_of_the_place(runs: Path) -> None:
     assert moving.dataset.attrs["compact_mode"] == 1
 
 
+@pytest.mark.slow
 def test_time_zero_is_the_epoch(runs: Path) -> None:
     """A scene that begins a day after J2000 by its epoch is the one that begins then by its clock; without an
     epoch time zero is J2000, and the dataset says so.

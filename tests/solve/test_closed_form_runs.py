@@ -85,6 +85,7 @@ def test_extremes_agree_with_an_integration_in_forty_digits(name: str) -> None:
     assert against_integration(scene_over(SPAN, **EXTREMES[name], precision=40)) <= 1e-36
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(moments=bodies(), rates=vectors(3), quaternion=vectors(4))
 def test_any_free_body_agrees_with_an_integration_in_quadruple_precision(
@@ -94,6 +95,7 @@ def test_any_free_body_agrees_with_an_integration_in_quadruple_precision(
     assert against_integration(scene_over(SPAN, **given, precision="quadruple")) <= allowed(2.0**-112)
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     along=st.sampled_from([0.5, 1.0, 1.75, 1e-9]),

@@ -55,6 +55,7 @@ def test_angles_grow_through_full_turns_without_a_jump(runs: Path) -> None:
     assert (np.einsum("ij,ij->i", q[1:], q[:-1]) > 0.9).all()
 
 
+@pytest.mark.slow
 def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(
     runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -53,7 +53,10 @@ def flip_interval() -> mpmath.mpf:
         return 2 * mpmath.ellipk(m) / p
 
 
-@pytest.mark.parametrize(("precision", "epsilon"), [("double", 2.0**-52), ("quadruple", 2.0**-112)])
+@pytest.mark.parametrize(
+    ("precision", "epsilon"),
+    [("double", 2.0**-52), pytest.param("quadruple", 2.0**-112, marks=pytest.mark.slow)],
+)
 def test_flips_come_at_the_interval_of_the_closed_form(precision: str, epsilon: float, runs: Path) -> None:
     run = run_text(FLIPS.format(samples=11) + FLIP, runs, f'integrator.precision="{precision}"')
     names = [n for n in ("flip_time", "flip_time_lo", "flip_time_lo2") if n in run.dataset]

@@ -250,6 +250,7 @@ def test_attitude_errors_no_longer_grow_faster_than_the_root_of_the_steps() -> N
     assert np.median(held) < np.median(plain) / 30
 
 
+@pytest.mark.slow
 def test_a_heavy_top_gains_as_much() -> None:
     settings = (Setting("extended"), Setting("double", hold_invariants=True), Setting("double"))
     reference, held, plain = (ended(LAGRANGE, 2e4, setting) for setting in settings)

@@ -219,6 +219,7 @@ def test_an_event_on_a_surface_is_found_again_within_the_next_step(runs: Path) -
     assert dataset["still_time"].values == pytest.approx([1, 1.5], rel=8 * EPSILON["double"])
 
 
+@pytest.mark.slow
 def test_a_certificate_knows_the_kink(runs: Path) -> None:
     """The scene on which the reference and the run once shared an error of 0.086 rad."""
     text = config(

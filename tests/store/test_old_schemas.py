@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
+from support import cases
 from typer.testing import CliRunner
 
 import rigidsim
@@ -28,7 +29,7 @@ def folder(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("version", cases(VERSIONS, [1, SCHEMA_VERSION]))
 def test_each_version_is_kept_and_read(version: int, folder: Path) -> None:
     shutil.copy(KEPT / f"schema_{version}.h5", folder / "dataset.h5")
     with rigidsim.open_run(folder).dataset as dataset:

@@ -100,6 +100,7 @@ def test_the_free_nutation_of_the_earth(tmp_path: Path) -> None:
     assert float(signal.lines[0].amplitude) == pytest.approx(1e-6, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_librations_of_a_satellite(tmp_path: Path) -> None:
     # amplitudes of 1e-4 rad: frequencies of the linearised equations to 1e-7
     text = config(

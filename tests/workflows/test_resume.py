@@ -111,11 +111,8 @@ def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> t
 UNROLLED = ("single", "double, dense", "double, sparse", "double, Euler angles", "quadruple")
 USUAL = (
     "double, dense",
-    "double, sparse",
     "double, sparse, derived angles",
     "double, held invariants, angles",
-    "double, events, angles, dates",
-    "double, switching, Euler angles",
     "double, ended by an event",
     "30 digits, tiny components",
 )
