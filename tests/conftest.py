@@ -11,6 +11,7 @@ import pytest
 
 os.environ.setdefault("CI", "1")  # rerun's viewer collects no statistics then
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # the studies are no installed package
 
 import rigidsim.workflows.read  # noqa: F401  (tests that read configs below need every kind of load)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,23 +11,19 @@ import mpmath
 import numpy as np
 import pytest
 import xarray
+from support import cases, same_bits
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from support import cases, same_bits  # noqa: E402
-
-import rigidsim  # noqa: E402
-from experiments.random_scenes import KINDS, random_scene  # noqa: E402
-from rigidsim.accuracy.certificate import certify  # noqa: E402
-from rigidsim.accuracy.choice import choose, chosen  # noqa: E402
-from rigidsim.accuracy.comparison import angles_between  # noqa: E402
-from rigidsim.accuracy.cost import cost  # noqa: E402
-from rigidsim.accuracy.forecast import Forecasts  # noqa: E402
-from rigidsim.accuracy.setting import Setting  # noqa: E402
-from rigidsim.accuracy.trial import try_setting  # noqa: E402
-from rigidsim.errors import ConfigError  # noqa: E402
-from rigidsim.model.loads import LoadModel  # noqa: E402
+import rigidsim
+from experiments.random_scenes import KINDS, random_scene
+from rigidsim.accuracy.certificate import certify
+from rigidsim.accuracy.choice import choose, chosen
+from rigidsim.accuracy.comparison import angles_between
+from rigidsim.accuracy.cost import cost
+from rigidsim.accuracy.forecast import Forecasts
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import try_setting
+from rigidsim.errors import ConfigError
+from rigidsim.model.loads import LoadModel
 
 pytestmark = pytest.mark.compact
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,20 +10,17 @@ from typing import Any
 import mpmath
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-import rigidsim  # noqa: E402
-from experiments import accuracy_certificates as study  # noqa: E402
-from experiments.certificates.calibration import BODY  # noqa: E402
-from experiments.certificates.examining import Outcome, examine  # noqa: E402
-from experiments.certificates.ledger import Ledger, code_version  # noqa: E402
-from experiments.certificates.searching import Search, truth_setting  # noqa: E402
-from experiments.random_scenes import KINDS, RandomScene, random_scene  # noqa: E402
-from rigidsim.accuracy.certificate import Certificate, certify  # noqa: E402
-from rigidsim.accuracy.cost import cost  # noqa: E402
-from rigidsim.accuracy.setting import Setting  # noqa: E402
-from rigidsim.accuracy.trial import try_setting  # noqa: E402
+import rigidsim
+from experiments import accuracy_certificates as study
+from experiments.certificates.calibration import BODY
+from experiments.certificates.examining import Outcome, examine
+from experiments.certificates.ledger import Ledger, code_version
+from experiments.certificates.searching import Search, truth_setting
+from experiments.random_scenes import KINDS, RandomScene, random_scene
+from rigidsim.accuracy.certificate import Certificate, certify
+from rigidsim.accuracy.cost import cost
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import try_setting
 
 
 def test_scenes_are_the_same_each_time_and_of_every_kind() -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))  # the studies are no installed package
 
 from experiments import error_coverage
 from experiments.coverage.families import FAMILIES, coverage_scene

@@ -14,7 +14,6 @@ import pytest
 from matplotlib.image import imread
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
 
 from experiments import all as everything  # noqa: E402
 from experiments import closed_forms, common, measure  # noqa: E402

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import tomllib
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from hypothesis import strategies as st
 from matplotlib.image import imread
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
 
 from experiments import peer_comparison as study  # noqa: E402
 from experiments.peers import ADAPTERS, campaign  # noqa: E402

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from experiments import precision_tradeoff as study  # noqa: E402
-from experiments.precision_tradeoff import Point  # noqa: E402
-from rigidsim.accuracy.setting import Setting  # noqa: E402
+from experiments import precision_tradeoff as study
+from experiments.precision_tradeoff import Point
+from rigidsim.accuracy.setting import Setting
 
 A, B, C = Setting("single"), Setting("double"), Setting("extended")
 MADE_UP = [Point(B, 1e-12, 1.0), Point(A, 1e-4, 0.2), Point(C, 1e-11, 12.0), Point(C, 1e-16, 10.0)]

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from experiments import stability_extremes as study  # noqa: E402
-from experiments.extremes import judging  # noqa: E402
-from experiments.extremes.random_scenes import random_case  # noqa: E402
-from experiments.extremes.scenes import ANY, Extreme, all_scenes  # noqa: E402
+from experiments import stability_extremes as study
+from experiments.extremes import judging
+from experiments.extremes.random_scenes import random_case
+from experiments.extremes.scenes import ANY, Extreme, all_scenes
 
 SCENES = {f"{scene.row}, {scene.name}": scene for scene in all_scenes(False)}
 
