@@ -99,7 +99,9 @@ def test_turns_between_two_samples_are_those_of_the_motion(integrator: str, runs
     assert np.isnan(run.dataset["node_longitude"].sel(axis="momentum").values[0])
     right_ascension = run.dataset["right_ascension"].sel(axis="figure").values
     np.testing.assert_allclose(right_ascension, node - np.pi / 2, rtol=0, atol=1e-9)
-    assert not run.summary["warnings"]
+    # of a rotation matrix the quaternion's sign isn't known so far apart, which is said
+    joined = ["not_joined"] if "rotation_matrix" in integrator else []
+    assert run.summary["warning_codes"] == joined
 
 
 def test_dense_and_sparse_samples_agree_against_a_moving_orbit(runs: Path) -> None:

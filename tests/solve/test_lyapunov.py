@@ -44,7 +44,7 @@ def chaotic(out: Path, unit: float = 1.0, end: float = 4000.0) -> rigidsim.Run:
     """Wisdom, Peale & Mignard 1984: start at 90 degrees with w = n; a tiny tilt of w lets it tumble."""
     rates = f"[{1e-3 / unit!r}, {1e-3 / unit!r}, {1 / unit!r}]"
     text = SATELLITE.format(rates=rates, angle=math.pi / 2, strength=repr(unit**-2.0), end=repr(end * unit))
-    return run_text(text, out)
+    return run_text(text, out, estimate=True)
 
 
 @pytest.mark.slow
