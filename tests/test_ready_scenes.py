@@ -81,7 +81,7 @@ def test_attitude_agrees_with_80_bit_arithmetic(path: Path, formulation: str, ru
     bound = 3 * law(EPSILON["double"], steps, prepared_rate, duration)
     unstable = 3 * EPSILON["double"] / 2 * np.sqrt(steps) * sensitivity(path)
     assert error.max() <= max(bound, unstable)
-    # the sign is continuous as well: no sample is the negative of its reference, or all are, where angles begin so
+    # the sign is continuous as well: no sample is its reference's negative, or all are, where angles begin so
     products = np.einsum("ij,ij->i", ours, exact.astype(float))
     begins = np.sign(products[0]) if formulation == "euler_angles" else 1.0
     assert (products * begins > 0).all()
