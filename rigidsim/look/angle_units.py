@@ -57,10 +57,3 @@ def angle_unit(size: float) -> AngleUnit:
     if size >= _SMALL:
         return ANGLE_UNITS["deg"]
     return ANGLE_UNITS["arcsec" if size >= _TINY else "mas"]
-
-
-def readable_angle(value: float, digits: int = 6) -> str:
-    """An angle (rad) in the unit that reads best, such as ``23.4393°`` or ``9.2 mas``."""
-    unit = angle_unit(value)
-    space = "" if unit.symbol in "°″" else " "
-    return f"{value * unit.per_radian:.{digits}g}{space}{unit.symbol}"

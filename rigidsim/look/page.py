@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -27,16 +26,6 @@ def read_config(dataset: xarray.Dataset) -> dict[str, Any]:
 def title_of(dataset: xarray.Dataset) -> str:
     """Title of the run: attribute `title`, else the config's name."""
     return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
-
-
-def headline(dataset: xarray.Dataset) -> str:
-    """Title and, as far as one line has room, the description."""
-    title = title_of(dataset)
-    description = str(read_config(dataset).get("description", ""))
-    room = 105 - len(title)
-    if not description or room < 20 or description in title:
-        return title
-    return f"{title}: {textwrap.shorten(description, room, placeholder=' …')}"
 
 
 def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset, notes: list[str]) -> str:

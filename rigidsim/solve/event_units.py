@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.solve.compiled import compiled_function
 
 _STATES = 64
 _TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the run
@@ -44,7 +46,7 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     random = np.random.default_rng(0)
     states = random.uniform(-1.0, 1.0, (_STATES, len(system.states)))
     states[0] = [float(x) for x in system.initial]
-    compiled = hy.cfunc(list(expressions), system.variables, compact_mode=True)
+    compiled: Any = compiled_function(expressions, system.variables, compact_mode=True)
     parameters = random.uniform(-1.0, 1.0, (_STATES, compiled.nparams))
     sides = len(system.surfaces)
     parameters[:, sides : sides + len(system.turning)] *= end - start  # full turns, of rates of order one
@@ -56,7 +58,7 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     return [bits if bits > _WORTH_A_UNIT else 0 for bits in exponents]
 
 
-def _evaluated(compiled: hy.cfunc, states: np.ndarray, parameters: np.ndarray, time: float) -> np.ndarray:
+def _evaluated(compiled: Any, states: np.ndarray, parameters: np.ndarray, time: float) -> np.ndarray:
     """Values of shape (expressions, states)."""
     inputs = np.ascontiguousarray(states.T)
     options = {"pars": np.ascontiguousarray(parameters.T)} if compiled.nparams else {}

@@ -16,6 +16,7 @@ import numpy as np
 from rigidsim.errors import StoppedError
 from rigidsim.model.system import System
 from rigidsim.solve.angle_wrapping import AngleState, AngleWrapping
+from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.event_units import of_order_one
 from rigidsim.solve.precision import Precision, Scalar
@@ -165,6 +166,6 @@ def engine_events(
 def _zero_at(system: System, start: Scalar) -> list[bool]:
     """Which events' expressions are zero at the start, as double precision tells."""
     expressions = [c.expression for c in system.crossings]
-    compiled = hy.cfunc(expressions, system.variables, compact_mode=True)
+    compiled = compiled_function(expressions, system.variables, compact_mode=True)
     values = compiled(np.array([float(x) for x in system.initial]), time=float(start))
     return [bool(value == 0) for value in values]
