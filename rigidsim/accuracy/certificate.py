@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import mpmath
@@ -27,6 +26,7 @@ from rigidsim.accuracy.setting import Setting, setting_of
 from rigidsim.accuracy.trial import Told, Trials, try_setting
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

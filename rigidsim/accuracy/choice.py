@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rigidsim.accuracy.cost import MEASURED, cost
 from rigidsim.accuracy.forecast import Forecasts
@@ -23,6 +23,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.schema import LARGEST_DIGITS
 

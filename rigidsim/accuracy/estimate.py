@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from rigidsim.accuracy.exact_error import ExactError, exact_error
 from rigidsim.accuracy.following import Course, Followed, follow, leading, loose
 from rigidsim.accuracy.growth import exponential_growth, power_of_time
 from rigidsim.accuracy.margins import MARGINS, Margins
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.trail import Trail, Waypoints

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from rigidsim.accuracy.growth import power_of_time
 from rigidsim.accuracy.margins import Margins
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.lanes import (
     NEIGHBOURS,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from rigidsim.accuracy.motion import Motion
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.scene.arithmetic import working_bits
+from rigidsim.scene.records import dataclass
 
 LOST = 0.5
 """rad, past which a difference says nothing but that digits are gone."""

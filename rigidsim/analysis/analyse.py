@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.analysis.decomposition import Found, amplitude_spectrum, decompose
@@ -12,6 +11,7 @@ from rigidsim.analysis.labels import Known, label, reversed_label, settled
 from rigidsim.analysis.result import Analysis, Line, SignalAnalysis
 from rigidsim.analysis.signals import Clock, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

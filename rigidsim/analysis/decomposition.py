@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rigidsim.analysis.exponentials import Complexes, Grid, Reals, Sum, blocks
 from rigidsim.analysis.windows import Spectrum, hann, moments, peak, positions, spectrum
+from rigidsim.scene.records import dataclass
 
 _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
 _SEARCH_ORDERS = (3, 1)  # of the window while lines are looked for; the second where some are close

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import mpmath
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from rigidsim.analysis.decomposition import Samples
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.records import dataclass
 from rigidsim.store.variables import parts_in
 
 if TYPE_CHECKING:

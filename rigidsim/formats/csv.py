@@ -8,7 +8,6 @@ reads it as float64 (which rounds numbers beyond double to the nearest one); ``d
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from rigidsim.formats.naming import named_epoch
 from rigidsim.formats.registry import Format, Source
 from rigidsim.formats.tables import Column, Table
 from rigidsim.scene.epochs import DIGITS, Epoch
+from rigidsim.scene.records import dataclass
 
 
 def write_csv(table: Table, path: Path, source: Source) -> None:

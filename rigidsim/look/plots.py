@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.roles import drift_of, put_back_of
+from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

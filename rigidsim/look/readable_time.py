@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene.epochs import J2000, Epoch, parse_epoch
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.units import time_unit
 
 if TYPE_CHECKING:

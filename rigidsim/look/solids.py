@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from rigidsim.scene import rotations
 from rigidsim.scene.outlines import THINNESS, Arc, Box, Ellipsoid, Line, Outline, Revolved
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.shapes import SHAPES
 
 Array = NDArray[np.float64]

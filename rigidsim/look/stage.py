@@ -7,7 +7,7 @@ arrows by one constant factor each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.thinning import thinned_indices
+from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

@@ -6,7 +6,7 @@ One object for all of them, in internal units; what a scene doesn't carry is Non
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -21,6 +21,7 @@ from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.expressions import Node
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
 

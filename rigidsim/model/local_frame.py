@@ -14,7 +14,6 @@ Spacecraft Attitude Determination and Control, 1978, ch. 2.)
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -24,6 +23,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.reference_plane import flight_normal
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import cross, norm
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _SLOW = 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import heyoka as hy
@@ -11,6 +11,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

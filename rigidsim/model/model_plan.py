@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rigidsim.model.load import Load
 from rigidsim.model.load_estimate import estimate_drive
@@ -14,6 +14,7 @@ from rigidsim.model.parity import refuse_odd_loads
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import Requirements, choose_requirements
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces, surfaces_of
 

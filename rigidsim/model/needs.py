@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from rigidsim.model import central_forces, fixed_axes
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
@@ -12,6 +11,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.reference_plane import flies_in_plane
 from rigidsim.model.rotating_frame import rotating_orbit
 from rigidsim.scene.arithmetic import negligible
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 

@@ -15,7 +15,6 @@ the precession of the ecliptic of IAU 2006).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -30,6 +29,7 @@ from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.frame import ORBIT
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _CENTURY = 36525 * 86400

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ Starts from what is recorded and what the loads read, and adds a state only when
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.model.needs import NEEDS
 from rigidsim.model.reference_plane import refuse_without_plane
 from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +25,7 @@ from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.state_names import carries_sign, plain_angles, state_names
 from rigidsim.model.state_selection import Requirements
 from rigidsim.scene.expressions import ATTITUDE_NAMES, names_used
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _LARGEST_EXPONENT = 1000

@@ -6,7 +6,7 @@ another. Positions in the result are body axes, metres, from the reference point
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
@@ -23,6 +23,7 @@ from rigidsim.scene.arithmetic import (
 )
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.presets import PRESETS
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.validation_messages import nearest, shown
 

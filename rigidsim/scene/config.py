@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import html
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.frame_table import PLANE_OR_NORMAL
 from rigidsim.scene.overrides import FLAG, apply_overrides, written
 from rigidsim.scene.python_values import assignments_of, toml_text
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import POINT_OR_NAME, Config, config_model
 from rigidsim.scene.toml_text import long_integers, parse_toml

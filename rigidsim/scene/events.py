@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.expression_parser import parse_expression
 from rigidsim.scene.expressions import (
@@ -14,6 +12,7 @@ from rigidsim.scene.expressions import (
     ExpressionError,
     names_used,
 )
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.schema import Config
 
 

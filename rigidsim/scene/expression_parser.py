@@ -18,7 +18,6 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn, TypeVar
 
@@ -42,6 +41,7 @@ from rigidsim.scene.expressions import (
     operation,
 )
 from rigidsim.scene.piecewise import power, written_out
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.validation_messages import nearest
 
 T = TypeVar("T")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import Surroundings
 
 

@@ -7,7 +7,6 @@ so that a config, a schema or a message never needs a second list of names.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from rigidsim.errors import ConfigError, Problem
@@ -16,6 +15,7 @@ from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions import Expression
 from rigidsim.scene.fields import ConfigTable
+from rigidsim.scene.records import dataclass
 
 
 class LoadFields(ConfigTable):

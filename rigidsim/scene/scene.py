@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
@@ -14,6 +13,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rigidsim.scene.outlines import THINNESS, Arc, Box, Ellipsoid, Outline, Revolved, polygon
+from rigidsim.scene.records import dataclass
 
 Dimensions = Mapping[str, list[Any]]
 Vector = list[Any]

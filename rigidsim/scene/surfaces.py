@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rigidsim.scene.expressions import (
@@ -22,6 +22,7 @@ from rigidsim.scene.expressions import (
     names_used,
 )
 from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _STATES = 4  # at which expressions are compared; two that agree at all of them are the same

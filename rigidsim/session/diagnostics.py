@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 from rigidsim.accuracy.error_law import DRIFT_FACTOR
 from rigidsim.accuracy.estimate import Estimate, estimate_errors
 from rigidsim.accuracy.growth import LOST
 from rigidsim.look.readable_time import TimeWords, span_text
+from rigidsim.scene.records import dataclass
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.understood import time_words
 from rigidsim.solve.loop import Progress

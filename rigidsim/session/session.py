@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import secrets
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rigidsim.scene.records import dataclass
 from rigidsim.session.attributes import of_complete, root_attributes
 from rigidsim.session.completion import Completion
 from rigidsim.session.diagnostics import Diagnostics

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rigidsim.scene.records import dataclass
 from rigidsim.store.summary import ENGINE
 
 NOT_KEPT = "attempts_not_kept"

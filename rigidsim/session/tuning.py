@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.pacing import Pacing
 from rigidsim.store.segments import SegmentLimits
 

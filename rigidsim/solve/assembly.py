@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position

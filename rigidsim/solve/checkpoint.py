@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.joined_angles import Continuity
 

@@ -12,10 +12,9 @@ grid output, which starts at such a time only. The move back to it is a step of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import STEPS_BETWEEN, AngleState, AngleWrapping
 from rigidsim.solve.charts import Charts
 from rigidsim.solve.projection import Projection

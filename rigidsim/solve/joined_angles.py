@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import heyoka as hy
 import mpmath
@@ -12,6 +12,7 @@ import numpy as np
 
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.followed_system import FollowedSystem

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth

@@ -15,12 +15,13 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.lanes import NEIGHBOURS, Lanes, SeriesErrors
 

@@ -20,9 +20,9 @@ Single steps are what remains between the others, and all that pays beyond 80 bi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sampling import SampleClock

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import heyoka as hy
@@ -16,6 +16,7 @@ from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.compiled import compiled_function

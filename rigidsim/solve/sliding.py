@@ -8,7 +8,6 @@ several surfaces are resolved where their parts of the field add up: f = base + 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import permutations
 
 import heyoka as hy
@@ -16,6 +15,7 @@ import heyoka as hy
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.step_limiter import slopes
 from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
 
 MOST_AT_ONCE = 3
 """Surfaces along which a motion slides at once."""

@@ -9,13 +9,13 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.engine import Integrator

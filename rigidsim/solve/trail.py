@@ -4,10 +4,11 @@ its errors are told later, from the others its neighbours begin.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 

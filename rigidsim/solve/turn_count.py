@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import time as clock_time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import heyoka as hy
@@ -26,6 +26,7 @@ from rigidsim.model.euler_charts import is_proper
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import SampleTimes
 from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.engine import CompiledFunction

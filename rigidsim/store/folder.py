@@ -9,11 +9,11 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.look.figure_names import FIGURES
+from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -23,6 +22,7 @@ from pydantic import (
 )
 
 from rigidsim.errors import RunFolderError
+from rigidsim.scene.records import dataclass
 from rigidsim.store.summary_fields import Claim, FiniteNumber, Part, Text
 from rigidsim.store.understood import Body, Span, Start
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import count, takewhile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from rigidsim.accuracy.bench.dataset import dataset_of
 from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.config import Experiment, parse, parse_earlier
+from rigidsim.scene.records import dataclass
 from rigidsim.session.guards import Observer
 from rigidsim.store import netcdf, provenance
 from rigidsim.store.attributes import Use, read_attributes

@@ -5,10 +5,10 @@ Quick estimates for labels and for taking trends off; `rigidsim analyse` has the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from rigidsim.scene.records import dataclass
 
 Array = NDArray[np.float64]
 _TURN = 2 * np.pi

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -26,6 +25,7 @@ from rigidsim.scene.expressions import (
     names_used,
 )
 from rigidsim.scene.fields import Metre, Triple, refuse
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, root_parts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import heyoka as hy
@@ -17,6 +16,7 @@ from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import heyoka as hy
@@ -19,6 +18,7 @@ from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC

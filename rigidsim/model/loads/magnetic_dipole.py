@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import heyoka as hy
@@ -15,6 +14,7 @@ from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Triple, quantity
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 

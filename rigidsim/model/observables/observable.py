@@ -8,7 +8,6 @@ dataset, the summary, the plots and the timeline.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -16,6 +15,7 @@ import heyoka as hy
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import NEEDS
 from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.records import dataclass
 
 Dims = tuple[str, ...]
 BODY: Dims = ("body_axis",)

@@ -7,9 +7,10 @@ nothing special to them. Per half period 2K of the elliptic functions the phase 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form.arithmetic import Arithmetic, Pair
 from rigidsim.solve.closed_form.theta import Lattice, Theta
 
