@@ -53,7 +53,7 @@ def spectrum_of(
 
 def _save(path: Path, done: Convergence, run_id: str) -> None:
     labels = {"run_id": run_id, "schema_version": SCHEMA_VERSION}
-    content = sealed(netcdf.image([], {}, 0, labels, {"lyapunov": done.arrays()}))
+    content = sealed(netcdf.image([], None, labels, {"lyapunov": done.arrays()}))
     try:
         atomic.write_bytes(path, content)
     except OSError as error:

@@ -21,6 +21,7 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.trail import Trail
 from rigidsim.store.memory import MemoryWriter
+from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.segments import SegmentWriter
 
 Arrays = dict[str, np.ndarray]
@@ -36,6 +37,7 @@ class Recorder(SampleReceiver):
     """
 
     progress: Progress
+    rows_together = CHUNK_ROWS
 
     def __init__(
         self,

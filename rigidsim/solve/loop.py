@@ -45,10 +45,9 @@ class IntegrationLoop:
         pacing: Pacing = MEASURED,
         most_steps: int | None = None,
     ) -> None:
-        first = 0
+        first = 0 if start is None else start.next_sample
         if start is not None:
             corrected.back_to(start.boundary)
-            first = start.next_sample
         self.corrected = corrected
         self.stepper = corrected.stepper
         self.clock = clock
@@ -57,6 +56,7 @@ class IntegrationLoop:
         self.check = check
         self.progress = Progress(clock.count, first)
         self.buffer = SampleBuffer(clock, receiver, pacing, first)
+        self._saved = first
         self.ways = WayFinder(corrected, clock, precision, pacing)
         self.last = clock.at(clock.count - 1)
         self.stepper.destination = float(self.last)
@@ -68,12 +68,15 @@ class IntegrationLoop:
         self._account()
 
     def position(self) -> Position:
-        """Where to go on, at a moment when everything collected was handed over.
+        """Where to go on after the samples that were handed over.
 
         After the last sample this is the start of the step that holds it: a later end has samples in there.
         """
-        boundary = self._before or (self._reach.boundary if self._reach else self.corrected.boundary())
-        return Position(boundary, self.buffer.handed)
+        return Position(self.buffer.boundary or self._here(), self.buffer.handed)
+
+    def _here(self) -> StepBoundary:
+        """Where to go on after the samples that were found."""
+        return self._before or (self._reach.boundary if self._reach else self.corrected.boundary())
 
     def run(self) -> Progress:
         """Go on until the last sample is recorded or something ends the run."""
@@ -88,9 +91,10 @@ class IntegrationLoop:
             stop = self.check(self.progress) or self._out_of_steps()
             if stop is None:
                 if self.receiver.due():
-                    if not self._hand_over():
+                    if not self._hand_over(least=self._saved + 1):
                         return self.progress
                     self.receiver.save(self.position())
+                    self._saved = self.buffer.handed
                 stop = self._interruptible_round()
             if stop is not None:
                 return self._ended(stop)
@@ -99,7 +103,7 @@ class IntegrationLoop:
 
     def _interruptible_round(self) -> Status | None:
         """A round is taken back where Ctrl-C ends it, as it may while another chart is compiled."""
-        boundary, found = self.position().boundary, self.buffer.count
+        boundary, found = self._here(), self.buffer.count
         try:
             return self._round(boundary)
         except KeyboardInterrupt:
@@ -158,9 +162,9 @@ class IntegrationLoop:
             self.progress.status = status
         return self.progress
 
-    def _hand_over(self, *, patiently: bool = False) -> bool:
+    def _hand_over(self, *, patiently: bool = False, least: int | None = None) -> bool:
         """Hand over what is collected; False where the receiver ended the run with one of the samples."""
-        refused = self.buffer.hand_over(patiently=patiently)
+        refused = self.buffer.hand_over(patiently=patiently, least=least)
         self.progress.next_sample = self.buffer.handed
         if refused is None:
             return True

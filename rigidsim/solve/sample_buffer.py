@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from bisect import bisect_right
+from bisect import bisect_left
 
 import numpy as np
 
@@ -90,8 +90,20 @@ class SampleBuffer:
             self._boundaries.pop()
         self.count = max(count, self.handed)
 
-    def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
-        """Give what is collected to the receiver; ``patiently``: only where it is much, or old.
+    @property
+    def boundary(self) -> StepBoundary | None:
+        """A step boundary before the first sample that waits; None where none does."""
+        return self._boundaries[0] if self._boundaries else None
+
+    def hand_over(
+        self, *, patiently: bool = False, least: int | None = None
+    ) -> tuple[int, StepBoundary] | None:
+        """Give what is collected to the receiver.
+
+        Args:
+            patiently: only where it is much, or old; of much the rest waits that the receiver can better
+                save with what follows.
+            least: so many samples are handed over at least, and the rest waits likewise.
 
         Returns:
             Where the receiver wants no sample past one of them: its index and a boundary before it; the
@@ -99,23 +111,50 @@ class SampleBuffer:
         """
         waiting, rows = self.count - self.handed, self._pacing.rows_at_once
         waited = time.perf_counter() - self._handed_at
-        if patiently and waiting < min(rows, self._most) and waited < self._pacing.patience:
+        old = waited >= self._pacing.patience
+        if patiently and waiting < min(rows, self._most) and not old:
+            return None
+        stop = self.count
+        if least is not None or (patiently and not old):
+            stop = self._round(self.handed + 1 if least is None else least)
+        if stop <= self.handed:
             return None
         started = self._handed_at = time.perf_counter()
-        if not self._blocks:
-            return None
-        whole, firsts = SampleBlock.joined(self._blocks), [block.first for block in self._blocks]
-        boundaries, self._blocks, self._boundaries = self._boundaries, [], []
-        for start in range(0, len(whole), rows):
+        whole, boundaries = self._waiting_until(stop)
+        handed = len(whole)
+        for start in range(0, handed, rows):
             block = whole.rows(start, start + rows)
             self._receiver.take(block)
             self.handed += len(block)
             last = self._receiver.last_wanted
             if last is not None:
+                self._blocks, self._boundaries = [], []
                 self.count = self.handed = last + 1
-                return last, boundaries[bisect_right(firsts, last) - 1]
-        self.took("hand over", waiting, time.perf_counter() - started)
+                return last, boundaries[max(first for first in boundaries if first <= last)]
+        self.took("hand over", handed, time.perf_counter() - started)
         return None
+
+    def _waiting_until(self, stop: int) -> tuple[SampleBlock, dict[int, StepBoundary]]:
+        """Take out the samples before one of those that wait; with them, by its first sample, a boundary
+        before each piece that they were found in.
+        """
+        firsts = [block.first for block in self._blocks]
+        pieces = bisect_left(firsts, stop)
+        blocks, boundaries = self._blocks[:pieces], self._boundaries[:pieces]
+        self._blocks, self._boundaries = self._blocks[pieces:], self._boundaries[pieces:]
+        cut = stop - blocks[-1].first
+        if cut < len(blocks[-1]):
+            self._blocks.insert(0, blocks[-1].rows(cut, len(blocks[-1])))
+            self._boundaries.insert(0, boundaries[-1])
+            blocks[-1] = blocks[-1].rows(0, cut)
+        return SampleBlock.joined(blocks), dict(zip(firsts, boundaries, strict=False))
+
+    def _round(self, least: int) -> int:
+        """So many of the samples found that the receiver can save them at the least cost, where those are as
+        many as asked for and the others few; else all.
+        """
+        stop = self.count - self.count % self._receiver.rows_together
+        return stop if stop >= least and self.count - stop < self._most else self.count
 
     def took(self, work: str, rows: int, seconds: float) -> None:
         """Learn how many samples may wait: as many as each work on them gets done in the time of a chunk."""

@@ -74,9 +74,11 @@ class SampleReceiver(Protocol):
 
     Attributes:
         last_wanted: index of a sample that ends the run by the guard ``max_drift``; those after it were left.
+        rows_together: samples are saved at the least cost after a multiple of so many.
     """
 
     last_wanted: int | None = None
+    rows_together: int = 1
 
     def take(self, block: SampleBlock) -> None:
         """The samples that follow those taken before."""

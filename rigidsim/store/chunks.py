@@ -37,11 +37,41 @@ def packed(values: np.ndarray) -> bytes:
     return bytes(_deflate(np.ascontiguousarray(octets.T), _LEVEL))
 
 
+class Compressor:
+    """Compresses chunks, in threads as soon as there is enough to do; see ``close``."""
+
+    def __init__(self) -> None:
+        self._pool: ThreadPoolExecutor | None = None
+        self._numbers = 0
+
+    def packed(self, values: np.ndarray) -> Future[bytes]:
+        """A whole chunk as it stands in a file, now or later.
+
+        Args:
+            values: not to be changed from now on.
+        """
+        self._numbers += values.size
+        if self._pool is None and self._numbers > _FEWEST_FOR_THREADS:
+            threads = min(_MOST_THREADS, _processors())
+            self._pool = ThreadPoolExecutor(threads, "rigidsim-chunks") if threads > 1 else None
+        if self._pool is not None:
+            return self._pool.submit(packed, values)
+        done: Future[bytes] = Future()
+        done.set_result(packed(values))
+        return done
+
+    def close(self) -> None:
+        """End the threads; what they haven't begun is dropped."""
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+            self._pool, self._numbers = None, 0
+
+
 class ChunkWriter:
     """Writes chunks in the order in which they come, while later ones are compressed."""
 
-    def __init__(self, pool: ThreadPoolExecutor | None) -> None:
-        self._pool = pool
+    def __init__(self, compressor: Compressor) -> None:
+        self._compressor = compressor
         self._waiting: deque[tuple[h5d.DatasetID, tuple[int, ...], Future[bytes]]] = deque()
 
     def put(self, target: h5d.DatasetID, place: tuple[int, ...], values: np.ndarray) -> None:
@@ -51,11 +81,8 @@ class ChunkWriter:
             place: of its first number.
             values: not to be changed from now on.
         """
-        if self._pool is None:
-            target.write_direct_chunk(place, packed(values))
-            return
-        self._waiting.append((target, place, self._pool.submit(packed, values)))
-        if len(self._waiting) > _MOST_WAITING:
+        self._waiting.append((target, place, self._compressor.packed(values)))
+        while self._waiting and (len(self._waiting) > _MOST_WAITING or self._waiting[0][2].done()):
             self._write_next()
 
     def finish(self) -> None:
@@ -72,6 +99,53 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+class RowCutter:
+    """Cuts rows into chunks as they come.
+
+    Attributes:
+        filled: rows that don't fill a chunk yet.
+
+    Args:
+        shape: of a chunk.
+    """
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._shape = shape
+        self._open = np.zeros(shape)
+        self.filled = 0
+
+    def cut(self, values: np.ndarray) -> Iterator[np.ndarray]:
+        """Take rows, doubles in any shape of that many numbers that aren't changed from now on; the chunks
+        that are full with them.
+        """
+        rows = self._shape[0]
+        values = np.asarray(values, "<f8").reshape(-1, *self._shape[1:])
+        taken = min(rows - self.filled, len(values)) if self.filled else 0
+        if taken:
+            self._open[self.filled : self.filled + taken] = values[:taken]
+            self.filled += taken
+            if self.filled == rows:
+                full, self._open, self.filled = self._open, np.zeros(self._shape), 0
+                yield full
+        while len(values) - taken >= rows:
+            taken += rows
+            yield values[taken - rows : taken]
+        rest = len(values) - taken
+        if rest:
+            self._open[:rest] = values[taken:]
+            self.filled = rest
+
+    @property
+    def rest(self) -> np.ndarray:
+        """The rows that don't fill a chunk."""
+        return self._open[: self.filled]
+
+    @property
+    def last(self) -> np.ndarray:
+        """They as a chunk, which is a whole one in a file whatever rows there are."""
+        return self._open
+
+
 class ChunkedVariable:
     """The chunks of one compressed variable, filled with rows as they come.
 
@@ -83,46 +157,38 @@ class ChunkedVariable:
         self._target = target
         self._writer = writer
         self._shape: tuple[int, ...] = target.get_create_plist().get_chunk()
-        self._first = self._filled = 0
-        self._open = np.zeros(self._shape)
+        self._first = 0
+        self._cutter = RowCutter(self._shape)
 
     def add(self, values: np.ndarray) -> None:
         """Take rows: doubles in any shape of that many numbers, not to be changed from now on."""
-        rows = self._shape[0]
-        values = np.asarray(values, "<f8").reshape(-1, *self._shape[1:])
-        taken = min(rows - self._filled, len(values)) if self._filled else 0
-        if taken:
-            self._open[self._filled : self._filled + taken] = values[:taken]
-            self._filled += taken
-            if self._filled == rows:
-                self._put(self._open)
-                self._open, self._filled = np.zeros(self._shape), 0
-        while len(values) - taken >= rows:
-            self._put(values[taken : taken + rows])
-            taken += rows
-        rest = len(values) - taken
-        if rest:
-            self._open[:rest] = values[taken:]
-            self._filled = rest
+        for chunk in self._cutter.cut(values):
+            self._put(chunk)
+
+    def add_packed(self, content: bytes) -> None:
+        """Take a chunk as it stands in a file, where no rows wait for the rest of theirs."""
+        if self._cutter.filled:
+            raise AssertionError("a whole chunk in the middle of another")
+        self._target.write_direct_chunk(self._place, content)
+        self._first += self._shape[0]
 
     def add_chunks_of(self, saved: h5py.Dataset) -> int:
         """Take whole chunks of another file as they are, if they are made like these; returns their rows."""
         rows = self._shape[0]
-        if self._filled or saved.chunks != self._shape or not _packed_alike(saved.id):
+        if self._cutter.filled or saved.chunks != self._shape or not _packed_alike(saved.id):
             return 0
         whole = len(saved) // rows
         for number in range(whole):
             mask, content = saved.id.read_direct_chunk((number * rows, *self._place[1:]))
             if mask:  # filters that were left out
                 return number * rows
-            self._target.write_direct_chunk(self._place, content)
-            self._first += rows
+            self.add_packed(content)
         return whole * rows
 
     def finish(self) -> None:
         """Write the last chunk, which is a whole one in the file whatever rows there are."""
-        if self._filled:
-            self._put(self._open)
+        if self._cutter.filled:
+            self._put(self._cutter.last)
 
     @property
     def _place(self) -> tuple[int, ...]:
@@ -142,14 +208,9 @@ def _packed_alike(saved: h5d.DatasetID) -> bool:
 
 @contextmanager
 def chunked(variables: Mapping[str, h5d.DatasetID]) -> Iterator[dict[str, ChunkedVariable]]:
-    """The chunks of compressed variables, whose rows are added inside the block; written when it ends.
-
-    Threads compress where there is enough to do.
-    """
-    numbers = sum(math.prod(target.shape) for target in variables.values())
-    threads = min(_MOST_THREADS, _processors()) if numbers >= _FEWEST_FOR_THREADS else 1
-    pool = ThreadPoolExecutor(threads, "rigidsim-chunks") if threads > 1 else None
-    writer = ChunkWriter(pool)
+    """The chunks of compressed variables, whose rows are added inside the block; written when it ends."""
+    compressor = Compressor()
+    writer = ChunkWriter(compressor)
     chunks = {name: ChunkedVariable(target, writer) for name, target in variables.items()}
     try:
         yield chunks
@@ -157,5 +218,4 @@ def chunked(variables: Mapping[str, h5d.DatasetID]) -> Iterator[dict[str, Chunke
             variable.finish()
         writer.finish()
     finally:
-        if pool is not None:  # after an error or Ctrl-C nobody needs what waits
-            pool.shutdown(cancel_futures=True)
+        compressor.close()  # after an error or Ctrl-C nobody needs what waits

@@ -11,9 +11,9 @@ import numpy as np
 
 from rigidsim.scene.records import dataclass
 from rigidsim.store import viewing
+from rigidsim.store.collected import JoinedBlocks
 from rigidsim.store.netcdf import Block
 from rigidsim.store.run import Run
-from rigidsim.store.segments import JoinedBlocks
 from rigidsim.store.summary import Brief
 from rigidsim.store.variables import LABELS, Extra, Variable
 

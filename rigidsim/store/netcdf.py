@@ -6,14 +6,13 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import h5py
 import numpy as np
 from h5py import h5d, h5ds
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.chunks import ChunkedVariable
 from rigidsim.store.netcdf_file import NetcdfFile, write_rows, writing
 from rigidsim.store.variables import LABELS, Extra, Variable
 
@@ -58,33 +57,36 @@ def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
         write_rows(file.variable(extra.name, extra.dims, extra.attributes), 0, extra.values)
 
 
-def fill(created: Created, variables: Sequence[Variable], block: Block) -> None:
-    """Write all rows of variables that aren't compressed."""
-    for variable in variables:
-        for name, values in zip(variable.part_names(), block[variable.name], strict=True):
-            write_rows(created[name], 0, values)
+class Rows(Protocol):
+    """Values of all variables of a file.
 
+    Attributes:
+        rows: their number.
+    """
 
-def add(chunks: Mapping[str, ChunkedVariable], variables: Sequence[Variable], block: Block) -> None:
-    """Write one block of rows after those before."""
-    for variable in variables:
-        for name, values in zip(variable.part_names(), block[variable.name], strict=True):
-            chunks[name].add(values)
+    rows: int
+
+    @property
+    def compressed(self) -> bool:
+        """Whether they are written as compressed chunks."""
+
+    def write(self, created: Created) -> None:
+        """Write them."""
 
 
 def image(
     variables: Sequence[Variable],
-    block: Block,
-    rows: int,
+    rows: Rows | None,
     attributes: Mapping[str, Any],
     groups: Mapping[str, Mapping[str, np.ndarray]],
 ) -> io.BytesIO:
-    """A whole uncompressed file built in memory; ``groups`` hold plain arrays beside the variables."""
+    """A whole file built in memory; ``groups`` hold plain arrays beside the variables."""
     buffer = io.BytesIO()
     with writing(buffer) as file:
-        created = declare(file, variables, rows, attributes, compressed=False)
-        if rows:
-            fill(created, variables, block)
+        count, compressed = (0, False) if rows is None else (rows.rows, rows.compressed)
+        created = declare(file, variables, count, attributes, compressed=compressed)
+        if rows is not None and count:
+            rows.write(created)
         for name, arrays in groups.items():
             file.group(name, arrays)
     return buffer

@@ -22,7 +22,8 @@ import numpy as np
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic, netcdf
-from rigidsim.store.chunks import ChunkedVariable, chunked
+from rigidsim.store.chunks import ChunkedVariable, Compressor, chunked
+from rigidsim.store.collected import CollectedRows
 from rigidsim.store.hdf5_sink import sink
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
 from rigidsim.store.variables import Extra, Variable
@@ -38,7 +39,8 @@ class SegmentLimits:
     """When a segment is due.
 
     Attributes:
-        bytes: of what is collected; twice that is in memory while a segment is put together.
+        bytes: of what is collected, before it is compressed; as much again, compressed, is in memory while a
+            segment is put together.
         seconds: since the latest one, which is what a crash can cost. A segment takes some 20 ms.
     """
 
@@ -95,8 +97,8 @@ class SegmentWriter:
         self._folder = folder
         self._variables = variables
         self._attributes = dict(attributes)
-        self._blocks: list[netcdf.Block] = []
-        self._rows = 0
+        self._compressor = Compressor()
+        self._collected = CollectedRows(variables, chain.rows, self._compressor)
         self._saved = time.monotonic()
         self._row_bytes = 8 * sum(v.parts * int(np.prod(v.shape)) for v in variables)
         self._seal = chain.seal
@@ -109,15 +111,12 @@ class SegmentWriter:
 
     def add(self, block: netcdf.Block) -> None:
         """Take a block of samples."""
-        rows = len(block["time"][0])
-        if rows:
-            self._blocks.append(block)
-            self._rows += rows
+        self._collected.add(block)
 
     @property
     def due(self) -> bool:
         """Whether what is collected is large, or the last segment so old that losing the time would hurt."""
-        large = self._rows * self._row_bytes >= self._limits.bytes
+        large = self._collected.rows * self._row_bytes >= self._limits.bytes
         return large or time.monotonic() - self._saved >= self._limits.seconds
 
     def flush(self, checkpoint: Arrays, events: Arrays) -> None:
@@ -130,25 +129,28 @@ class SegmentWriter:
         Raises:
             RunFolderError: the disk is full or fails; what is collected stays in memory.
         """
-        content = self._image(self._collected(), self._rows, checkpoint, events, self._place())
+        content = self._image(self._collected, checkpoint, events, self._place())
         path = self._folder / f"{self.count:08d}.h5"
         with self._writing():
             atomic.write_bytes(path, content)
         self._seal = seal_of(content)
         self.count += 1
-        self.saved_rows += self._rows
-        self._blocks, self._rows = [], 0
+        self.saved_rows += self._collected.rows
+        self._collected = self._nothing(self.saved_rows)
         self._saved = time.monotonic()
 
     def _place(self) -> dict[str, Any]:
         return {"segment": self.count, "first_sample": self.saved_rows, "previous_seal": self._seal}
 
+    def _nothing(self, first: int) -> CollectedRows:
+        return CollectedRows(self._variables, first, self._compressor)
+
     def _image(
-        self, block: netcdf.Block, rows: int, checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
+        self, collected: CollectedRows, checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
     ) -> memoryview:
         attributes = {**self._attributes, **place}
         groups = {"checkpoint": checkpoint, "events": events}
-        return sealed(netcdf.image(self._variables, block, rows, attributes, groups))
+        return sealed(netcdf.image(self._variables, collected, attributes, groups))
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -160,9 +162,6 @@ class SegmentWriter:
                 f"{self.saved_rows} samples are saved in {self._folder.name}/; "
                 f"{once_mended(error)}, {RESUME} continues from there"
             ) from error
-
-    def _collected(self) -> netcdf.Block:
-        return JoinedBlocks(self._blocks, self._variables)
 
     def complete(
         self,
@@ -188,7 +187,7 @@ class SegmentWriter:
         paths = segment_paths(self._folder)
         if len(paths) < self.count:  # rows that nothing fills would read as zeros
             raise RunFolderError(f"{self._folder}: segment {len(paths):08d}.h5 is missing")
-        rows = self.saved_rows + self._rows
+        rows = self.saved_rows + self._collected.rows
         with self._writing(), atomic.replacing(target) as temporary:
             with sink(temporary) as target_file, netcdf.writing(target_file) as file:
                 created = netcdf.declare(file, self._variables, rows, attributes, compressed=True)
@@ -196,41 +195,18 @@ class SegmentWriter:
                     for path in paths:
                         target_file.check()
                         _copy(path, chunks)
-                    for block in self._blocks:
-                        netcdf.add(chunks, self._variables, block)
+                    self._collected.add_to(chunks)
                 netcdf.add_extras(file, extras)
             content_seal, self.dataset_sha256 = seal(temporary)
         with self._writing():
             if checkpoint is not None:
                 path, last, events = checkpoint
                 place = {"segment": 1, "first_sample": rows, "previous_seal": content_seal}
-                atomic.write_bytes(path, self._image({}, 0, last, events, place))
+                atomic.write_bytes(path, self._image(self._nothing(rows), last, events, place))
             conclude()
         remove(self._folder)
+        self._compressor.close()
         return rows
-
-
-class JoinedBlocks(Mapping[str, Sequence[np.ndarray]]):
-    """Blocks one after the other; only the variable that is asked for is in memory twice."""
-
-    def __init__(self, blocks: Sequence[netcdf.Block], variables: Sequence[Variable]) -> None:
-        self._blocks = blocks
-        self._parts = {v.name: v.parts for v in variables}
-
-    def __getitem__(self, name: str) -> list[np.ndarray]:
-        return [self._column(name, part) for part in range(self._parts[name])]
-
-    def _column(self, name: str, part: int) -> np.ndarray:
-        """Row by row in memory, as it stands in a file; blocks come column by column."""
-        pieces = [block[name][part] for block in self._blocks]
-        rows = sum(len(piece) for piece in pieces)
-        return np.concatenate(pieces, out=np.empty((rows, *pieces[0].shape[1:])))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._parts)
-
-    def __len__(self) -> int:
-        return len(self._parts)
 
 
 def segment_paths(folder: Path) -> list[Path]:

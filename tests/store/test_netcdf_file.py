@@ -114,7 +114,7 @@ def test_groups_hold_plain_arrays(tmp_path: Path) -> None:
     arrays = {"counts": np.array([1, 2, 3]), "state_0": np.array([[0.1, -0.0]]), "scalar": np.array(2.5)}
     made = tmp_path / "made.h5"
     made.write_bytes(
-        netcdf.image([], {}, 0, {"title": "t"}, {"checkpoint": {**arrays, "no": np.empty(0)}}).getvalue()
+        netcdf.image([], None, {"title": "t"}, {"checkpoint": {**arrays, "no": np.empty(0)}}).getvalue()
     )
     read = netcdf.read_group(made, "checkpoint")
     assert sorted(read) == sorted(arrays)

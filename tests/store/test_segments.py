@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import xarray
@@ -17,7 +18,7 @@ import rigidsim
 from rigidsim.errors import RunFolderError
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.pacing import Pacing
-from rigidsim.store import netcdf, segments
+from rigidsim.store import chunks, netcdf, segments
 from rigidsim.store.segments import SegmentLimits, SegmentWriter, read_chain, segment_paths
 from rigidsim.store.variables import SCHEMA_VERSION, Variable, time_variable
 
@@ -240,6 +241,61 @@ def test_a_run_in_many_segments_is_the_run_in_one(
         assert not run.folder.segments.exists()
         assert names(run.folder.path) == ["checkpoint.h5", "config.toml", "dataset.h5", "summary.json"]
     same_bits(one, many)
+
+
+def test_whole_chunks_are_compressed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of segments that begin with a chunk are copied: here the fourth and the fifth of six."""
+    chunk, packed = netcdf.CHUNK_ROWS, []
+    original = chunks.packed
+    monkeypatch.setattr(chunks, "packed", lambda values: packed.append(values.size) or original(values))
+    w = writer(tmp_path / "s")
+    first = 0
+    for rows in (chunk - 3, 2 * chunk + 3, chunk, chunk + 5, 100):  # the last segment begins within a chunk
+        w.add(block(first, rows))
+        w.flush(CHECKPOINT, {})
+        first += rows
+    numbers = sorted(chunk * width for width in (1, 1, 3, 3, 1))  # of a chunk of each part
+    assert sorted(packed) == sorted(3 * numbers)  # with what begins the sixth
+    with (
+        h5py.File(tmp_path / "s" / "00000002.h5") as segment,
+        h5py.File(tmp_path / "s" / "00000004.h5") as rest,
+    ):
+        assert segment["rates"].chunks == (chunk, 3)
+        assert rest["rates"].chunks is None
+    packed.clear()
+    assert w.complete(tmp_path / "d.h5", {}) == first
+    assert sorted(packed) == sorted(4 * numbers)
+    with xarray.open_dataset(tmp_path / "d.h5") as dataset:
+        np.testing.assert_array_equal(dataset.rates_lo, block(0, first)["rates"][1])
+
+
+def test_a_dense_run_saves_whole_chunks_and_resumes_from_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
+) -> None:
+    """What waits at a checkpoint is found again; steps and numbers are those of the run in one."""
+    text = free_body("end = 400\nsamples = 60_001")
+    one = rigidsim.run(rigidsim.parse(text), out=tmp_path / "one")
+    flush = SegmentWriter.flush
+
+    def killed(self: SegmentWriter, *given: Any) -> None:
+        if self.count == 2:
+            raise RunFolderError("killed")
+        flush(self, *given)
+
+    tuning = Tuning(segments=SegmentLimits(bytes=2_000_000))
+    with monkeypatch.context() as patch:
+        patch.setattr(SegmentWriter, "flush", killed)
+        with pytest.raises(RunFolderError, match="killed"):
+            rigidsim.run(rigidsim.parse(text), out=tmp_path / "two", tuning=tuning)
+    [folder] = (tmp_path / "two").iterdir()
+    chain = read_chain(folder / "segments")
+    assert chain.rows > 0
+    assert chain.rows % netcdf.CHUNK_ROWS == 0
+    with h5py.File(chain.paths[-1]) as segment:
+        assert segment["quaternion"].chunks == (netcdf.CHUNK_ROWS, 4)
+    two = rigidsim.resume(folder)
+    same_bits(one, two)
+    assert one.summary["cost"]["steps"] == two.summary["cost"]["steps"]
 
 
 @pytest.mark.parametrize("missing", [0, 1])
