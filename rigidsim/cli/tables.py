@@ -105,6 +105,8 @@ def _print_ended(summary: Summary, out: Console) -> None:
         f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
         f"{summary.precision} precision, {how}",
     )
+    if summary.formulation == "planar":
+        _line(out, "", "whether a small push out of the plane would grow isn't examined")
     cost = summary.cost
     seconds = sum(v for k, v in cost.seconds.items() if k != ENGINE)
     _line(

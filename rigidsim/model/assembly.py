@@ -21,6 +21,7 @@ from rigidsim.model.needs import work_is_needed
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.orbital_frame import orbital_states
+from rigidsim.model.planar import SPIN, PlanarStates, planar_states, spin_equation
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.step_limiter import PACE, arguments, pace_derivative, roots
@@ -48,9 +49,13 @@ def assemble_states(
     canonical = None
     if requirements.canonical:
         canonical = canonical_states(plan.scene, plan.scaling, numbers, number)
-    rate_states = canonical.rates if canonical else list(hy.make_vars(*RATES))
+    planar = None
+    if plan.plane is not None:
+        planar = planar_states(plan.scene, plan.plane, plan.scaling.time, number)
+    of_states = canonical or planar
+    rate_states = of_states.rates if of_states else list(hy.make_vars(*RATES))
     rates = in_common_unit(rate_states, numbers.rate_units, number)
-    attitude = canonical.attitude if canonical else _attitude(plan, rates, number, sequence)
+    attitude = of_states.attitude if of_states else _attitude(plan, rates, number, sequence)
     vertical = None
     if attitude is not None and numbers.arm is not None:
         vertical = vertical_from_attitude(attitude.matrix, numbers, number)
@@ -71,7 +76,12 @@ def assemble_states(
         plan.surfaces,
         loads=list(plan.loads),
     )
-    blocks = [_canonical_block(m, canonical, plan)] if canonical else _rotation_blocks(m, plan)
+    if canonical is not None:
+        blocks = [_canonical_block(m, canonical, plan)]
+    elif planar is not None:
+        blocks = [_planar_block(m, planar, plan)]
+    else:
+        blocks = _rotation_blocks(m, plan)
     if flies:
         blocks.append(_flight_block(m, plan))
     blocks += _load_blocks(m)
@@ -102,6 +112,20 @@ def _canonical_block(m: Mechanics, states: CanonicalStates, plan: ModelPlan) -> 
         hamilton_equations(m),
         [*states.attitude.initial, *states.initial_momenta],
         exponents=[0] * 3 + [m.scaling.momentum] * 3,
+        why=plan.requirements.why["attitude"],
+    )
+
+
+def _planar_block(m: Mechanics, states: PlanarStates, plan: ModelPlan) -> StateBlock:
+    assert plan.plane is not None
+    return StateBlock(
+        [*states.attitude.names, SPIN],
+        [
+            *states.attitude.derivatives,
+            spin_equation(plan.plane, m.numbers, m.torque, m.number, m.scene.context),
+        ],
+        [*states.attitude.initial, states.initial_spin],
+        exponents=[states.attitude.angle_unit, -m.scaling.time],
         why=plan.requirements.why["attitude"],
     )
 

@@ -50,6 +50,7 @@ class AttitudeStates:
         angles: positions within ``names`` of states that are angles and grow without bound.
         defect: name, long name and expression of what should stay constant by construction, or None.
         singular_factor: expression that vanishes where the formulation breaks down, or None.
+        angle_unit: binary exponent of the unit that such angles are carried in, rad.
         orbital: where the states are the attitude relative to an orbital frame.
     """
 
@@ -65,6 +66,7 @@ class AttitudeStates:
     singular_factor: Symbolic | None = None
     sequence: str = field(default="")
     orbital: OrbitalFrame | None = None
+    angle_unit: int = 0
 
     @property
     def variables(self) -> list[Symbolic]:

@@ -79,6 +79,15 @@ class Load(SceneLoad):
             if expression != hy.expression(0.0)
         )
 
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """Whether its torque has no part across a principal axis of a body that turns about it alone.
+
+        Args:
+            axis: unit, body axes (mpf).
+            normal: the same in space axes.
+        """
+        return False
+
     def turns_about(self, m: Kinematics, axis: Vector) -> bool:
         """Whether it may have a torque about a unit axis in space (mpf). Not asked where ``linear_potential``
         or ``fixed_source`` say more.

@@ -11,8 +11,9 @@ from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbital_frame import corotating_orbit
 from rigidsim.model.parity import refuse_odd_loads
+from rigidsim.model.planar import Plane, asked_plane, gradient_plane
 from rigidsim.model.scaling import Scaling, choose_scaling
-from rigidsim.model.state_selection import Requirements, choose_requirements
+from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
@@ -29,6 +30,7 @@ class ModelPlan:
         orbit_tags: of each prescribed orbit, what makes the names of its states unique.
         frame_orbit: the orbit in whose frame the attitude is carried; None where that is space.
         surfaces: on which the equations change.
+        plane: that the motion stays in, where its formulation is planar.
     """
 
     scene: Scene
@@ -39,6 +41,7 @@ class ModelPlan:
     orbit_tags: Mapping[KeplerOrbit, str]
     frame_orbit: KeplerOrbit | None
     surfaces: Surfaces
+    plane: Plane | None = None
 
     @property
     def wide(self) -> bool:
@@ -60,10 +63,11 @@ def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
         scene = replace(scene, loads=(*scene.loads, *extra_loads))
     loads: list[Load] = [*UniformGravity.of(scene), *scene.loads]  # type: ignore[list-item]
     requirements = choose_requirements(scene, loads)
+    requirements, plane = _planar(scene, loads, requirements)
     unknown = [load for load in loads if load.amplitude(scene) is None]
     refuse_odd_loads(scene, requirements, unknown)
     scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
-    if requirements.canonical:
+    if requirements.canonical or plane is not None:
         scaling = replace(scaling, rates=(0, 0, 0))
     tags: dict[KeplerOrbit, str] = {}
     for number, load in enumerate(scene.loads, start=1):
@@ -78,4 +82,19 @@ def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
         tags,
         corotating_orbit(scene, loads, requirements.formulation),
         surfaces_of(scene),
+        plane,
     )
+
+
+def _planar(
+    scene: Scene, loads: Sequence[Load], requirements: Requirements
+) -> tuple[Requirements, Plane | None]:
+    """Two states where a gravity gradient keeps the body in a plane, or where that is asked."""
+    if requirements.formulation == PLANAR:
+        return requirements, asked_plane(scene, loads)
+    if scene.config.integrator.formulation != "auto" or requirements.formulation != "quaternion":
+        return requirements, None
+    plane = gradient_plane(scene, loads)
+    if plane is None:
+        return requirements, None
+    return requirements.in_plane(), plane

@@ -6,6 +6,7 @@ Starts from what is recorded and what the loads read, and adds a state only when
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
@@ -15,6 +16,9 @@ from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
+
+PLANAR = "planar"
+"""The formulation of a body that turns about one axis."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,20 @@ class Requirements:
     def canonical(self) -> bool:
         """Whether Euler angles and their momenta are carried, from which the rates follow."""
         return self.formulation == "canonical"
+
+    @property
+    def planar(self) -> bool:
+        """Whether an angle and its rate are all."""
+        return self.formulation == PLANAR
+
+    def in_plane(self) -> Requirements:
+        """The same for a motion that was found to stay in a plane."""
+        why = {
+            **self.why,
+            "attitude": f"{self.why['attitude']}; the body turns about a principal axis, along which every "
+            'torque points and stays (formulation = "quaternion" carries the full motion)',
+        }
+        return replace(self, formulation=PLANAR, vertical=False, why=why)
 
 
 def choose_requirements(scene: Scene, loads: Sequence[Load] = ()) -> Requirements:

@@ -190,6 +190,11 @@ class System:
         return tuple(first + i for i in attitude.angles)
 
     @property
+    def angle_unit(self) -> int:
+        """Binary exponent of the unit that those are carried in, rad."""
+        return 0 if self.mechanics.attitude is None else self.mechanics.attitude.angle_unit
+
+    @property
     def singular_factor(self) -> Symbolic | None:
         """Expression that vanishes where the formulation breaks down, or None."""
         attitude = self.mechanics.attitude

@@ -61,6 +61,11 @@ def cross(a: Vector, b: Vector) -> Vector:
     ]
 
 
+def parallel(context: Any, a: Vector, b: Vector) -> bool:
+    """Whether two unit vectors point along one line."""
+    return bool(norm(context, cross(a, b)) <= negligible(context))
+
+
 def apply(matrix: Matrix, a: Vector) -> Vector:
     """Matrix times vector."""
     return [dot(row, a) for row in matrix]

@@ -72,6 +72,12 @@ class KeplerOrbit:
         """Whether neither node nor periapsis moves (a circle's periapsis never does)."""
         return bool(self.node_rate == 0 and self.periapsis_rate == 0)
 
+    def normal(self, context: Any) -> list[Any]:
+        """Unit vector at time zero about which the body goes in the direct sense, space axes."""
+        tilt, node = self.inclination, self.ascending_node
+        across = context.sin(tilt)
+        return [across * context.sin(node), -across * context.cos(node), context.cos(tilt)]
+
     @property
     def pericentre(self) -> Any:
         """Least distance, m."""

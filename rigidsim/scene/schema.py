@@ -52,7 +52,7 @@ from rigidsim.scene.validation_messages import nearest, shown
 # room for numbers down to 1e-70.
 LARGEST_DIGITS = 250
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
-FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical")
+FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar")
 STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
 EULER_SEQUENCES = tuple(
     first + second + third
@@ -186,9 +186,9 @@ class Integrator(ConfigTable):
         "epsilon in double precision and an eighth of it in others, whose series would otherwise be just too "
         "short to keep what is cut off well below rounding",
     )
-    formulation: Literal["auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical"] = (
-        "auto"
-    )
+    formulation: Literal[
+        "auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar"
+    ] = "auto"
     euler_sequence: EulerSequence = "zxz"
     method: Literal["taylor", "closed_form"] = "taylor"
     hold_invariants: StrictBool = False

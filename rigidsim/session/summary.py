@@ -32,6 +32,7 @@ from rigidsim.store.summary import (
     as_fields,
 )
 
+_IN_PLANE = "; in its plane alone: whether a small push out of the plane would grow isn't examined"
 _NOT_CERTIFIED = "not certified against an independent solution"
 
 
@@ -206,7 +207,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         estimated_attitude_error=estimate.attitude,
         estimated_position_error=estimate.position,
         estimated_velocity_error=estimate.velocity,
-        estimated_how=estimate.how,
+        estimated_how=estimate.how + (_IN_PLANE if found.prepared.system.requirements.planar else ""),
         amplification=min(estimate.amplification, sys.float_info.max),
         error_growth_rate=estimate.growth_rate,
         predictable_seconds=estimate.predictable_seconds,

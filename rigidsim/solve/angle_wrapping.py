@@ -6,6 +6,7 @@ so they are brought back into (-pi, pi] every few steps, and the turns are count
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import mpmath
@@ -43,9 +44,12 @@ class AngleWrapping:
 
     Args:
         context: mpmath context with more digits than the precision.
+        unit: binary exponent of the unit of the angle states, rad.
     """
 
-    def __init__(self, positions: tuple[int, ...], precision: Precision, context: mpmath.MPContext) -> None:
+    def __init__(
+        self, positions: tuple[int, ...], precision: Precision, context: mpmath.MPContext, unit: int = 0
+    ) -> None:
         self.positions = list(positions)
         self.angles = AngleState((0, 0, 0), 0, (0.0, 0.0, 0.0)) if positions else AngleState()
         self._precision = precision
@@ -56,17 +60,20 @@ class AngleWrapping:
         high = context.ldexp(whole, 3 - bits)
         self._high = precision.number(high)
         self._low = precision.number(pi2 - high)
+        self._turn = math.ldexp(2 * math.pi, -unit)
+        self._turn_parts = tuple(precision.number(context.ldexp(x, -unit)) for x in (high, pi2 - high))
 
     def wrap(self, state: np.ndarray) -> None:
         """Bring the angles of ``state`` into (-pi, pi], in place."""
         scalar = self._precision.scalar
         counted = list(self.angles.turns)
         for n, position in enumerate(self.positions):
-            turns = int(np.rint(float(state[position]) / (2 * np.pi)))
+            turns = int(np.rint(float(state[position]) / self._turn))
             if turns:
                 count = self._precision.indices(turns, turns + 1)[0]
                 count = scalar(count) if self._precision.narrow else count
-                state[position] = (state[position] - count * self._high) - count * self._low
+                high, low = self._turn_parts
+                state[position] = (state[position] - count * high) - count * low
                 counted[n] += turns
         self.angles = self.angles._replace(turns=tuple(counted))
 

@@ -58,7 +58,7 @@ def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly
 
 def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
-    wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context)
+    wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context, system.angle_unit)
     log = EventLog([c.stop for c in system.crossings], wrapping)
     stepper = stepper_of(system, precision, prepared.tolerance, start, log)
     projection = None

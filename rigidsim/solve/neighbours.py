@@ -145,6 +145,7 @@ class Neighbours:
         exponents = system.state_exponents
         self._units = np.ldexp(1.0, np.array([exponents[i] for i in self._places["rates"][:3]], np.int32))
         self._angles = list(system.angle_states)
+        self._turn = math.ldexp(2 * math.pi, -system.angle_unit)
         initial = np.array([float(x) for x in system.initial])
         self._begin(initial, start, end, steps, _FEWEST_STRETCHES)
         self._push(pushes.first, np.abs(initial), rounded)
@@ -242,7 +243,7 @@ class Neighbours:
         moved = before[:, 0] != self._states[:, 0]  # what stands still isn't rounded
         self._push(self._pushes.own * math.sqrt(taken), largest, moved, elapsed)
         angles = self._angles  # which grow, and step control with them
-        self._states[angles] -= 2 * np.pi * np.rint(self._states[angles, :1] / (2 * np.pi))
+        self._states[angles] -= self._turn * np.rint(self._states[angles, :1] / self._turn)
         far = float(self._distances(self._states).max())
         if far > _LARGEST:
             self._states = self._drawn_in(self._states, _DRAWN_IN * _LARGEST / far)

@@ -249,7 +249,8 @@ def double_twin(prepared: InitialValueProblem) -> System:
     about the motion itself, such as its stability.
     """
     config = prepared.scene.config
-    formulation = "rates" if prepared.system.requirements.formulation == "rates" else "quaternion"
+    own = prepared.system.requirements.formulation
+    formulation = own if own in ("rates", "planar") else "quaternion"
     record = ["angular_velocity"] if formulation == "rates" else ["quaternion"]
     integrator = config.integrator.model_copy(update={"formulation": formulation})
     output = config.output.model_copy(update={"record": record})

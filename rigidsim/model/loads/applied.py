@@ -13,7 +13,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.state_names import state_names
-from rigidsim.scene.arithmetic import Vector, cross, diagonal
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, parallel
 from rigidsim.scene.expression_parser import parse_expression
 from rigidsim.scene.expressions import (
     ATTITUDE_NAMES,
@@ -186,6 +186,14 @@ class Torque(Applied):
     Fields = TorqueFields
     title = "torque"
     unit = "N m"
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """Where only the component along the axis isn't zero."""
+        along = axis if self.frame == "body" else normal
+        return all(
+            _vanishes(component) or parallel(scene.context, unit, along)
+            for component, unit in zip(self.components, diagonal([scene.context.one] * 3), strict=True)
+        )
 
     def torque(self, m: Kinematics) -> list[Term]:
         """See ``Load``."""

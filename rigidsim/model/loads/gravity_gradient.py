@@ -13,7 +13,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
@@ -144,6 +144,19 @@ class GravityGradient(Load):
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
         """c x (I c) has no part along an axis of symmetry."""
         return True
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """c x (I c) is along a principal axis if c is across it, and zero if c is along it."""
+        if self.orbit is not None:
+            return self.orbit.node_rate == 0 and parallel(
+                scene.context, self.orbit.normal(scene.context), normal
+            )
+        if self.position is None:
+            return False
+        length = norm(scene.context, self.position)
+        direction = [x / length for x in self.position]
+        across = abs(dot(direction, normal)) <= negligible(scene.context)
+        return across or parallel(scene.context, direction, normal)
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
         """Where the source rests."""

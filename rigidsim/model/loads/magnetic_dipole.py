@@ -10,7 +10,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, dot, negligible, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Triple, quantity
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
@@ -131,6 +131,15 @@ class MagneticDipole(Load):
         moment = self._moment(m)
         axes = diagonal([m.scene.context.one] * 3)
         return [(cross(moment, axis), b) for axis, b in zip(axes, self._field(m), strict=True)]
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """A needle across the axis in a uniform field across it."""
+        context = scene.context
+        if self.orbit is not None:
+            return False
+        tiny = negligible(context)
+        across = abs(dot(self.moment, axis)) <= tiny * norm(context, self.moment)
+        return bool(across and abs(dot(self.source, normal)) <= tiny * norm(context, self.source))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         """-m . B."""

@@ -11,7 +11,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
 from rigidsim.scene.records import dataclass
@@ -100,6 +100,18 @@ class UniformGravity(Load):
         weights = [context.ldexp(-mass * g, scaling.length - scaling.energy) for g in scene.gravity]
         terms = [m.number(k) * x for k, x in zip(weights, m.position, strict=True) if k]
         return hy.sum(terms) if terms else None
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """A pendulum's pull is across the axis, and so is its arm; none of them has a torque along it."""
+        context, arm = scene.context, scene.torque_arm
+        if arm is None or all(x == 0 for x in arm):
+            return True
+        length, strength = norm(context, arm), norm(context, self.acceleration)
+        if strength == 0:
+            return True
+        tiny = negligible(context)
+        across = abs(dot(arm, axis)) <= tiny * length
+        return bool(across and abs(dot(self.acceleration, normal)) <= tiny * strength)
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         """M com and g, about a fixed point."""

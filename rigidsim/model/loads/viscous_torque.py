@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, Triple
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
@@ -46,6 +46,11 @@ class ViscousTorque(Load):
     def damping(self) -> Vector | None:
         """See ``Load``."""
         return self.coefficients
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """Where the damping of a spin about the axis is along it."""
+        context, damped = scene.context, [c * x for c, x in zip(self.coefficients, axis, strict=True)]
+        return bool(norm(context, cross(damped, axis)) <= negligible(context) * max(self.coefficients))
 
     def amplitude(self, scene: Scene) -> Any:
         """It only takes."""
