@@ -128,7 +128,7 @@ def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Ex
     problems = long_integers(table)
     if problems:
         raise ConfigError(problems, source)
-    problems = messages.later_features(table)
+    problems = []
     if not table:
         problems.append(Problem("config", f"it is empty; {NEW}"))
     model = config_model()

@@ -22,6 +22,9 @@ _LARGEST_DECIMAL_EXPONENT = 5000
 _LONGEST_TEXT = 5000
 _TOO_LONG = f"digits and exponent of a number may make at most {_LARGEST_DECIMAL_EXPONENT}"
 
+_LONGEST_DECIMAL = 150  # places of a decimal that is written out
+_PLAIN_DIGITS = 18
+
 _MOST_FACTORS = 20
 _LARGEST_POWER_OF_PI = 64
 _LARGEST_BITS = 150_000  # of a product, which a single power may have
@@ -179,6 +182,45 @@ def parse_quantity(value: Any) -> ExactNumber:
     if match is None or match["unit"] is None:
         return parse_number(value, "1")
     return with_unit(parse_number(match["number"], "1"), match["unit"].strip(), value)
+
+
+def in_its_unit(value: Any) -> tuple[ExactNumber, str]:
+    """A TOML value as a number of the unit that is written behind it, and that unit; empty where none is.
+
+    Raises:
+        ValueError: see ``parse_number``; the unit isn't looked at.
+    """
+    short = isinstance(value, str) and len(value) <= _LONGEST_TEXT
+    match = _NUMBER_AND_UNIT.fullmatch(value) if short else None
+    if match is None or match["unit"] is None:
+        return parse_number(value, "1"), ""
+    return parse_number(match["number"], "1"), match["unit"].strip()
+
+
+def decimal_text(value: Fraction) -> str:
+    """A number as TOML has it: a decimal where it is one of some hundred digits, else ``p/q``, which has to
+    stand in quotes.
+    """
+    rest, powers = value.denominator, {2: 0, 5: 0}
+    for prime in powers:
+        while rest % prime == 0 and powers[prime] <= _LONGEST_DECIMAL:
+            rest //= prime
+            powers[prime] += 1
+    places = max(powers.values())
+    if rest != 1 or places > _LONGEST_DECIMAL:
+        return f"{value.numerator}/{value.denominator}"
+    whole = value.numerator * 10**places // value.denominator
+    sign, digits = "-" if whole < 0 else "", str(abs(whole))
+    if not places and len(digits) <= _PLAIN_DIGITS:
+        return sign + digits
+    significant = digits.rstrip("0") or "0"
+    exponent = len(digits) - len(significant) - places
+    point = len(significant) + exponent  # digits before the point
+    if -4 <= point - 1 <= _PLAIN_DIGITS and exponent < 0:
+        whole_part = significant[:point] if point > 0 else "0"
+        return f"{sign}{whole_part}.{'0' * max(0, -point)}{significant[max(0, point) :]}"
+    rest_digits = f".{significant[1:]}" if len(significant) > 1 else ""
+    return f"{sign}{significant[0]}{rest_digits}e{point - 1}"
 
 
 def with_unit(number: ExactNumber, unit: str, text: str) -> Quantity:

@@ -94,18 +94,32 @@ def _parts(assignment: str, where: str) -> tuple[str, str]:
     return key.strip(), value_text.strip()
 
 
-def _assign(table: dict[str, Any], key: str, value: Any, where: str) -> None:
+_KEY_PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d{1,9}\])*)\s*(\.|$)""")
+
+
+def key_steps(key: str, where: str) -> list[str | int]:
+    """The parts of a dotted key and its indices, counted from 0; a part with points in it stands in quotes.
+
+    Raises:
+        ConfigError: it is none.
+    """
     steps: list[str | int] = []
-    for part in key.split("."):
-        match = re.fullmatch(r"([^\[\]]+)((?:\[\d{1,9}\])*)", part.strip())
+    begin = 0
+    while True:
+        match = _KEY_PART.match(key, begin)
         if match is None:
-            raise ConfigError(
-                Problem(
-                    where, f'"{part}" is not a key, or a key with an index counted from 0, such as times[0]'
-                )
-            )
-        steps.append(match[1])
-        steps.extend(int(index) for index in re.findall(r"\d+", match[2]))
+            part = key[begin:].split(".")[0]
+            what = f'"{part}" is not a key, or a key with an index counted from 0, such as times[0]'
+            raise ConfigError(Problem(where, what))
+        steps.append(match[1] or match[2] or match[3].strip())
+        steps.extend(int(index) for index in re.findall(r"\d+", match[4]))
+        if not match[5]:
+            return steps
+        begin = match.end()
+
+
+def _assign(table: dict[str, Any], key: str, value: Any, where: str) -> None:
+    steps = key_steps(key, where)
     target: Any = table
     for step, following in pairwise(steps):
         if isinstance(target, dict) and isinstance(step, str):

@@ -157,3 +157,12 @@ def _key(key: Any) -> str:
     if not isinstance(key, str) or not key:
         raise ConfigError(Problem("config", f'given the key {shown(key)}; a key is a text, such as "end"'))
     return key
+
+
+def inline_text(value: Any) -> str:
+    """A value of a TOML file as it is written on one line.
+
+    Raises:
+        ConfigError: something that a config can't hold.
+    """
+    return _inline(value, "value")

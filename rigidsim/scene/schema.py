@@ -46,6 +46,7 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.frame_table import Frame
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.shapes import DIMENSIONS, SHAPES
+from rigidsim.scene.sweep_table import SweepTable
 from rigidsim.scene.validation_messages import nearest, shown
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
@@ -316,6 +317,7 @@ class Config(ConfigTable):
     integrator: Integrator = Field(default_factory=Integrator)
     output: Output = Field(default_factory=Output)
     limits: Limits = Field(default_factory=Limits)
+    sweep: SweepTable | None = None
 
     @field_validator("events")
     @classmethod

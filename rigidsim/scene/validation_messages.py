@@ -12,9 +12,6 @@ from pydantic import BaseModel, ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 
-_LATER: dict[tuple[str, ...], str] = {
-    ("sweep",): "sweeps are not in this version yet",
-}
 _TABLES = (
     "body",
     "initial",
@@ -98,15 +95,6 @@ def key_path(location: Iterable[str | int]) -> str:
 def _key(key: str) -> str:
     """A key as it is; one that is empty, long or can't be seen stands in quotes, shortened."""
     return key if 0 < len(key) <= 60 and key.isprintable() and key.strip() else shown(key)
-
-
-def later_features(table: Mapping[str, Any]) -> list[Problem]:
-    """Keys of the interface that this version knows of but doesn't carry out."""
-    problems = []
-    for path, why in _LATER.items():
-        if _value_at(table, path) is not None:
-            problems.append(Problem(key_path(path), why + "; remove the key"))
-    return problems
 
 
 def _value_at(table: Any, path: tuple[str, ...]) -> Any:

@@ -10,7 +10,7 @@ from functools import cached_property
 import heyoka as hy
 import mpmath
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.model.load import Load
 from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System, build_system
@@ -87,6 +87,13 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
     Raises:
         ConfigError: with what was given, what is allowed and where.
     """
+    if experiment.config.sweep is not None:
+        what = (
+            "describes many members, and this takes a single experiment: "
+            f"{either('rigidsim sweep runs', 'rigidsim.sweep(...) runs')} them; remove [sweep] to run the "
+            "experiment without it"
+        )
+        raise ConfigError(Problem("[sweep]", what), experiment.source)
     return prepare_scene(experiment, build_scene(experiment), loads=loads)
 
 

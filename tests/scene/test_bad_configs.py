@@ -61,7 +61,6 @@ MOMENT = 'a number (in kg m^2), or a string such as "8.008e37 kg m^2", is allowe
 WHOLE = "a whole number, without point or exponent, is allowed"
 SOURCES = "exactly one of principal_moments, inertia_tensor, points, shape, parts, preset is needed"
 ONE_WAY = "only one of samples, every, times is allowed"
-LATER = "not in this version yet"
 
 # name: (tables to replace, where the message points, phrases that it has)
 CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
@@ -968,7 +967,12 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[[events]] number 1 expression",
         ["missing"],
     ),
-    "sweep": ({"more": '[sweep]\nmode = "zip"'}, "[sweep]", [LATER, "remove the key"]),
+    "sweep without axes": ({"more": '[sweep]\nmode = "zip"'}, "[sweep] axes", ["missing"]),
+    "sweep for a single run": (
+        {"more": "[sweep.axes]\n'time.end' = {values = [1, 2]}"},
+        "[sweep]",
+        ["many members", "rigidsim.sweep(...)", "remove [sweep]"],
+    ),
     "parameter named as a state": (
         {"more": "[parameters]\nwx = 1"},
         "[parameters]",
@@ -1240,7 +1244,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["run", "plan"])
 @pytest.mark.parametrize(
-    "case", ["triangle inequality", "key twice", "samples too dense", "sweep", "table misspelt"]
+    "case", ["triangle inequality", "key twice", "samples too dense", "sweep without axes", "table misspelt"]
 )
 def test_the_command_line_says_it_and_leaves_no_folder(tmp_path: Path, command: str, case: str) -> None:
     tables, where, phrases = CASES[case]

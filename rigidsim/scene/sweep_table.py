@@ -1,0 +1,128 @@
+"""``[sweep]`` as it stands in a config: which keys take which values, and what is kept of each member."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
+
+from rigidsim.scene.fields import ConfigTable, refuse
+from rigidsim.scene.validation_messages import nearest, shown
+
+KEPT = (
+    "final",
+    "extremes",
+    "means",
+    "events",
+    "section",
+    "megno",
+    "fli",
+    "lyapunov",
+    "frequencies",
+    "series",
+)
+"""What can be kept of a member; drifts, steps and warnings always are."""
+RANDOM = ("normal", "uniform", "sphere")
+WAYS = ("linspace", "logspace", "step", "values", *RANDOM)
+"""How an axis says its values."""
+LARGEST_AXIS = 10_000_000
+
+
+class AxisTable(ConfigTable):
+    """One axis: the values that a key takes, said in one of seven ways."""
+
+    linspace: list[Any] | None = Field(
+        default=None, description="[from, to, count], both ends included", min_length=3, max_length=3
+    )
+    logspace: list[Any] | None = Field(
+        default=None, description="[from, to, count], of equal ratios, both ends included",
+        min_length=3, max_length=3,
+    )  # fmt: skip
+    step: list[Any] | None = Field(
+        default=None, description="[from, step, count]", min_length=3, max_length=3
+    )
+    values: list[Any] | None = Field(
+        default=None, description="each as the key itself would take it", min_length=1
+    )
+    normal: list[Any] | None = Field(
+        default=None, description="[mean, standard deviation]; with count", min_length=2, max_length=2
+    )
+    uniform: list[Any] | None = Field(
+        default=None, description="[from, to]; with count", min_length=2, max_length=2
+    )
+    sphere: Any = Field(
+        default=None,
+        description="its radius: random directions of a vector with count, or a grid of them with grid",
+    )
+    count: StrictInt | None = Field(default=None, ge=1, description="of random values")
+    grid: list[StrictInt] | None = Field(
+        default=None, min_length=2, max_length=2,
+        description="of a sphere: polar angles (at equal distances of their cosines) and azimuths",
+    )  # fmt: skip
+    name: StrictStr | None = Field(
+        default=None, description="of its dimension; the key's last part by default"
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> AxisTable:
+        ways = [way for way in WAYS if getattr(self, way) is not None]
+        if len(ways) != 1:
+            given = "none of them" if not ways else " and ".join(ways)
+            raise refuse(f"given {given}; exactly one of {', '.join(WAYS)} is needed")
+        [way] = ways
+        if way == "sphere" and (self.count is None) == (self.grid is None):
+            raise refuse(
+                "a sphere takes either count (random directions) or grid (polar angles and azimuths), "
+                "such as grid = [16, 32]"
+            )
+        if way in ("normal", "uniform") and self.count is None:
+            raise refuse(f"{way} needs a count beside it, such as count = 100")
+        if way not in RANDOM and self.count is not None:
+            raise refuse(f"count is for random values ({', '.join(RANDOM)}); {way} says it itself")
+        if way != "sphere" and self.grid is not None:
+            raise refuse("grid is for sphere alone")
+        return self
+
+    @field_validator("grid")
+    @classmethod
+    def _possible_grid(cls, value: list[int] | None) -> list[int] | None:
+        if value is not None and min(value) < 1:
+            raise refuse(f"given {shown(value)}; two whole numbers of at least 1 are allowed")
+        return value
+
+    @property
+    def way(self) -> str:
+        """Which of the ways it is."""
+        return next(way for way in WAYS if getattr(self, way) is not None)
+
+
+class SweepTable(ConfigTable):
+    """``[sweep]``: many members of one experiment."""
+
+    mode: Literal["product", "zip"] = Field(
+        default="product",
+        description="product: every combination of the axes' values; zip: the first of each, the second, ...",
+    )
+    seed: StrictInt = Field(default=0, description="of random values; each depends on seed, key and index")
+    keep: list[StrictStr] = Field(
+        default_factory=lambda: ["final"], description=f"what is kept of a member: {', '.join(KEPT)}"
+    )
+    most_events: StrictInt = Field(
+        default=16, ge=1, description="times (events) and points (section) kept of an event, at most"
+    )
+    tile: StrictInt | None = Field(
+        default=None, ge=1, description="members that are computed and saved at once; by default some seconds"
+    )
+    axes: dict[StrictStr, AxisTable] = Field(
+        min_length=1, description="by the dotted keys whose values are swept, indices from 0"
+    )
+
+    @field_validator("keep")
+    @classmethod
+    def _can_be_kept(cls, value: list[str]) -> list[str]:
+        for name in value:
+            if name not in KEPT:
+                raise refuse(f"given {shown(name)}{nearest(name, KEPT)}; allowed: {', '.join(KEPT)}")
+        if len(set(value)) < len(value):
+            raise refuse("something is named twice; name each once")
+        return value

@@ -1,0 +1,338 @@
+"""The values that an axis of a sweep takes: exact numbers, each with the text that a config would say it in.
+
+A value is the same number whatever else the axis holds, so that a member is known by its values: an axis that
+is prolonged keeps those that it had, random ones included, which depend on seed, key and index alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from statistics import NormalDist
+from typing import Any
+
+import mpmath
+
+from rigidsim.scene.exact import ExactNumber, decimal_text, fraction_of, in_its_unit, with_unit
+from rigidsim.scene.sweep_table import LARGEST_AXIS, AxisTable
+from rigidsim.scene.validation_messages import shown
+
+DIGITS = 40
+"""Significant decimal digits of values that aren't rational: of logspace, and on a sphere."""
+_DRAWN = 10**14
+"""Draws from the normal distribution are rounded to such a part of the deviation: fewer digits than double
+precision has, so that mathematical libraries that differ in the last bit draw the same."""
+_PLACES = 10**18
+"""In so many equal parts the interval from 0 to 1 is divided for uniform draws."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """A number in the unit that it is written in; ``unit`` is empty where none is."""
+
+    number: ExactNumber
+    unit: str = ""
+
+    @classmethod
+    def of(cls, value: Any) -> Written:
+        """A TOML value as a number.
+
+        Raises:
+            ValueError: it is none.
+        """
+        return cls(*in_its_unit(value))
+
+    @property
+    def exact(self) -> ExactNumber:
+        """In SI units.
+
+        Raises:
+            ValueError: no such unit.
+        """
+        return with_unit(self.number, self.unit, self.unit) if self.unit else self.number
+
+    @property
+    def text(self) -> str:
+        """As a config says it."""
+        plain = decimal_text(self.number.rational)
+        if self.number.pi_power:
+            power = "" if self.number.pi_power == 1 else f"^{self.number.pi_power}"
+            plain = f"{plain}*pi{power}"
+        if self.unit:
+            return f'"{plain} {self.unit}"'
+        return f'"{plain}"' if not _is_number(plain) else plain
+
+
+def nearest_double(number: ExactNumber) -> float:
+    """For labels: the double nearest to a number."""
+    value = number.rational
+    if number.pi_power:
+        value = fraction_of(number.at(_labelling()))
+    try:
+        return value.numerator / value.denominator
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+@cache
+def _labelling() -> Any:
+    context = mpmath.MPContext()
+    context.prec = 200
+    return context
+
+
+def _is_number(text: str) -> bool:
+    return not any(sign in text for sign in "/*")
+
+
+Entry = tuple[Written, ...]
+
+
+@dataclass(frozen=True)
+class AxisValues:
+    """The values of an axis.
+
+    Attributes:
+        count: how many there are.
+        components: of each; 0 for plain numbers, and for what is no number.
+        entry: the numbers of one of them; None where they are no numbers.
+        word: the TOML text of one of them that is no number; None where they are numbers.
+    """
+
+    count: int
+    components: int
+    entry: Callable[[int], Entry] | None
+    word: Callable[[int], str] | None = None
+
+    def text(self, index: int) -> str:
+        """One of them as a config says it, by which it is known."""
+        if self.entry is None:
+            assert self.word is not None
+            return self.word(index)
+        texts = [number.text for number in self.entry(index)]
+        return f"[{', '.join(texts)}]" if self.components else texts[0]
+
+
+def axis_values(table: AxisTable, key: str, seed: int, length: int) -> AxisValues:
+    """What a table of ``[sweep] axes`` asks for.
+
+    Args:
+        key: whose values they are.
+        seed: of random values.
+        length: components of the vector that the key takes; 0 where it takes a number.
+
+    Raises:
+        ValueError: says what was given, and what is allowed.
+    """
+    given = getattr(table, table.way)
+    if table.way == "values":
+        return _listed(given)
+    if table.way == "sphere":
+        if length < 3:
+            raise ValueError("sphere is for keys that take a vector, such as initial.angular_velocity")
+        radius = Written.of(given)
+        if radius.number.sign <= 0:
+            raise ValueError(f"given {shown(given)}; a radius above zero is allowed")
+        if table.grid is None:
+            assert table.count is not None
+            return AxisValues(_counted(table.count), length, _random_directions(radius, key, seed, length))
+        if length != 3:
+            raise ValueError("a grid on the sphere is for vectors of three; give count for random ones")
+        polar, azimuths = table.grid
+        return AxisValues(_counted(polar * azimuths), 3, _grid_of_directions(radius, polar, azimuths))
+    if table.way in ("normal", "uniform"):
+        assert table.count is not None
+        return _random(table.way, given, _counted(table.count), key, seed, length)
+    count = _counted(given[2])
+    if table.way == "step":
+        first, step = _alike(given[0], given[1])
+        return _numbers(count, lambda i: first[0] + i * step[0], first)
+    if count < 2:
+        raise ValueError(f"given a count of {count}; at least 2 are needed, both ends being included")
+    first, last = _alike(given[0], given[1])
+    if table.way == "linspace":
+        width = last[0] - first[0]
+        return _numbers(count, lambda i: first[0] + width * i / (count - 1), first)
+    if first[0] * last[0] <= 0:
+        raise ValueError("both ends of a logspace must be above zero, or both below")
+    return _numbers(count, _geometric(first[0], last[0], count), first)
+
+
+Rational = tuple[Fraction, int, str]
+"""A number with its power of pi and its unit."""
+
+
+def _numbers(count: int, value: Callable[[int], Fraction], like: Rational) -> AxisValues:
+    def entry(index: int) -> Entry:
+        return (Written(ExactNumber(value(index), like[1]), like[2]),)
+
+    return AxisValues(count, 0, entry)
+
+
+def _alike(*given: Any) -> tuple[Rational, ...]:
+    """Numbers in one unit, times one power of pi.
+
+    Raises:
+        ValueError: they can't be told so.
+    """
+    written = [Written.of(value) for value in given]
+    if len({w.unit for w in written}) > 1 or len({w.number.pi_power for w in written if w.number.sign}) > 1:
+        if not all(w.unit for w in written if w.number.sign):
+            raise ValueError(f"given {' and '.join(map(shown, given))}; write both in one unit")
+        written = [Written(w.exact) for w in written]
+    turns = {w.number.pi_power for w in written if w.number.sign}
+    if len(turns) > 1:
+        raise ValueError(f"given {' and '.join(map(shown, given))}; write both in one unit")
+    power = turns.pop() if turns else 0
+    return tuple((w.number.rational, power, w.unit) for w in written)
+
+
+def _counted(count: Any) -> int:
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= LARGEST_AXIS:
+        raise ValueError(f"given a count of {shown(count)}; whole numbers from 1 to 1e7 are allowed")
+    return count
+
+
+def _listed(given: Sequence[Any]) -> AxisValues:
+    """Numbers or vectors of them where all can be read so, else whatever a config may hold."""
+    from rigidsim.scene.python_values import inline_text
+
+    if len(given) > LARGEST_AXIS:
+        raise ValueError(f"given {len(given)} values; at most 1e7 are allowed")
+    try:
+        if all(isinstance(value, list) for value in given) and len({len(value) for value in given}) == 1:
+            vectors = [tuple(Written.of(x) for x in value) for value in given]
+            return AxisValues(len(given), len(vectors[0]), vectors.__getitem__)
+        numbers = [(Written.of(value),) for value in given]
+        return AxisValues(len(given), 0, numbers.__getitem__)
+    except ValueError:
+        if all(isinstance(value, int | float) or hasattr(value, "is_finite") for value in given):
+            raise  # such as nan, which no key takes
+        words = [inline_text(value) for value in given]
+        return AxisValues(len(given), 0, None, words.__getitem__)
+
+
+def _geometric(first: Fraction, last: Fraction, count: int) -> Callable[[int], Fraction]:
+    context = mpmath.MPContext()
+    context.dps = DIGITS + 20
+    ratio = context.log(context.mpf(last.numerator) / last.denominator * first.denominator / first.numerator)
+
+    @cache
+    def value(index: int) -> Fraction:
+        if index in (0, count - 1):
+            return first if index == 0 else last
+        power = context.exp(ratio * index / (count - 1))
+        return _rounded(fraction_of(power * first.numerator / first.denominator))
+
+    return value
+
+
+def _rounded(value: Fraction) -> Fraction:
+    """The nearest number of ``DIGITS`` decimal digits."""
+    if not value:
+        return value
+    size = abs(value)
+    magnitude = math.floor(math.log10(size.numerator) - math.log10(size.denominator))
+    places = DIGITS - 1 - magnitude
+    scale = Fraction(10) ** places
+    return round(value * scale) / scale
+
+
+_UNIT, _WIDE = 10**DIGITS, 10 ** (DIGITS + 5)
+
+# --- random values ------------------------------------------------------------------------------------------
+
+
+def _uniform(seed: int, key: str, index: int, component: int) -> int:
+    """Between 0 and 1, neither included, in units of ``1 / (2 _PLACES)``."""
+    name = f"{seed}\n{key}\n{index}\n{component}".encode()
+    drawn = int.from_bytes(hashlib.blake2b(name, digest_size=8).digest(), "big")
+    return 2 * (drawn * _PLACES >> 64) + 1
+
+
+_quantile = NormalDist().inv_cdf  # Wichura 1988, algorithm AS 241
+
+
+def _normal(seed: int, key: str, index: int, component: int) -> int:
+    """Of mean 0 and deviation 1, in units of ``1 / _DRAWN``."""
+    share = _uniform(seed, key, index, component)
+    below = share < _PLACES
+    size = round(_quantile((share if below else 2 * _PLACES - share) / (2 * _PLACES)) * _DRAWN)
+    return size if below else -size
+
+
+def _random(way: str, given: Sequence[Any], count: int, key: str, seed: int, length: int) -> AxisValues:
+    vectors = [value for value in given if isinstance(value, list)]
+    components = len(vectors[0]) if vectors else 0
+    if any(len(vector) != components for vector in vectors):
+        raise ValueError(f"given vectors of different lengths in {way}")
+    if length and not vectors:
+        raise ValueError(f"the key takes a vector of {length}; give vectors, such as {way} = {_SUCH_AS[way]}")
+    pairs = [
+        _alike(*(value[i] if isinstance(value, list) else value for value in given))
+        for i in range(components or 1)
+    ]
+    if way == "uniform" and any(low[0] > high[0] for low, high in pairs):
+        raise ValueError("the first end of a uniform interval must not be above the second")
+    if way == "normal" and any(deviation[0] < 0 for _, deviation in pairs):
+        raise ValueError("a standard deviation of zero or more is allowed")
+
+    def entry(index: int) -> Entry:
+        found = []
+        for component, (a, b) in enumerate(pairs):
+            if way == "uniform":
+                value = a[0] + (b[0] - a[0]) * Fraction(_uniform(seed, key, index, component), 2 * _PLACES)
+            else:
+                value = a[0] + b[0] * Fraction(_normal(seed, key, index, component), _DRAWN)
+            found.append(Written(ExactNumber(value, a[1]), a[2]))
+        return tuple(found)
+
+    return AxisValues(count, components, entry)
+
+
+_SUCH_AS = {"normal": "[[0, 0, 1], [0.1, 0.1, 0.1]]", "uniform": "[[0, 0, 0], [1, 1, 1]]"}
+
+
+def _random_directions(radius: Written, key: str, seed: int, length: int) -> Callable[[int], Entry]:
+    """Points at equal density on the sphere: normal draws, brought to its radius."""
+
+    def entry(index: int) -> Entry:
+        whole = [_normal(seed, key, index, component) for component in range(length)]
+        norm = math.isqrt(sum(n * n for n in whole) * _WIDE**2)
+        unit = [Fraction((2 * n * _WIDE * _UNIT + norm) // (2 * norm), _UNIT) for n in whole]
+        return _scaled(radius, unit)
+
+    return entry
+
+
+def _grid_of_directions(radius: Written, polar: int, azimuths: int) -> Callable[[int], Entry]:
+    """The centres of cells of equal area; the azimuth runs fastest."""
+    context = mpmath.MPContext()
+    context.dps = DIGITS + 20
+
+    @cache
+    def sine_and_cosine(j: int) -> tuple[Fraction, Fraction]:
+        cosine = 1 - Fraction(2 * j + 1, polar)
+        square = 1 - cosine * cosine
+        return fraction_of(context.sqrt(context.mpf(square.numerator) / square.denominator)), cosine
+
+    @cache
+    def around(k: int) -> tuple[Fraction, Fraction]:
+        angle = context.mpf(2 * k + 1) / azimuths
+        return fraction_of(context.cospi(angle)), fraction_of(context.sinpi(angle))
+
+    def entry(index: int) -> Entry:
+        sine, cosine = sine_and_cosine(index // azimuths)
+        x, y = around(index % azimuths)
+        return _scaled(radius, [_rounded(sine * x), _rounded(sine * y), _rounded(cosine)])
+
+    return entry
+
+
+def _scaled(radius: Written, unit: Sequence[Fraction]) -> Entry:
+    factor, power = radius.number.rational, radius.number.pi_power
+    return tuple(Written(ExactNumber(factor * x, power), radius.unit) for x in unit)

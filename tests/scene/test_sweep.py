@@ -1,0 +1,209 @@
+"""Sweeps: the exact values that members are known by, and what is no sweep."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+from math import sqrt
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene.exact import decimal_text, parse_number
+from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweep_table import AxisTable
+from rigidsim.scene.swept_values import axis_values, nearest_double
+from rigidsim.workflows.read import parse
+
+BASE = """\
+name = "box"
+[body]
+principal_moments = [1, 2, 2.5]  # kept
+[initial]
+angular_velocity = [0.1, 1, 0.05]
+[time]
+end = 10
+samples = 11
+"""
+RATE = 'axes."initial.angular_velocity[2]"'
+
+
+def swept(table: str, base: str = BASE) -> Sweep:
+    return Sweep.of(parse(f"{base}[sweep]\n{table}\n"))
+
+
+def values(sweep: Sweep) -> list[tuple[str, ...]]:
+    return [sweep.texts(member) for member in range(sweep.count)]
+
+
+@given(st.fractions(max_denominator=10**30), st.integers(-60, 60))
+def test_a_number_reads_back_from_its_text(value: Fraction, exponent: int) -> None:
+    scaled = value * Fraction(10) ** exponent
+    assert parse_number(decimal_text(scaled), "1").rational == scaled
+
+
+def test_whole_numbers_stay_whole_and_decimals_decimal() -> None:
+    assert decimal_text(Fraction(1000)) == "1000"  # as keys that count need it
+    assert decimal_text(Fraction(-1, 10)) == "-0.1"
+    assert decimal_text(Fraction(1, 3)) == "1/3"
+    assert decimal_text(Fraction(8008, 10**9)) == "8.008e-6"
+
+
+def test_a_linspace_is_exact_and_a_member_has_its_values() -> None:
+    sweep = swept(f'{RATE} = {{linspace = [0.1, 0.9, 9]}}\naxes."time.end" = {{values = ["1 h", 7]}}')
+    assert sweep.shape == (9, 2)
+    assert sweep.dims == ("angular_velocity_2", "end")
+    assert sweep.texts(5) == ("0.3", "7")
+    assert [axis.unit for axis in sweep.axes] == ["rad/s", "s"]
+    config = sweep.experiment_of(4).config
+    assert config.initial.angular_velocity[2].rational == Fraction(3, 10)
+    assert config.time.end.rational == 3600
+    assert config.sweep is None
+    assert "# kept" in sweep.experiment_of(4).text
+    assert [column[1].rational for column in sweep.exact([0, 5])] == [Fraction(3, 10), 7]
+
+
+WAYS = {
+    "step": {"step": [Decimal("0.1"), Decimal("0.003"), None]},
+    "uniform": {"uniform": [-1, 1], "count": None},
+    "normal": {"normal": [0, Decimal("0.1")], "count": None},
+}
+
+
+def axis(way: str, count: int, seed: int = 0) -> list[str]:
+    table = {
+        key: count if value is None else [count if x is None else x for x in value]
+        for key, value in WAYS[way].items()
+    }
+    found = axis_values(AxisTable.model_validate(table), "initial.angular_velocity[2]", seed, 0)
+    return [found.text(index) for index in range(found.count)]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.sampled_from(sorted(WAYS)), st.integers(1, 40), st.integers(1, 40), st.integers(0, 5))
+def test_a_longer_axis_keeps_what_it_had(way: str, count: int, more: int, seed: int) -> None:
+    long = axis(way, count + more, seed)
+    assert long[:count] == axis(way, count, seed)
+    assert len(set(long)) == len(long)
+
+
+def test_a_prolonged_space_of_the_same_step_keeps_its_values() -> None:
+    short = values(swept(f"{RATE} = {{linspace = [0, 0.999, 1000]}}"))
+    assert values(swept(f"{RATE} = {{linspace = [0, 1.099, 1100]}}"))[:1000] == short
+    decades = values(swept(f"{RATE} = {{logspace = [0.01, 1, 21]}}"))
+    assert values(swept(f"{RATE} = {{logspace = [0.01, 10, 31]}}"))[:21] == decades
+    assert decades[10] == ("0.1",)
+
+
+def test_random_values_depend_on_seed_and_key() -> None:
+    one = axis("uniform", 5, 1)
+    assert one != axis("uniform", 5, 2)
+    table = AxisTable.model_validate({"uniform": [-1, 1], "count": 5})
+    assert one != [axis_values(table, "time.end", 1, 0).text(index) for index in range(5)]
+
+
+def test_draws_have_the_distribution_asked_for() -> None:
+    count = 2000
+    table = f'mode = "zip"\n{RATE} = {{normal = [2, 0.5], count = {count}}}\n'
+    table += f'axes."time.end" = {{uniform = [3, 5], count = {count}}}'
+    normal, uniform = ([nearest_double(x) for x in column] for column in swept(table).exact(range(count)))
+    for found, mean, deviation in ((normal, 2, 0.5), (uniform, 4, sqrt(4 / 12))):
+        average = sum(found) / count
+        spread = sqrt(sum((x - average) ** 2 for x in found) / (count - 1))
+        assert abs(average - mean) < 5 * deviation / sqrt(count)
+        assert abs(spread / deviation - 1) < 5 / sqrt(count)
+    assert min(uniform) > 3
+    assert max(uniform) < 5
+    below = sum(x < 2 for x in normal)  # binomial with one half
+    assert abs(below - count / 2) < 5 * sqrt(count) / 2
+
+
+def test_directions_lie_on_the_sphere_and_cover_it() -> None:
+    table = 'axes."initial.angular_velocity" = {sphere = "2 rad/s", %s}'
+    for how, count in (("count = 600", 600), ("grid = [20, 30]", 600)):
+        sweep = swept(table % how)
+        points = list(zip(*sweep.exact(range(count)), strict=True))
+        assert sweep.axes[0].values.components == 3
+        for point in points:
+            square = sum(x.rational**2 for x in point)
+            assert abs(square - 4) < Fraction(1, 10**37)
+        for axis in range(3):  # mean 0, mean square a third
+            assert abs(sum(nearest_double(p[axis]) for p in points)) / count < 5 * 2 / sqrt(3 * count)
+            assert abs(sum(nearest_double(p[axis]) ** 2 for p in points) / count - 4 / 3) < 0.2
+    assert len(set(values(swept(table % "grid = [20, 30]")))) == 600
+    unit = swept('axes."initial.quaternion" = {sphere = 1, count = 3}')
+    assert len(unit.columns) == 4
+
+
+def test_words_and_whole_vectors_are_values_too() -> None:
+    table = 'axes."integrator.formulation" = {values = ["quaternion", "euler_angles"]}\n'
+    table += 'axes."body.principal_moments" = {values = [[1, 2, 2.5], [1, "3/2", 2]], name = "shape"}'
+    sweep = swept(table)
+    assert not sweep.numeric
+    assert sweep.texts(3) == ('"euler_angles"', "[1, 1.5, 2]")
+    config = sweep.experiment_of(3).config
+    assert config.integrator.formulation == "euler_angles"
+    assert config.body.principal_moments[1].rational == Fraction(3, 2)
+    with pytest.raises(ValueError, match="more than numbers"):
+        sweep.exact([0])
+
+
+def test_a_setting_reaches_a_key_with_points_in_it() -> None:
+    text = f"{BASE}[sweep]\n{RATE} = {{linspace = [0, 1, 3]}}\n"
+    experiment = parse(text, overrides=['sweep.axes."initial.angular_velocity[2]".linspace=[0, 2, 5]'])
+    assert values(Sweep.of(experiment)) == [("0",), ("0.5",), ("1",), ("1.5",), ("2",)]
+
+
+def test_units_of_loads_and_parameters_are_known() -> None:
+    base = BASE + '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1, 1, 1]\n'
+    sweep = swept('axes."loads[0].coefficients[1]" = {linspace = [0, 1, 3]}', base)
+    assert sweep.axes[0].unit == "kg m^2/s"
+
+
+REFUSED = {
+    "nan": (f"{RATE} = {{values = [0.1, nan]}}", "finite numbers are allowed"),
+    "too many": (
+        f'{RATE} = {{step = [0, 1, 1000000]}}\naxes."time.end" = {{step = [1, 1, 1000000]}}',
+        "1e12 members; at most 1e8",
+    ),
+    "one name twice": (
+        f'{RATE} = {{values = [1]}}\naxes."time.end" = {{values = [1], name = "angular_velocity_2"}}',
+        "give one of them another name",
+    ),
+    "one key within another": (
+        f'{RATE} = {{values = [1]}}\naxes."initial.angular_velocity" = {{values = [[1, 2, 3]], name = "w"}}',
+        "sweep one of them",
+    ),
+    "zip of different lengths": (
+        f'mode = "zip"\n{RATE} = {{values = [1, 2]}}\naxes."time.end" = {{values = [1]}}',
+        "needs axes of one length",
+    ),
+    "no way": (f'{RATE} = {{name = "a"}}', "exactly one of linspace"),
+    "two ways": (f"{RATE} = {{values = [1], step = [0, 1, 2]}}", "exactly one of"),
+    "random without count": (f"{RATE} = {{uniform = [0, 1]}}", "needs a count"),
+    "count without random": (f"{RATE} = {{values = [1], count = 3}}", "count is for random values"),
+    "mixed units": (f'{RATE} = {{linspace = ["1 deg/s", 2, 3]}}', "write both in one unit"),
+    "logspace through zero": (f"{RATE} = {{logspace = [0, 1, 3]}}", "above zero"),
+    "kept what nobody knows": (f'keep = ["finale"]\n{RATE} = {{values = [1]}}', 'did you mean "final"'),
+    "the output itself": ('axes."output.record" = {values = [["energy"]]}', "can't be swept"),
+    "sphere for a number": (f"{RATE} = {{sphere = 1, count = 3}}", "take a vector"),
+    "a count that is none": (f"{RATE} = {{linspace = [0, 1, 2.5]}}", "whole numbers from 1"),
+    "a bad name": (f'{RATE} = {{values = [1], name = "a b"}}', "letters, digits and underscores"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_no_sweep_is_refused(case: str) -> None:
+    table, told = REFUSED[case]
+    with pytest.raises(ConfigError) as caught:
+        swept(table)
+    assert told in str(caught.value)
+    assert "[sweep]" in str(caught.value)
+
+
+def test_a_member_that_cannot_be_is_named() -> None:
+    with pytest.raises(ConfigError) as caught:
+        swept('axes."initial.angular_velocty[2]" = {values = [1, 2]}').experiment_of(1)
+    assert "member 1 (angular_velocty_2 = 2)" in str(caught.value)
