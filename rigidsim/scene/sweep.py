@@ -376,4 +376,3 @@ def _unit(nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any]) -> str:
 def _length(nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any]) -> int:
     sizes = [node.get("minItems") for node in _alternatives(nodes, schema, None) if "items" in node]
     return next((int(size) for size in sizes if size), 0)
-
