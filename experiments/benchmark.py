@@ -1,0 +1,242 @@
+"""As fast as the machine? Runs of rigidsim beside bare scripts of the same work, and what each may cost.
+
+Held against: scripts in ``experiments/bare`` that anybody would write with heyoka and h5py, imports of the
+modules that they need, and a compiled DOP853 (extras ``peers``).
+
+Method: pairs of fresh processes, ours first in every other one; the ratio is the median over the pairs. CPU
+seconds (user and system, all threads), imports apart but where the whole process counts; heyoka's cache of
+compiled code is warm on both sides. Of the first rows and the warm one what is judged is without estimates;
+with them it stands beside, over at most three pairs. Absolute times depend on what else the machine does.
+
+Run: python -m experiments.benchmark [--pairs 7] [--rows sparse,dense,...] [--quick] [--out DIR]
+     [--scratch DIR] [--python numba=/other/bin/python]
+Exit code 1 if a ratio is above its bound (never with ``--quick``). 1e8 samples take some 15 GB of disk and
+several minutes; ``--rows`` leaves them out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from experiments.benchmarking import satellite
+from experiments.benchmarking.processes import Figures
+from experiments.benchmarking.readers import farthest, readings
+from experiments.benchmarking.rows import Row, rows
+from experiments.common import BLUE, DEFAULT_OUT, GREY, RED, new_figure, save, tidy
+
+NAME = "benchmark"
+SATELLITE = "satellite"
+_ESTIMATED = 3  # pairs with estimates at most
+
+
+@dataclass
+class Result:
+    """What came out of a row; ``ratios`` and ``estimated`` pair by pair, the latter with estimates on.
+
+    Attributes:
+        ours, bare: the figures that are compared, medians.
+        wall: likewise wall seconds, ours and bare.
+        size: bytes of both datasets.
+        readers: what each makes of ours.
+        differences: of its numbers from the bare script's, the largest of each variable.
+        note: why there is no ratio, and what else is to be said.
+    """
+
+    key: str
+    work: str
+    against: str
+    bound: float
+    ratios: list[float] = field(default_factory=list)
+    estimated: list[float] = field(default_factory=list)
+    judged: bool = True
+    ours: float | None = None
+    bare: float | None = None
+    wall: tuple[float, float] | None = None
+    size: tuple[int, int] | None = None
+    readers: dict[str, str] = field(default_factory=dict)
+    differences: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def ratio(self) -> float | None:
+        """The median."""
+        return statistics.median(self.ratios) if self.ratios else None
+
+    @property
+    def met(self) -> bool | None:
+        """None where nothing was measured, or is too short to tell."""
+        return None if self.ratio is None or not self.judged else self.ratio <= self.bound
+
+    @property
+    def line(self) -> str:
+        """Of the table."""
+        ratio, spread, verdict = "–", "–", "–"
+        if self.ratio is not None:
+            ratio, verdict = f"{self.ratio:.3g}", _VERDICTS[self.met]
+            spread = f"{min(self.ratios):.3g} .. {max(self.ratios):.3g}"
+        beside = f"{statistics.median(self.estimated):.3g}" if self.estimated else ""
+        wall = "" if self.wall is None else f"{self.wall[0]:.3g} / {self.wall[1]:.3g}"
+        size = "" if self.size is None else f"{self.size[0] / 1e6:.3g} / {self.size[1] / 1e6:.3g}"
+        cells = [self.work, self.against, ratio, f"{self.bound:g}", verdict, spread, beside, wall, size]
+        return f"| {' | '.join(cells)} |"
+
+
+_VERDICTS = {True: "met", False: "NOT MET", None: "not judged"}
+HEAD = (
+    "| work | against | ratio | at most | | pairs | with estimates | wall s | MB of dataset |",
+    "| --- " * 9 + "|",
+)
+
+
+def measure(row: Row, pairs: int, scratch: Path | None, *, judged: bool = True) -> Result:
+    """One row, in fresh processes."""
+    result = Result(row.key, row.work, row.against, row.bound, judged=judged)
+    ours: list[Figures] = []
+    bare: list[Figures] = []
+    with tempfile.TemporaryDirectory(dir=scratch) as warming:  # compiled code, caches of files
+        row.bare.run(Path(warming), False)
+    for pair in range(1 if row.measure == "peak" else pairs):
+        with (
+            tempfile.TemporaryDirectory(dir=scratch) as own,
+            tempfile.TemporaryDirectory(dir=scratch) as other,
+        ):
+            both = [(ours, row.ours, Path(own), not row.plain), (bare, row.bare, Path(other), not row.plain)]
+            for figures, job, folder, estimate in both[:: -1 if pair % 2 else 1]:
+                figures.append(job.run(folder, estimate))
+            result.ratios.append(ours[-1][row.measure] / bare[-1][row.measure])
+            if row.dataset and not pair:
+                _look_at(result, next(Path(own).glob("*/dataset.h5")), Path(other) / "bare.h5")
+        if row.plain and pair < _ESTIMATED:
+            with tempfile.TemporaryDirectory(dir=scratch) as own:
+                result.estimated.append(row.ours.run(Path(own), True)["cpu"] / bare[-1]["cpu"])
+    result.ours, result.bare = (statistics.median(f[row.measure] for f in fs) for fs in (ours, bare))
+    if "wall" in ours[0] and "wall" in bare[0]:
+        first, second = (statistics.median(f["wall"] for f in fs) for fs in (ours, bare))
+        result.wall = first, second
+    return result
+
+
+def _look_at(result: Result, ours: Path, bare: Path) -> None:
+    result.size = ours.stat().st_size, bare.stat().st_size
+    result.readers = readings(ours)
+    result.differences = farthest(ours, bare)
+
+
+def measure_satellite(pairs: int, pythons: dict[str, str], *, quick: bool) -> list[Result]:
+    """The rows without closed form."""
+    found = satellite.costs(repeats=pairs, quick=quick, pythons=pythons)
+    results = []
+    for error in satellite.ERRORS:
+        work = f"satellite without closed form at {error:.0e} rad, {satellite.radians(quick=quick):.2g} rad"
+        ours, best = found.ours.get(error), found.best.get(error)
+        ratios = [ours / best] if ours is not None and best is not None else []
+        note = "; ".join(found.notes)
+        results.append(
+            Result(
+                f"{SATELLITE} {error:.0e}",
+                work,
+                "best compiled DOP853",
+                1.0,
+                ratios,
+                judged=not quick,
+                ours=ours,
+                bare=best,
+                note=note,
+            )
+        )
+    return results
+
+
+def draw(results: Sequence[Result], out: Path) -> Path:
+    """Ratios with their bounds, a line for each row."""
+    shown = [result for result in results if result.ratio is not None][::-1]
+    figure = new_figure(
+        10, 1.6 + 0.62 * len(shown), "What rigidsim costs, over a bare script of the same work"
+    )
+    axes = figure.subplots()
+    for place, result in enumerate(shown):
+        color = RED if result.met is False else BLUE
+        axes.plot([min(result.ratios), max(result.ratios)], [place, place], color=color, lw=2, alpha=0.4)
+        axes.plot([result.ratio], [place], "o", color=color, ms=8, label="_")
+        axes.plot([result.bound] * 2, [place - 0.32, place + 0.32], color="black", lw=2)
+        if result.estimated:
+            axes.plot([statistics.median(result.estimated)], [place], "d", color=GREY, ms=6, mfc="white")
+        axes.annotate(
+            f"{result.ratio:.3g}", (result.ratio or 0, place), (0, 9), textcoords="offset points", ha="center"
+        )
+    axes.set_yticks(
+        range(len(shown)), [f"{r.work}\nagainst {r.against}".replace("`", "") for r in shown], fontsize=8.5
+    )
+    axes.axvline(1, color="#999999", lw=1, ls=":")
+    axes.set_ylim(-0.7, len(shown) - 0.2)
+    axes.set_xlim(left=0)
+    tidy(axes, "ratio (median and range over the pairs); black: at most; diamond: with estimates", "")
+    return save(figure, out, NAME)
+
+
+def report(results: Sequence[Result]) -> str:
+    """Markdown: the table, readers and notes."""
+    lines = [*HEAD, *(result.line for result in results)]
+    for result in results:
+        if result.readers:
+            said = ", ".join(f"{name}: {what}" for name, what in result.readers.items())
+            worst = max(result.differences.values())
+            lines.append(f"\n{result.work}: read by {said}; at most {worst:.1e} from the script's numbers")
+        if result.note:
+            lines.append(f"\n{result.work}: {result.note}")
+    return "\n".join(lines)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
+    known = [row.key for row in rows(quick=False)] + [SATELLITE]
+    parser.add_argument("--pairs", type=int, default=7, help="of fresh processes (default: %(default)s)")
+    parser.add_argument("--rows", default=",".join(known), help="some of %(default)s")
+    parser.add_argument("--quick", action="store_true", help="a hundredth of the lengths, judging no ratio")
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT, help="of table and figure (default: %(default)s)"
+    )
+    parser.add_argument("--scratch", type=Path, help="where runs are written")
+    parser.add_argument(
+        "--python", action="append", default=[], metavar="PEER=PATH", help="of another environment"
+    )
+    arguments = parser.parse_args(argv)
+    wanted = arguments.rows.split(",")
+    unknown = sorted(set(wanted) - set(known))
+    if unknown:
+        parser.error(f"--rows: {', '.join(unknown)}: allowed are {', '.join(known)}")
+    results: list[Result] = []
+    for row in rows(quick=arguments.quick):
+        if row.key in wanted:
+            results.append(measure(row, arguments.pairs, arguments.scratch, judged=not arguments.quick))
+            print(results[-1].line, file=sys.stderr, flush=True)
+    if SATELLITE in wanted:
+        pythons = dict(given.split("=", 1) for given in arguments.python)
+        results += measure_satellite(arguments.pairs, pythons, quick=arguments.quick)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    kept: list[dict[str, Any]] = [
+        asdict(result) | {"ratio": result.ratio, "met": result.met} for result in results
+    ]
+    (arguments.out / f"{NAME}.json").write_text(json.dumps(kept, indent=1))
+    print(report(results))
+    if any(result.ratios for result in results):
+        print(f"\nfigure: {draw(results, arguments.out)}")
+    if arguments.quick:
+        return 0
+    return int(any(result.met is False for result in results))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,176 @@
+"""The rows of the benchmark: what is run, what it is held against, and what the ratio may be at most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.benchmarking.processes import BARE, Figures, told, whole
+
+CONFIG = """name = "benchmark"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1.0, 0.05]
+[time]
+end = {end}
+samples = {samples}
+[integrator]
+precision = "{precision}"
+[output]
+timeline = {timeline}
+estimate = {estimate}
+"""
+_TIMES = 50  # in a warm process
+_MODULE = ("-m", "experiments.benchmarking.ours")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One thing that is run in a fresh process.
+
+    Attributes:
+        run: takes a folder of its own, and whether estimates are on.
+    """
+
+    run: Callable[[Path, bool], Figures]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Attributes:
+        key: for ``--rows``.
+        work, against: in words.
+        bound: of the median ratio.
+        ours, bare: what is run.
+        measure: which of the figures is compared.
+        plain: whether the ratio that is judged is without estimates.
+        dataset: whether both leave a dataset with the same variables.
+    """
+
+    key: str
+    work: str
+    against: str
+    bound: float
+    ours: Job
+    bare: Job
+    measure: str = "cpu"
+    plain: bool = True
+    dataset: bool = False
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The free body of the benchmark."""
+
+    end: float
+    samples: int
+    precision: str = "double"
+    timeline: bool = False
+
+    def config(self, folder: Path, *, estimate: bool) -> str:
+        """The path of its config, written into a folder."""
+        path = folder / "benchmark.toml"
+        values = {"end": self.end, "samples": self.samples, "precision": self.precision}
+        switches = {"timeline": str(self.timeline).lower(), "estimate": str(estimate).lower()}
+        path.write_text(CONFIG.format(**values, **switches))
+        return str(path)
+
+    @property
+    def run(self) -> Job:
+        """A run folder, imports apart."""
+        return Job(
+            lambda folder, estimate: told([*_MODULE, self.config(folder, estimate=estimate), str(folder)])
+        )
+
+    @property
+    def command(self) -> Job:
+        """The command line as a whole."""
+
+        def go(folder: Path, estimate: bool) -> Figures:
+            config = self.config(folder, estimate=estimate)
+            return whole(["-m", "rigidsim", "run", config, "--out", str(folder)])
+
+        return Job(go)
+
+    @property
+    def warm(self) -> Job:
+        """In memory, again and again."""
+
+        def go(folder: Path, estimate: bool) -> Figures:
+            return told([*_MODULE, self.config(folder, estimate=estimate), "--again", str(_TIMES)])
+
+        return Job(go)
+
+    def script(self, name: str) -> Job:
+        """A script of ``experiments/bare``."""
+
+        def go(folder: Path, _: bool) -> Figures:
+            more = ["extended"] if self.precision == "extended" else []
+            return told([str(BARE / name), str(folder / "bare.h5"), str(self.end), str(self.samples), *more])
+
+        return Job(go)
+
+
+def imports(*modules: str) -> Job:
+    """An interpreter that does nothing but import."""
+    return Job(lambda folder, estimate: whole(["-c", f"import {', '.join(modules)}"]))
+
+
+def rows(*, quick: bool) -> list[Row]:
+    """All rows but those of the satellite.
+
+    Args:
+        quick: a hundredth of the lengths, where ratios tell nothing.
+    """
+    part = 0.01 if quick else 1.0
+    sparse = Scene(1e7 * part, 1001)
+    dense = Scene(1e5 * part, round(1e6 * part))
+    shown = Scene(1e5 * part, round(1e6 * part), timeline=True)
+    extended = Scene(1e5 * part, round(1e5 * part), "extended")
+    few, many = Scene(1e5 * part, round(1e6 * part)), Scene(1e5 * part, round(1e8 * part))
+    tiny = Scene(1.0, 11)
+    return [
+        Row(
+            "sparse", f"free body, {_span(sparse)}", "`propagate_grid` + h5py", 1.03,
+            sparse.run, sparse.script("free_body_sparse.py"),
+        ),
+        Row(
+            "dense", f"free body, {_span(dense)}, default record",
+            "script with the same variables, gzip 4 + shuffle", 0.6,
+            dense.run, dense.script("free_body_dense.py"), dataset=True,
+        ),
+        Row(
+            "timeline", f"the same with its timeline ({min(shown.samples, 100_000):,} rows)",
+            "the same script without one", 0.8,
+            shown.run, dense.script("free_body_dense.py"),
+        ),
+        Row(
+            "extended", f"80-bit, {_span(extended)}", "the same script in 80-bit arithmetic", 1.02,
+            extended.run, extended.script("free_body_dense.py"), dataset=True,
+        ),
+        Row(
+            "memory", f"{many.samples:.0e} samples: peak memory", f"{few.samples:.0e} samples", 1.1,
+            many.run, few.run, measure="peak", plain=False,
+        ),
+        Row(
+            "tiny", "tiny scene, whole process, no timeline", '`python -c "import heyoka, h5py"`', 2.2,
+            tiny.command, imports("heyoka", "h5py"), plain=False,
+        ),
+        Row(
+            "tiny_timeline", "tiny scene, whole process, with timeline",
+            '`python -c "import heyoka, h5py, rerun"`', 2.0,
+            Scene(1.0, 11, timeline=True).command, imports("heyoka", "h5py", "rerun"), plain=False,
+        ),
+        Row(
+            "warm", "tiny scene in a warm process, no files", "bare `taylor_adaptive` + run", 2.0,
+            tiny.warm, Job(lambda folder, estimate: told([str(BARE / "tiny_warm.py"), str(_TIMES)])),
+        ),
+    ]  # fmt: skip
+
+
+def _span(scene: Scene) -> str:
+    return f"T = {scene.end:.0e}, {scene.samples:,} samples"

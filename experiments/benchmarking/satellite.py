@@ -1,0 +1,54 @@
+"""The rows without closed form: a satellite under gravity gradient at equal error, against DOP853."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from experiments.peers.campaign import OURS, measure
+from experiments.peers.curves import cost_at
+from experiments.peers.scenes import SCENES
+
+COMPILED = ("numba", "numbalsoda")
+"""Peers with a compiled DOP853."""
+ERRORS = (1e-6, 1e-9)
+_SCENE = "satellite"
+
+
+@dataclass
+class Costs:
+    """CPU seconds of an integration by attitude error, rad; those that can't be told are missing.
+
+    Attributes:
+        notes: why.
+    """
+
+    ours: dict[float, float] = field(default_factory=dict)
+    best: dict[float, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def radians(*, quick: bool) -> float:
+    """How far the satellite turns."""
+    scene = SCENES[_SCENE]
+    return scene.rate * scene.ends[0 if quick else 1]
+
+
+def costs(*, repeats: int, quick: bool, pythons: dict[str, str] | None = None) -> Costs:
+    """Measure them in fresh processes, in turn.
+
+    Args:
+        quick: the short horizon.
+        pythons: interpreters of peers that live in another environment.
+    """
+    case = _SCENE, SCENES[_SCENE].ends[0 if quick else 1]
+    measured = measure([OURS, *COMPILED], [case], repeats=repeats, pythons=pythons)
+    found = Costs(notes=[note for note in measured.notes if "left out" in note or "broke" in note])
+    for error in ERRORS:
+        ours = cost_at(measured.of(*case, OURS), error)
+        others = [cost_at(measured.of(*case, peer), error) for peer in COMPILED]
+        best = min((cost for cost in others if cost is not None), default=None)
+        if ours is not None:
+            found.ours[error] = ours
+        if best is not None:
+            found.best[error] = best
+    return found
