@@ -1,5 +1,5 @@
 """``python -m rigidsim``."""
 
-from rigidsim.cli.app import app
+from rigidsim.cli.app import main
 
-app(prog_name="rigidsim")
+main()

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from rigidsim.cli.tables import console
+from rigidsim.cli.page import console
 from rigidsim.look.readable_time import YEAR, span_text, unit_for
 
 if TYPE_CHECKING:

@@ -4,44 +4,52 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
+from collections.abc import Iterable
 from importlib import import_module
-from typing import Annotated
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from rigidsim.cli.commands import COMMANDS
-from rigidsim.cli.options import user_errors
 
-app = typer.Typer(
-    name="rigidsim",
-    help="High-precision experiments on rotating rigid bodies: one TOML file is one experiment.",
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-)
+if TYPE_CHECKING:
+    import typer
+
+    app: typer.Typer
+    """All commands."""
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
-        from rigidsim import __version__
-
-        print(f"rigidsim {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def main(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """High-precision experiments on rotating rigid bodies: one TOML file is one experiment."""
+def main() -> None:
+    """The program ``rigidsim``: what it is called with says which command has to be loaded."""
     # what follows loads hundreds of modules, which hold no garbage to be looked for every 700 objects
     gc.set_threshold(100_000, 20, 20)
     # pydantic would read the metadata of every installed package to find plugins that nothing here uses
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    named = sys.argv[1:2]
+    program(named if set(named) <= set(COMMANDS) and named else COMMANDS)(prog_name="rigidsim")
 
 
-for _name in COMMANDS:
-    app.command()(user_errors(getattr(import_module(f"rigidsim.cli.commands.{_name}"), _name)))
+def program(names: Iterable[str] = COMMANDS) -> typer.Typer:
+    """Some commands as a program."""
+    import typer
+
+    from rigidsim.cli.options import user_errors, version
+
+    made = typer.Typer(
+        name="rigidsim",
+        help="High-precision experiments on rotating rigid bodies: one TOML file is one experiment.",
+        no_args_is_help=True,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+    )
+    made.callback()(version)
+    for name in names:
+        made.command()(user_errors(getattr(import_module(f"rigidsim.cli.commands.{name}"), name)))
+    return made
+
+
+def __getattr__(name: str) -> Any:
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()["app"] = whole = program()
+    return whole

@@ -39,6 +39,23 @@ OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from rigidsim import __version__
+
+        print(f"rigidsim {__version__}")
+        raise typer.Exit
+
+
+def version(
+    wanted: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """High-precision experiments on rotating rigid bodies: one TOML file is one experiment."""
+
+
 def print_run(result: Run, as_json: bool) -> int:
     """Print a run's summary; returns its exit code."""
     from rigidsim.cli import tables

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import math
-import shutil
 import sys
 from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
+from rigidsim.cli.page import Page, Styled, page
 from rigidsim.cli.understood import understood
 from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import TimeWords, span_text
@@ -19,21 +14,9 @@ from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
 from rigidsim.store.understood import Body, Span, Start
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from rigidsim.workflows.check import Checked
-
-
-def console() -> Console:
-    """stdout; wide enough for whole words when piped."""
-    width = None if sys.stdout.isatty() else max(110, shutil.get_terminal_size().columns)
-    return Console(width=width, highlight=False)
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for name in columns:
-        right = name in ("largest drift", "final", "bound", "initial", "put back")
-        table.add_column(name, justify="right" if right else "left", overflow="fold")
-    return table
 
 
 def size(count: float) -> str:
@@ -42,15 +25,6 @@ def size(count: float) -> str:
         if count >= factor:
             return f"{count / factor:.3g} {unit}"
     return f"{count:.0f} B"
-
-
-def _line(out: Console, label: str, text: str, style: str = "") -> None:
-    """A label and a text that is broken between words, indented; never read as markup."""
-    line = Table.grid(padding=(0, 1))
-    line.add_column(width=8)
-    line.add_column(overflow="fold")
-    line.add_row(Text(label, style=style), Text(text, style=style))
-    out.print(line)
 
 
 def _initial(value: float | tuple[float, ...] | None) -> str:
@@ -74,33 +48,36 @@ def _drift(value: float | None) -> str:
 
 def print_summary(summary: Brief, folder: str, out: Console | None = None) -> None:
     """The table at the end of ``run`` and of ``info``."""
-    out = out or console()
+    on = page(out)
     color = "green" if summary.status == "finished" else "yellow"
-    out.print(Text.assemble((summary.name, "bold"), "  ", (summary.status, f"bold {color}")))
+    on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))
     if summary.description:
-        out.print(Text(summary.description, style="dim"))
+        on.say((summary.description, "dim"))
     if summary.status != "finished":
-        out.print(Text(summary.message))
+        on.say(summary.message)
     if isinstance(summary, Summary):
-        _print_ended(summary, out)
-    _line(out, "folder", folder)
+        _print_ended(summary, on)
+    on.line("folder", folder)
 
 
 def print_understood(body: Body | None, start: Start | None, time: Span | None, out: Console) -> None:
     """Body, start and time as they were understood."""
+    _print_understood(body, start, time, page(out))
+
+
+def _print_understood(body: Body | None, start: Start | None, time: Span | None, on: Page) -> None:
     for label, text in understood(body, start, time):
-        _line(out, label, text)
+        on.line(label, text)
 
 
-def _print_ended(summary: Summary, out: Console) -> None:
-    print_understood(summary.body, summary.start, summary.time, out)
+def _print_ended(summary: Summary, on: Page) -> None:
+    _print_understood(summary.body, summary.start, summary.time, on)
     how = f"tolerance {summary.tolerance:.3g}"
     if summary.method == "closed_form":
         how = "in closed form"
     if summary.hold_invariants:
         how += ", invariants projected"
-    _line(
-        out,
+    on.line(
         "model",
         f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
         f"{summary.precision} precision, {how}",
@@ -109,8 +86,7 @@ def _print_ended(summary: Summary, out: Console) -> None:
         _line(out, "", "whether a small push out of the plane would grow isn't examined")
     cost = summary.cost
     seconds = sum(v for k, v in cost.seconds.items() if k != ENGINE)
-    _line(
-        out,
+    on.line(
         "cost",
         f"{cost.steps:,} steps, {summary.samples:,} of {summary.samples_planned:,} samples, "
         f"{span_text(seconds)} wall ({span_text(cost.seconds[ENGINE])} integrating), "
@@ -118,21 +94,21 @@ def _print_ended(summary: Summary, out: Console) -> None:
     )
     if cost.cpu_by_phase:
         spent = [f"{name.replace('_', ' ')} {span_text(s)}" for name, s in cost.cpu_by_phase.items()]
-        _line(out, "CPU", ", ".join(spent))
-    out.print(_invariants(summary))
-    _line(out, "drifts", "relative to: " + _scales(summary.invariants))
+        on.line("CPU", ", ".join(spent))
+    _print_invariants(summary, on)
+    on.line("drifts", "relative to: " + _scales(summary.invariants))
     if summary.hold_invariants:
-        _line(out, "held", "put back: what the drift would have been; held drifts are no independent check")
-    _print_accuracy(summary.accuracy, out)
+        on.line("held", "put back: what the drift would have been; held drifts are no independent check")
+    _print_accuracy(summary.accuracy, on)
     for number, name in enumerate(summary.events):
-        _line(out, "" if number else "events", _event(summary, name))
+        on.line("" if number else "events", _event(summary, name))
     chaos = summary.lyapunov
     if chaos is not None:
         what = "chaotic" if chaos.chaotic else "regular"
         moved = f"moved by {chaos.moved_over_second_half:.1g} over the second half"
-        _line(out, "motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
+        on.line("motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
     for warning in summary.warnings:
-        _line(out, "warning", warning, "bold red")
+        on.line("warning", warning, "bold red")
 
 
 def _event(summary: Summary, name: str) -> str:
@@ -157,109 +133,96 @@ def _words(summary: Summary) -> TimeWords:
     return TimeWords.of({"epoch": time.epoch, "time_unit": time.unit}, time.start_s, time.end_s)
 
 
-def _invariants(summary: Summary) -> Table:
+def _print_invariants(summary: Summary, on: Page) -> None:
     held = ["put back"] if summary.hold_invariants else []
-    table = _table("invariant", "initial", "largest drift", "final", "bound", *held)
+    rows: list[list[Styled]] = []
     for name, row in summary.invariants.items():
         sound = row.largest_drift is None or row.largest_drift <= row.bound
-        table.add_row(
-            name,
-            Text(_initial(row.initial)),
-            Text(_drift(row.largest_drift), style="" if sound else "red"),
-            _drift(row.final_drift),
-            _drift(row.bound),
-            *([_drift(row.put_back)] if held else []),
-        )
-    return table
+        largest = (_drift(row.largest_drift), "" if sound else "red")
+        rows.append([name, _initial(row.initial), largest, _drift(row.final_drift), _drift(row.bound)])
+        rows[-1] += [_drift(row.put_back)] if held else []
+    on.table(["invariant", "initial", "largest drift", "final", "bound", *held], rows)
 
 
-def _print_accuracy(accuracy: Accuracy, out: Console) -> None:
+def _print_accuracy(accuracy: Accuracy, on: Page) -> None:
     if accuracy.chosen:
-        _line(out, "chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
+        on.line("chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
     estimate = accuracy.estimated_attitude_error
     if accuracy.certified is not None:
         asked = "" if accuracy.requested is None else f", {accuracy.requested:.1e} asked for"
         text = f"certified to {accuracy.certified:.1e} rad{asked} ({accuracy.how}, "
-        _line(out, "attitude", f"{text}{accuracy.times_compared} times)")
+        on.line("attitude", f"{text}{accuracy.times_compared} times)")
     elif estimate is not None:
         factor = accuracy.amplification or 1.0
         unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 else ""
         size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
-        _line(out, "attitude", size if estimate < math.pi else "unknown at the end")
+        on.line("attitude", size if estimate < math.pi else "unknown at the end")
         share = accuracy.examined_share
         if share is not None and share < 1 and estimate < math.pi:
             seen = f"the growth of errors was followed over the first {100 * share:.2g} % of the run"
-            _line(out, "examined", f"{seen} (estimated_how in the summary says more)")
+            on.line("examined", f"{seen} (estimated_how in the summary says more)")
     elif accuracy.amplification is None:
-        _line(out, "errors", accuracy.estimated_how)
+        on.line("errors", accuracy.estimated_how)
     if accuracy.certified_position is not None:
         length = accuracy.requested_position or math.nan
         text = f"certified to {accuracy.certified_position:.1e} m, {length:.1e} m asked for"
-        _line(out, "path", text)
+        on.line("path", text)
         return
     place, speed = accuracy.estimated_position_error, accuracy.estimated_velocity_error
     if place is not None and speed is not None:
         text = f"position uncertain by about {place:.1e} m, velocity by {speed:.1e} m/s, at the end"
-        _line(out, "path", text)
+        on.line("path", text)
 
 
 def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     """What ``rigidsim plan`` says."""
-    out = out or console()
-    out.print(Text.assemble((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}"))
+    on = page(out)
+    on.say((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}")
     parts = Body(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
-    print_understood(*parts, out)
+    _print_understood(*parts, on)
     for effect in plan["loads"]:
-        _line(out, "load", effect)
+        on.line("load", effect)
     for surface in plan["switching"]:
         where = f"steps end on the kinks and jumps of {surface['surface']} ({surface['where']})"
-        out.print(Text("  " + where))
+        on.say("  " + where)
     if plan["turning"]:
-        out.print(Text(f"  turns of {', '.join(plan['turning'])} count: steps are taken one by one"))
-    table = _table("states", "carried because")
-    for row in plan["reasons"]:
-        table.add_row(row["states"], row["why"])
-    for row in plan["left_out"]:
-        table.add_row(Text(f"no {row['what']}", style="dim"), Text(row["why"], style="dim"))
-    out.print(table)
-    out.print(Text("equations (internal units: powers of two)", style="bold"))
+        on.say(f"  turns of {', '.join(plan['turning'])} count: steps are taken one by one")
+    reasons: list[list[Styled]] = [[row["states"], row["why"]] for row in plan["reasons"]]
+    reasons += [[(f"no {row['what']}", "dim"), (row["why"], "dim")] for row in plan["left_out"]]
+    on.table(["states", "carried because"], reasons)
+    on.say(("equations (internal units: powers of two)", "bold"))
     for line in plan["equations"]:
-        out.print(Text("  " + line), soft_wrap=True)
-    table = _table("invariant", "holds because")
-    for row in plan["invariants"]:
-        table.add_row(row["name"], row["why"])
-    out.print(table)
-    out.print(f"recorded   {', '.join(plan['recorded'])}", soft_wrap=True)
+        on.say("  " + line, whole=True)
+    on.table(["invariant", "holds because"], [[row["name"], row["why"]] for row in plan["invariants"]])
+    on.say(f"recorded   {', '.join(plan['recorded'])}", whole=True)
     predicted, pilot = plan["predicted"], plan["pilot"]
     held = ", invariants held" if plan["hold_invariants"] else ""
-    out.print(
+    on.say(
         f"precision  {plan['precision']}, tolerance {plan['tolerance']:.3g}, Taylor order "
         f"{plan['taylor_order']}{held}"
     )
     if plan["method"] == "closed_form":
-        out.print(f"method     {plan['closed_form']}: no steps are taken")
+        on.say(f"method     {plan['closed_form']}: no steps are taken")
     elif plan["closed_form"] is not None:
-        out.print(f'closed     {plan["closed_form"]}: method = "closed_form" would take no steps')
+        on.say(f'closed     {plan["closed_form"]}: method = "closed_form" would take no steps')
     if plan["accuracy"] is not None:
-        out.print(f"chosen     {plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
-    out.print(
+        on.say(f"chosen     {plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
+    on.say(
         f"predicted  {predicted['steps']:.3g} steps of about {span_text(pilot['step'])} "
         f"(pilot of {pilot['steps']:.0f}), {span_text(predicted['total_seconds'])}, "
         f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
         f"timeline {size(predicted['timeline_bytes'])}"
     )
     for warning in plan["warnings"]:
-        out.print(Text(f"warning    {warning}", style="bold red"), soft_wrap=True)
+        on.say((f"warning    {warning}", "bold red"), whole=True)
     error = predicted["attitude_error_rad"]
     if error is not None and math.isfinite(error):
         factor = predicted["amplification"]
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        out.print(
-            f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
-        )
+        on.say(f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})")
         seen = predicted["growth_seconds"]
         if seen:
-            out.print(
+            on.say(
                 f"           if errors go on growing as in the first {span_text(seen)}; what sets in later "
                 "isn't seen here, but by the run"
             )
@@ -267,12 +230,9 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
 
 def print_scenes(described: dict[str, str]) -> None:
     """What ``rigidsim new`` can write."""
-    out = console()
-    table = _table("scene", "what it is")
-    for name, text in described.items():
-        table.add_row(name, text)
-    out.print(table)
-    out.print("rigidsim new SCENE [NAME] writes NAME.toml", markup=False)
+    on = page()
+    on.table(["scene", "what it is"], described.items())
+    on.say("rigidsim new SCENE [NAME] writes NAME.toml")
 
 
 def print_checked(found: Checked) -> None:
@@ -280,44 +240,44 @@ def print_checked(found: Checked) -> None:
     if not found.valid:
         print(f"rigidsim: {ConfigError(found.problems, found.source).for_command_line()}", file=sys.stderr)
         return
-    out = console()
-    out.print(Text.assemble((found.source, "bold"), "  ", ("valid", "bold green")))
-    print_understood(found.body, found.start, found.time, out)
+    on = page()
+    on.say((found.source, "bold"), "  ", ("valid", "bold green"))
+    _print_understood(found.body, found.start, found.time, on)
     for caution in found.cautions:
-        _line(out, "warning", caution.text, "bold red")
+        on.line("warning", caution.text, "bold red")
 
 
 def print_verdict(verdict: dict[str, Any]) -> None:
     """A verification in words, from ``Verdict.as_dict``."""
-    out = console()
+    on = page()
     if verdict["identical"]:
-        out.print(f"identical: {verdict['samples']:,} samples, every variable, every bit")
+        on.say(f"identical: {verdict['samples']:,} samples, every variable, every bit")
     else:
-        out.print(f"different: {verdict['path']}")
+        on.say(f"different: {verdict['path']}")
     for problem in verdict["problems"]:
-        out.print(f"  {problem}", markup=False)
+        on.say(f"  {problem}")
     first = verdict["first_difference"]
     if first is not None:
-        out.print(
+        on.say(
             f"  first difference: {first['variable']} at sample {first['sample']}: saved "
             f"{first['saved']!r}, again {first['again']!r}, {first['size']:.3g} apart"
         )
     names = verdict["differing_variables"]
     if names:
-        out.print(f"  variables that differ: {', '.join(names)}")
+        on.say(f"  variables that differ: {', '.join(names)}")
     if verdict["environment"]:
-        out.print("  changed since, which can explain other bits:")
+        on.say("  changed since, which can explain other bits:")
         for line in verdict["environment"]:
-            out.print(f"    {line}", markup=False)
+            on.say(f"    {line}")
     elif names:
-        out.print("  versions, CPU features and settings are the same, so they don't explain it")
+        on.say("  versions, CPU features and settings are the same, so they don't explain it")
 
 
 def print_tradeoff(result: dict[str, Any]) -> None:
     """What ``rigidsim tradeoff`` says, from ``Tradeoff.as_dict``."""
-    out = console()
-    out.print(Text.assemble((result["name"], "bold"), "  for this accuracy, use this"))
-    table = _table("attitude error, rad", "cost", "error reached", "keys of \\[integrator]")
+    on = page()
+    on.say((result["name"], "bold"), "  for this accuracy, use this")
+    rows = []
     over = result["measured_seconds"]
     marked = False
     for row in result["advice"]:
@@ -326,32 +286,29 @@ def print_tradeoff(result: dict[str, Any]) -> None:
             reach += f" to {row['more_than'] * 10:.0e}"
         marked = marked or row["less"]
         star = " *" if row["less"] else ""
-        table.add_row(
-            Text(reach), f"{row['cost']:.3g}", f"{row['error']:.1e}{star}", Text(", ".join(row["keys"]))
-        )
-    out.print(table)
+        rows.append([reach, f"{row['cost']:.3g}", f"{row['error']:.1e}{star}", ", ".join(row["keys"])])
+    on.table(["attitude error, rad", "cost", "error reached", "keys of [integrator]"], rows)
     if marked:
         less = next(row["seconds"] for row in result["advice"] if row["less"])
-        out.print(Text(f"  * over the first {span_text(less)} only: quadruple precision is slow"))
+        on.say(f"  * over the first {span_text(less)} only: quadruple precision is slow")
     part = over / result["horizon_seconds"]
     how_much = "all" if part >= 1 else f"the first {100 * part:.2g} %"
-    _line(out, "measured", f"{how_much} of {span_text(result['horizon_seconds'])}; nothing is extrapolated")
-    _line(out, "compared", f"{result['compared']}; largest error at up to 38 times")
-    _line(out, "against", result["reference"])
-    _line(
-        out,
+    on.line("measured", f"{how_much} of {span_text(result['horizon_seconds'])}; nothing is extrapolated")
+    on.line("compared", f"{result['compared']}; largest error at up to 38 times")
+    on.line("against", result["reference"])
+    on.line(
         "cost",
         f"CPU time of integration over that of double precision in quaternions, {result['processes']} fresh "
         f"processes, medians; recording not counted",
     )
     if result["closed_form"] != "yes":
-        _line(out, "exact", f"no: {result['closed_form'].removeprefix('none: ')}")
-    _not_measured(out, result["settings"])
+        on.line("exact", f"no: {result['closed_form'].removeprefix('none: ')}")
+    _not_measured(on, result["settings"])
     if result["folder"]:
-        _line(out, "folder", result["folder"])
+        on.line("folder", result["folder"])
 
 
-def _not_measured(out: Console, settings: list[dict[str, Any]]) -> None:
+def _not_measured(on: Page, settings: list[dict[str, Any]]) -> None:
     """Settings without numbers, those with the same reason together."""
     reasons: dict[str, list[str]] = {}
     for row in settings:
@@ -359,4 +316,4 @@ def _not_measured(out: Console, settings: list[dict[str, Any]]) -> None:
             reasons.setdefault(row["reason"], []).append(row["setting"])
     for reason, names in reasons.items():
         many = f"{len(names)} settings, from {names[0]} on" if len(names) > 4 else "; ".join(names)
-        _line(out, "no data", f"{many}: {reason}", "yellow")
+        on.line("no data", f"{many}: {reason}", "yellow")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import html
 from collections.abc import Mapping, Sequence
 from dataclasses import replace as exchanged
 from pathlib import Path
@@ -102,6 +101,8 @@ class Experiment:
         return f"<Experiment {self.config.name!r} ({self.source}): {loads}{until}, {precision}>"
 
     def _repr_html_(self) -> str:
+        import html
+
         return f"<b>{html.escape(self.config.name)}</b><pre>{html.escape(self.text)}</pre>"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import secrets
+import os
 from contextlib import suppress
 from dataclasses import field
 
@@ -69,7 +69,7 @@ class Session:
         parts = assemble(prepared)
         log, stepper, evaluator, corrected = parts.log, parts.stepper, parts.evaluator, parts.corrected
         resumed = None if chain is None else restore(chain, prepared, corrected, evaluator, log)
-        run_id = secrets.token_hex(8) if chain is None else chain.run
+        run_id = os.urandom(8).hex() if chain is None else chain.run
         attributes = root_attributes(prepared, stepper, run_id, self.mixed)
         limits = self.tuning.segments
         variables = dataset_variables(prepared)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import platform
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,8 @@ import h5py
 import heyoka as hy
 import mpmath
 import numpy as np
+
+from rigidsim import __version__
 
 
 def cpu_model() -> str:
@@ -31,15 +31,7 @@ def versions() -> dict[str, str]:
     """Of everything that takes part in the numbers."""
     parts = {"heyoka": hy, "numpy": np, "mpmath": mpmath, "h5py": h5py}
     found = {name: str(module.__version__) for name, module in parts.items()}
-    return {"python": platform.python_version(), "rigidsim": _own_version(), **found}
-
-
-@cache
-def _own_version() -> str:
-    try:
-        return importlib.metadata.version("rigidsim")
-    except importlib.metadata.PackageNotFoundError:  # run from a source tree
-        return "unknown"
+    return {"python": platform.python_version(), "rigidsim": __version__, **found}
 
 
 def code_target(integrator: Any) -> dict[str, str]:

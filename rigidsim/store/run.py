@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import sys
 from abc import abstractmethod
 from dataclasses import replace
@@ -86,6 +85,8 @@ class Run:
         return f"<Run {self.outcome.name!r} ({self.place}): {self.status}>"
 
     def _repr_html_(self) -> str:
+        import html
+
         title = f"{html.escape(self.outcome.name)}: {html.escape(self.status)}"
         return f"<b>{title}</b> ({html.escape(self.place)}){_table(self.outcome)}"
 
@@ -192,6 +193,8 @@ def open_run(path: str | Path) -> SavedRun:
 
 def _table(outcome: Brief) -> str:
     """Warnings, the attitude's error and the invariants of a summary, for a notebook."""
+    import html
+
     if not isinstance(outcome, Summary):
         return f"<p>{html.escape(outcome.message)}</p>"
     lines = [f"warning: {html.escape(text)}" for text in outcome.warnings]

@@ -17,7 +17,8 @@ from rigidsim.accuracy.choice import choose
 from rigidsim.accuracy.setting import Setting
 from rigidsim.cli import tables as report
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress import LineObserver, TerminalObserver
+from rigidsim.session.progress import LineObserver
+from rigidsim.session.progress_bar import TerminalObserver
 from rigidsim.session.timings import NOT_KEPT, Phases
 from rigidsim.solve.loop import Progress
 

@@ -476,6 +476,29 @@ def test_help_loads_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "loaded: []"
 
 
+UNUSED = (
+    "{'rerun', 'xarray', 'pandas', 'matplotlib', 'dask', 'pyarrow', 'scipy', 'rich', 'tomlkit', 'h5netcdf', "
+    "'html', 'email.parser', 'secrets', 'rigidsim.cli.commands.plot'}"
+)
+
+
+def test_a_run_without_a_timeline_loads_nothing_that_it_does_not_use(config: Config) -> None:
+    path = config()
+    code = (
+        "import sys\nfrom rigidsim.cli.app import main\n"
+        f"sys.argv = ['rigidsim', 'run', {str(path)!r}]\n"
+        "try: main()\nexcept SystemExit as end: assert end.code == 0, end.code\n"
+        f"print('loaded:', sorted({UNUSED} & set(sys.modules)), len(sys.modules))"
+    )
+    done = python(code)
+    assert done.returncode == 0, done.stderr
+    *printed, loaded = done.stdout.splitlines()
+    assert printed[0] == "free  finished"
+    assert printed[-1] == f"folder   {Path('runs/free')}"
+    assert loaded.startswith("loaded: [] ")
+    assert int(loaded.split()[-1]) < 850  # 780 with the libraries that constraints.txt names
+
+
 def test_importing_loads_nothing_prints_nothing_and_writes_nothing(tmp_path: Path) -> None:
     done = python(
         "import sys\nopened = []\n"
@@ -550,7 +573,7 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
     """Name, bar, percentage, rate and time left, none of them cut."""
     from rich.console import Console
 
-    from rigidsim.session.progress import TerminalObserver
+    from rigidsim.session.progress_bar import TerminalObserver
     from rigidsim.solve.loop import Progress
     from rigidsim.solve.problem import prepare
 

@@ -13,6 +13,7 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
     Example: rigidsim info runs/intermediate_axis
     """
     from rigidsim.cli import tables
+    from rigidsim.cli.page import page
     from rigidsim.store.run import open_run
 
     opened = open_run(run_path)
@@ -21,9 +22,7 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
         return
     tables.print_summary(opened.outcome, str(opened.folder.path))
     if not opened.saved:
-        tables.console().print("dataset  nothing was saved yet")
+        page().say("dataset  nothing was saved yet")
         return
     with opened.dataset as dataset:
-        tables.console().print(
-            f"dataset  {dataset.sizes['time']:,} samples of {', '.join(map(str, dataset.data_vars))}"
-        )
+        page().say(f"dataset  {dataset.sizes['time']:,} samples of {', '.join(map(str, dataset.data_vars))}")

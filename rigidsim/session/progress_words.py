@@ -1,0 +1,32 @@
+"""What a progress bar and plain lines say alike."""
+
+from __future__ import annotations
+
+NOTHING_LEFT = "nothing is left to do: {}; --until prolongs a finished run to a later end"
+PHASES = {
+    "lyapunov": "Lyapunov exponents",
+    "dataset": "writing dataset.h5",
+    "timeline": "drawing timeline.rrd",
+    "certify": "certifying",
+}
+
+
+def left(elapsed: float, fraction: float) -> str:
+    """Time to go at the mean pace so far; a guess from the first moments would be far off."""
+    if fraction >= 1:
+        return "0:00:00 left"
+    if fraction <= 0 or elapsed < 0.3:
+        return "-:--:-- left"
+    seconds = elapsed * (1 / fraction - 1)
+    if seconds >= 360_000:
+        return f"{seconds / 86400:.3g} days left"
+    minutes, seconds = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d} left"
+
+
+def rate_text(value: float) -> str:
+    """A rate to three digits, with a prefix."""
+    for factor, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if value >= factor:
+            return f"{value / factor:.3g} {suffix}"
+    return f"{value:.3g}"
