@@ -21,11 +21,14 @@ if TYPE_CHECKING:
 def main() -> None:
     """The program ``rigidsim``: what it is called with says which command has to be loaded."""
     # what follows loads hundreds of modules, which hold no garbage to be looked for every 700 objects
-    gc.set_threshold(100_000, 20, 20)
+    gc.set_threshold(400_000, 20, 20)
     # pydantic would read the metadata of every installed package to find plugins that nothing here uses
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     named = sys.argv[1:2]
-    program(named if set(named) <= set(COMMANDS) and named else COMMANDS)(prog_name="rigidsim")
+    try:
+        program(named if set(named) <= set(COMMANDS) and named else COMMANDS)(prog_name="rigidsim")
+    finally:
+        gc.freeze()  # what is left is given back with the process, and needn't be searched for garbage
 
 
 def program(names: Iterable[str] = COMMANDS) -> typer.Typer:
