@@ -83,7 +83,7 @@ def _print_ended(summary: Summary, on: Page) -> None:
         f"{summary.precision} precision, {how}",
     )
     if summary.formulation == "planar":
-        _line(out, "", "whether a small push out of the plane would grow isn't examined")
+        on.line("", "whether a small push out of the plane would grow isn't examined")
     cost = summary.cost
     seconds = sum(v for k, v in cost.seconds.items() if k != ENGINE)
     on.line(
