@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,6 @@ import h5py
 import heyoka as hy
 import mpmath
 import numpy as np
-
-from rigidsim import __version__
 
 
 def cpu_model() -> str:
@@ -31,7 +30,7 @@ def versions() -> dict[str, str]:
     """Of everything that takes part in the numbers."""
     parts = {"heyoka": hy, "numpy": np, "mpmath": mpmath, "h5py": h5py}
     found = {name: str(module.__version__) for name, module in parts.items()}
-    return {"python": platform.python_version(), "rigidsim": __version__, **found}
+    return {"python": platform.python_version(), "rigidsim": sys.modules["rigidsim"].__version__, **found}
 
 
 def code_target(integrator: Any) -> dict[str, str]:
