@@ -1,7 +1,8 @@
-"""Reading a bounded number of rows from a dataset of any length."""
+"""A bounded number of rows from a dataset of any length: read, or kept while the run goes on."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,54 @@ def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
     return indices if indices[-1] == count - 1 else np.append(indices, count - 1)
 
 
-def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xarray.Dataset:
+class KeptRows:
+    """The rows of `thinned_indices` of a run, kept as they come, so that nothing has to be read for them.
+
+    Args:
+        count: number of rows of the whole run, >= 1.
+        rows: number of rows wanted at most, >= 2.
+    """
+
+    def __init__(self, count: int, rows: int) -> None:
+        self._count = count
+        self._stride = _stride(count, rows)
+        self._seen = 0
+        self._pieces: dict[str, list[NDArray[np.float64]]] = {}
+
+    def take(self, first: int, block: Mapping[str, NDArray[np.float64]]) -> None:
+        """Look at the rows from `first` on; nothing is kept of a run whose beginning wasn't seen.
+
+        Args:
+            block: (rows, ...) by variable, `time` among them.
+        """
+        if first != self._seen:
+            self._pieces = {}
+            return
+        rows = len(block["time"])
+        self._seen = first + rows
+        picked = [slice(-first % self._stride, None, self._stride)]
+        if self._seen == self._count and (self._count - 1) % self._stride:
+            picked.append(slice(rows - 1, None))
+        for name, values in block.items():
+            self._pieces.setdefault(name, []).extend(values[part].copy() for part in picked)
+
+    def columns(self, count: int) -> dict[str, NDArray[np.float64]] | None:
+        """The rows of each variable; None where not every row was seen.
+
+        Args:
+            count: number of rows that there are now, fewer than there were to be in a run that was stopped.
+        """
+        if not self._pieces or not self._seen == self._count == count:
+            return None
+        return {name: np.concatenate(pieces) for name, pieces in self._pieces.items()}
+
+
+def thin(
+    dataset: xarray.Dataset,
+    rows: int,
+    at_once: int = ROWS_AT_ONCE,
+    kept: KeptRows | None = None,
+) -> xarray.Dataset:
     """The rows of `thinned_indices`, in memory; residuals are left out.
 
     Only variables that have a time dimension, and of those only the rows asked for, are read:
@@ -41,6 +89,7 @@ def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xar
 
     Args:
         at_once: rows of the file that one read spans.
+        kept: while the run went on; what is there isn't read.
 
     Raises:
         ValueError: no `time` dimension or coordinate, or see `thinned_indices`.
@@ -55,6 +104,9 @@ def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xar
         if "time" in variable.dims and variable.dtype.kind in "fiub" and not is_residual(variable)
     ]
     wanted = dataset[names]
+    known = None if kept is None else kept.columns(count)
+    if known is not None and all(name in known for name in _along_time(wanted)):
+        return _replaced(wanted, known)
     stride = _stride(count, rows)
     # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
     # kilobytes of notes for every chunk that it touches, hence pieces.
@@ -71,6 +123,23 @@ def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xar
     if joined.sizes["time"] != len(indices):  # concat must neither merge nor sort
         raise AssertionError("thinning lost rows")
     return joined.transpose("time", ...)
+
+
+def _along_time(dataset: xarray.Dataset) -> list[str]:
+    return [str(name) for name, variable in dataset.variables.items() if "time" in variable.dims]
+
+
+def _replaced(dataset: xarray.Dataset, known: Mapping[str, NDArray[np.float64]]) -> xarray.Dataset:
+    """The dataset with other rows."""
+    import xarray
+
+    found = {str(name): variable for name, variable in dataset.variables.items()}
+    for name in _along_time(dataset):
+        shape = (-1, *(dataset.sizes[dim] for dim in found[name].dims[1:]))
+        found[name] = xarray.Variable(found[name].dims, known[name].reshape(shape), found[name].attrs)
+    coordinates = {name: found.pop(name) for name in map(str, dataset.coords)}
+    bare = xarray.Coordinates(coordinates, indexes={})
+    return xarray.Dataset(found, coords=bare, attrs=dataset.attrs).load()
 
 
 def _stride(count: int, rows: int) -> int:

@@ -15,7 +15,7 @@ from rigidsim.look.clock import build_clock
 from rigidsim.look.page import summary_page, title_of
 from rigidsim.look.plots import Plot, Series, plan_plots
 from rigidsim.look.stage import build_stages
-from rigidsim.look.thinning import thin, thinned_indices
+from rigidsim.look.thinning import KeptRows, thin, thinned_indices
 
 if TYPE_CHECKING:
     import xarray
@@ -25,7 +25,9 @@ _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 
-def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) -> int:
+def write_timeline(
+    dataset: xarray.Dataset, path: Path, *, rows: int = 100_000, kept: KeptRows | None = None
+) -> int:
     """Write a dataset as a rerun recording with its own layout.
 
     Args:
@@ -33,6 +35,7 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
             variable along time gets a plot. It may be lazy: only the rows shown are read.
         path: the file; it is whole when this returns.
         rows: at most so many rows are shown, evenly strided, with the first and the last.
+        kept: these rows, where they were kept while the run went on; otherwise they are read.
 
     Returns:
         The number of rows written.
@@ -46,7 +49,7 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     """
     import rerun as rr
 
-    shown = thin(dataset, rows)
+    shown = thin(dataset, rows, kept=kept)
     count = shown.sizes["time"]
     steps = thinned_indices(dataset.sizes["time"], rows)
     seconds = np.asarray(shown["time"].values, dtype=np.float64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigidsim.errors import VIEW, StoppedWritingError
+from rigidsim.look.thinning import KeptRows
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.schema import Output
 from rigidsim.session.attributes import of_complete
@@ -94,14 +95,27 @@ class Completion:
 
     def _draw_timeline(self) -> None:
         self.summary = with_timeline(
-            self.summary, self.folder, self.prepared.scene.config.output, self.observer
+            self.summary,
+            self.folder,
+            self.prepared.scene.config.output,
+            self.observer,
+            self.recorder.kept,
         )
         if self.summary.timeline_sha256 is not None:
             self.phases.next("timeline")
 
 
-def with_timeline(summary: Summary, folder: RunFolder, output: Output, observer: Observer) -> Summary:
+def with_timeline(
+    summary: Summary,
+    folder: RunFolder,
+    output: Output,
+    observer: Observer,
+    kept: KeptRows | None = None,
+) -> Summary:
     """Draw a complete dataset's timeline, where one is asked for; the summary with its digest.
+
+    Args:
+        kept: its rows, where they were kept.
 
     Raises:
         StoppedWritingError: it can't be written.
@@ -114,7 +128,7 @@ def with_timeline(summary: Summary, folder: RunFolder, output: Output, observer:
     observer.phase("timeline")
     try:
         with open_dataset(folder.dataset, indexed=False) as dataset:  # memory goes with the rows
-            write_timeline(dataset, path, rows=output.timeline_rows)
+            write_timeline(dataset, path, rows=output.timeline_rows, kept=kept)
     except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
         why = error.strerror if isinstance(error, OSError) else None
         raise StoppedWritingError(

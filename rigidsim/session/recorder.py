@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 
+from rigidsim.look.thinning import KeptRows
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.timings import Effort
 from rigidsim.session.variables import dates_of, drift_name, put_back_name
@@ -34,6 +35,7 @@ class Recorder(SampleReceiver):
         statistics: what the summary says of all samples.
         progress: of the run; set when it begins.
         trail: some of this session's samples.
+        kept: rows for the timeline; None where none is asked for.
     """
 
     progress: Progress
@@ -58,6 +60,9 @@ class Recorder(SampleReceiver):
         self._max_drift = None if guard is None else float(guard)
         self.statistics = SampleStatistics()
         self.trail = Trail(prepared.precision)
+        output, count = prepared.scene.config.output, prepared.clock.count
+        shown = output.timeline and isinstance(writer, SegmentWriter)
+        self.kept = KeptRows(count, output.timeline_rows) if shown else None
 
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples, up to the first past the guard ``max_drift``."""
@@ -87,6 +92,8 @@ class Recorder(SampleReceiver):
         factors = self._evaluator.singular_factors(block.states, block.chart)
         if factors is not None:
             self.statistics.see_singular(factors, recorded["time"][0])
+        if self.kept is not None:
+            self.kept.take(block.first, {name: parts[0] for name, parts in recorded.items()})
         self._writer.add(recorded)
 
     def _note_lost_turns(self) -> None:

@@ -11,8 +11,9 @@ import xarray
 
 pytest.importorskip("rerun")
 
+import rigidsim
 from rigidsim.look.stage import plane_view
-from rigidsim.look.thinning import thin
+from rigidsim.look.thinning import KeptRows, thin
 from rigidsim.look.timeline import CHUNK, write_timeline
 
 Build = Callable[..., xarray.Dataset]
@@ -32,6 +33,47 @@ def page(path: Path) -> str:
         if chunk.entity_path == "/summary":
             return str(chunk.to_record_batch().column("TextDocument:text").to_pylist()[0][0])
     raise AssertionError("no summary")
+
+
+@pytest.mark.parametrize(("cuts", "rows"), [([1001], 77), ([1, 499, 500, 1], 100), ([300, 701], 2000)])
+def test_rows_kept_on_the_way_are_those_that_would_be_read(
+    symmetric_top: Build, cuts: list[int], rows: int
+) -> None:
+    dataset, first = symmetric_top(), 0
+    kept = KeptRows(1001, rows)
+    for size in cuts:
+        assert kept.columns(1001) is None
+        names = [str(name) for name in dataset.variables if "time" in dataset[name].dims]
+        block = {name: dataset[name].values[first : first + size].reshape(size, -1) for name in names}
+        kept.take(first, {**block, "time": block["time"][:, 0]})
+        first += size
+    bare = dataset.drop_indexes(list(dataset.indexes))
+    xarray.testing.assert_identical(thin(bare, rows, kept=kept), thin(bare, rows))
+    assert kept.columns(1000) is None  # of a run that was stopped others are shown
+    late = KeptRows(1001, rows)
+    late.take(500, block)
+    assert late.columns(1001) is None
+
+
+def test_a_run_draws_what_it_kept(tmp_path: Path, read_back: Read, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what is drawn from its dataset later is the same."""
+    text = """
+        name = "kept"
+        body.principal_moments = [1, 2, 2.5]
+        initial.angular_velocity = [0.1, 1, 0.05]
+        time = {end = 20, samples = 20_003}
+        output.timeline_rows = 300
+    """
+    with monkeypatch.context() as patch:
+        patch.setattr(xarray.Dataset, "isel", None)  # nothing is read
+        run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
+    with run.dataset as dataset:
+        assert write_timeline(dataset, tmp_path / "later.rrd", rows=300) == 300
+    for entity in ("/scene/body", "/plots/angular_momentum", "/plots/drift/energy_drift"):
+        drawn, later = (read_back(path, entity) for path in (run.folder.timeline, tmp_path / "later.rrd"))
+        assert drawn.keys() == later.keys()
+        for name in drawn:
+            np.testing.assert_array_equal(drawn[name], later[name])
 
 
 def test_attitude_is_the_datasets_to_float32(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
