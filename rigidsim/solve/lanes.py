@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, Protocol
@@ -26,8 +27,15 @@ UNROLLED_FROM = 30_000
 equations' decomposition in place of 0.4 ms) and a tenth of the time to run."""
 _HOPELESS_STEPS = 32_768
 """In one stretch: the motion comes to no end, say towards a collision."""
-_LEAST_TOLERANCE = 1e-11
-"""Whose errors in a step still stand out of rounding in double precision; others' are in proportion."""
+_UNEVEN, _FEW_STEPS = 2.5, 8
+"""Longest step over the shortest, up to which they are alike, and so few that it doesn't matter."""
+_EIGHTY_BITS = int(np.finfo(np.longdouble).nmant) == 63
+_LEAST_TOLERANCE, _LEAST_WIDE_TOLERANCE = 1e-11, 1e-15
+"""Whose errors in a step still stand out of rounding in double precision and in 80 bits; others' are in
+proportion."""
+_ONE_ORDER = math.exp(2.0)
+"""What one order more gains in general, which is the tolerance's own step from order to order (Jorba & Zou
+2005); by how much proportions can be missed."""
 
 _PARTS = 4
 """Of a step, whose errors are a thousandth of its own or less: the power of 4 that is the series' order."""
@@ -59,14 +67,43 @@ class Lanes(Protocol):
     tolerance: float
 
     def advance(
-        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, int] | None:
-        """States (states, lanes) at the ends of intervals of time (lanes,), and steps that the first lane
-        took; None where one isn't finite or takes steps without end.
+        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
+    ) -> tuple[np.ndarray, int, float] | None:
+        """States (states, lanes) at the ends of intervals of time (lanes,), steps that the first lane took,
+        and the time that it got to; None where one isn't finite or takes steps without end.
+
+        Args:
+            most: steps of the first lane, after which all intervals end early alike; they do sooner where its
+                steps change in length.
         """
 
     def again(self, steps: float) -> Lanes:
         """For so many steps more."""
+
+
+class _Evenly:
+    """Ends a stretch where steps have become longer or shorter, as they do in passing something closely:
+    errors that are made there count for more, and are another part of the states.
+    """
+
+    def __init__(self) -> None:
+        self._most = _HOPELESS_STEPS
+
+    def go(self, go: Callable[[int], tuple[int, float, float]], most: int) -> int:
+        """Steps taken.
+
+        Args:
+            go: takes so many steps at most from the same place again; returns how many, the shortest, and the
+                longest.
+            most: steps.
+        """
+        tried = min(self._most, most)
+        while True:
+            steps, shortest, longest = go(tried)
+            if longest <= _UNEVEN * shortest or steps <= _FEW_STEPS:
+                self._most = 2 * max(tried, _FEW_STEPS)
+                return steps
+            tried = steps // 2
 
 
 class BatchLanes:
@@ -84,6 +121,7 @@ class BatchLanes:
         if self._unrolled:
             options = {"compact_mode": system.wide, "opt_level": 1}
         self._integrator = hy.taylor_adaptive_batch(system.equations, initial, tol=tolerance, **options)
+        self._even = _Evenly()
 
     def again(self, steps: float) -> Lanes:
         """As of ``Lanes``."""
@@ -92,17 +130,27 @@ class BatchLanes:
         return BatchLanes(self._system, steps, self.tolerance)
 
     def advance(
-        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, int] | None:
+        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
+    ) -> tuple[np.ndarray, int, float] | None:
         """As of ``Lanes``."""
         integrator = self._integrator
-        integrator.state[:] = states
-        integrator.set_time([float(t) for t in begin])
-        integrator.propagate_until([float(t) for t in end], max_steps=_HOPELESS_STEPS)
-        results = integrator.propagate_res
+
+        def go(most: int) -> tuple[int, float, float]:
+            integrator.state[:] = states
+            integrator.set_time([float(t) for t in begin])
+            integrator.propagate_until([float(t) for t in end], max_steps=most)
+            _, shortest, longest, steps = integrator.propagate_res[0]
+            return steps, shortest, longest
+
+        steps, results = self._even.go(go, most), integrator.propagate_res
+        reached = float(integrator.time[0])
         if any(result[0] != hy.taylor_outcome.time_limit for result in results):
-            return None
-        return np.array(integrator.state), int(results[0][3])
+            # the others took steps of almost the same lengths
+            integrator.propagate_until([float(t) for t in end - end[0] + reached], max_steps=_HOPELESS_STEPS)
+            results = integrator.propagate_res
+            if any(result[0] != hy.taylor_outcome.time_limit for result in results):
+                return None
+        return np.array(integrator.state), steps, reached
 
 
 class OwnLanes:
@@ -116,6 +164,7 @@ class OwnLanes:
         self._system = system
         self._integrator = copy.deepcopy(integrator)
         self.tolerance = float(integrator.tol)
+        self._even = _Evenly()
 
     def again(self, steps: float) -> Lanes:
         """As of ``Lanes``."""
@@ -124,18 +173,29 @@ class OwnLanes:
         return BatchLanes(self._system, steps, TIGHT if steps < _TIGHT_UNTIL else TOLERANCE)
 
     def advance(
-        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, int] | None:
+        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
+    ) -> tuple[np.ndarray, int, float] | None:
         """As of ``Lanes``."""
-        integrator, result, steps = self._integrator, np.empty_like(states), 0
-        for lane in reversed(range(states.shape[1])):
+        integrator, result = self._integrator, np.empty_like(states)
+
+        def go(most: int) -> tuple[int, float, float]:
+            integrator.time = float(begin[0])
+            integrator.state[:] = states[:, 0]
+            _, shortest, longest, steps, *_ = integrator.propagate_until(float(end[0]), max_steps=most)
+            return steps, shortest, longest
+
+        steps = self._even.go(go, most)
+        result[:, 0] = integrator.state
+        reached = float(integrator.time)
+        early = float(end[0]) - reached
+        for lane in range(1, states.shape[1]):
             integrator.time = float(begin[lane])
             integrator.state[:] = states[:, lane]
-            outcome, _, _, steps, *_ = integrator.propagate_until(float(end[lane]), max_steps=_HOPELESS_STEPS)
+            outcome, *_ = integrator.propagate_until(float(end[lane]) - early, max_steps=_HOPELESS_STEPS)
             if outcome != hy.taylor_outcome.time_limit:
                 return None
             result[:, lane] = integrator.state
-        return result, int(steps)
+        return result, steps, reached
 
 
 class SwitchingLanes:
@@ -164,8 +224,8 @@ class SwitchingLanes:
         return self
 
     def advance(
-        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, int] | None:
+        self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
+    ) -> tuple[np.ndarray, int, float] | None:
         """As of ``Lanes``."""
         stepper, result = self._stepper, np.empty_like(states)
         # all lanes are on the sides, and have the signs, that the motion has
@@ -183,39 +243,47 @@ class SwitchingLanes:
             if lane == 0:
                 mark = replace(stepper.mark(), time=(float(end[0]), 0.0))
                 self._reached = {float(begin[0]): known, float(end[0]): mark}
-        return result, max(round(float(end[0] - begin[0]) * self._pace), 1)
+        return result, max(round(float(end[0] - begin[0]) * self._pace), 1), float(end[0])
 
 
 class SeriesErrors:
     """What a tolerance lets a step be wrong by, held against the same step in parts.
+
+    Errors are those of the series' order, a whole number, and one more term may gain nothing at all (its
+    coefficient has a phase): they are looked at with the tolerance as it is. Where they don't stand out of
+    double precision's rounding, that is done with 80 bits.
 
     Args:
         integrator: of the system and the tolerance, in double precision; without one it is compiled.
     """
 
     def __init__(self, system: System, tolerance: float, integrator: Integrator | None = None) -> None:
-        tried = max(tolerance, _LEAST_TOLERANCE)
-        self._share = tolerance / tried
-        if integrator is not None and tried == tolerance:
+        wide = tolerance < _LEAST_TOLERANCE and _EIGHTY_BITS
+        tried = max(tolerance, _LEAST_WIDE_TOLERANCE if wide else _LEAST_TOLERANCE)
+        self._share = min(tolerance / tried * _ONE_ORDER, 1.0)
+        self._rounding = 16 * float(np.finfo(np.longdouble if wide else float).eps)
+        if integrator is not None and not wide and tried == tolerance:
             self._integrator: Integrator = copy.deepcopy(integrator)
             return
-        initial = [float(x) for x in system.initial]
+        number: Any = np.longdouble if wide else float
+        initial = [number(float(x)) for x in system.initial]
         self._integrator = hy.taylor_adaptive(
-            system.equations, initial, tol=tried, compact_mode=True, opt_level=0
+            system.equations, initial, tol=number(tried), compact_mode=True, opt_level=0, fp_type=number
         )
 
-    def rate(self, state: np.ndarray, time: float) -> np.ndarray:
-        """Error (states,) for each unit of time, internal units."""
+    def of_step(self, state: np.ndarray, time: float) -> np.ndarray:
+        """Error (states,) of the step that begins in a state."""
         engine = self._integrator
-        engine.time = time
+        number = engine.state.dtype.type
+        engine.time = number(time)
         engine.state[:] = state
-        _, size = engine.step(2.0**10)
+        _, size = engine.step(number(2.0**10))
         whole, end = np.array(engine.state), engine.time
         if not (size and np.isfinite(whole).all()):
-            return np.zeros_like(whole)
-        engine.time = time
+            return np.zeros_like(state)
+        engine.time = number(time)
         engine.state[:] = state
-        engine.propagate_until(end, max_steps=64, max_delta_t=float(size) / _PARTS)
-        wrong = whole - np.array(engine.state)
-        wrong[np.abs(wrong) < 2.0**-50 * np.abs(state)] = 0.0  # rounding
-        return self._share * wrong / size if np.isfinite(wrong).all() else np.zeros_like(wrong)
+        engine.propagate_until(end, max_steps=64, max_delta_t=number(size) / _PARTS)
+        wrong = (whole - engine.state).astype(float)
+        wrong[np.abs(wrong) < self._rounding * np.abs(state)] = 0.0
+        return self._share * wrong if np.isfinite(wrong).all() else np.zeros_like(wrong)

@@ -25,6 +25,8 @@ from rigidsim.scene.records import dataclass
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.lanes import NEIGHBOURS, Lanes, SeriesErrors
 
+_HOPELESS_STEPS = 32_768
+"""More than were expected: the motion comes to no end, say towards a collision."""
 _LARGEST = 2.0**-24
 """Distance from which neighbours are drawn in. A chord that is drawn in leaves the surfaces on which the
 motion's invariants are constant by half its square, which must stay below what the pushes did."""
@@ -35,10 +37,13 @@ _FIRST_PUSHES = 2.0**-40
 """Distance that stands for one epsilon, at first."""
 _STEPS_AT_ONCE = 192.0
 _FEWEST_STRETCHES, _MOST_STRETCHES, _FEWEST_OF_WINDOW = 32, 512, 12
-"""Between pushes where growth is slow: so many steps, or so many stretches of the whole."""
+"""Between pushes where growth is slow: so many steps, or so many stretches of the whole. Stretches are counted
+in steps, among which those of a close passage are many, not in time, of which they take little."""
 _FEWEST_STEPS, _FEWEST_OF_ALL = 6.0, 12
 """In a stretch, whose last one is cut short, of the shortest motions; but so many stretches at any rate."""
 _MOST_STEPS_AT_ONCE = 4096
+_LONGER = 1.5
+"""A stretch may last, over the mean, when the motion takes few steps in it."""
 _CALM, _WILD = 4.0, 16.0
 """Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
 _MOST_CLOSER = 40
@@ -165,7 +170,9 @@ class Neighbours:
         fewest = max(_FEWEST_OF_ALL, min(fewest, steps / _FEWEST_STEPS))
         stretches = min(max(fewest, steps / _STEPS_AT_ONCE), _MOST_STRETCHES)
         stretches = max(stretches, steps / _MOST_STEPS_AT_ONCE)
-        self._longest = (end - self._time) / stretches
+        self._longest = _LONGER * (end - self._time) / stretches
+        self._steps_at_once = round(max(steps / stretches, _FEWEST_STEPS))
+        self._most_steps = self.steps + 4 * steps + _HOPELESS_STEPS
 
     def elsewhere(self, state: np.ndarray, start: float, end: float, steps: float) -> Neighbours:
         """Of a part of the motion that begins in another state (states,), in the same lanes.
@@ -217,9 +224,10 @@ class Neighbours:
             time = min(self._time + self._stretch, until)
             if until - time < 0.01 * self._stretch:
                 time = until
-            taken = self._advance(before, time)
-            if taken is None:
+            found = self._advance(before, time, self._steps_at_once)
+            if found is None:
                 return False
+            taken, time = found
             grown = self._distances(self._states)
             if grown.max() < _SATURATED:
                 break
@@ -235,13 +243,12 @@ class Neighbours:
             self._stretch = max(self._stretch / 2, (time - self._time) / max(taken, 1))
         elif growth < _CALM:
             self._stretch = min(2 * self._stretch, self._longest)
-        elapsed = time - self._time
         self.steps += taken
         self._time = time
         largest = np.maximum(np.abs(before[:, 0]), np.abs(self._states[:, 0]))
         self._largest = np.maximum(self._largest, largest)
         moved = before[:, 0] != self._states[:, 0]  # what stands still isn't rounded
-        self._push(self._pushes.own * math.sqrt(taken), largest, moved, elapsed)
+        self._push(self._pushes.own * math.sqrt(taken), largest, moved, taken)
         angles = self._angles  # which grow, and step control with them
         self._states[angles] -= self._turn * np.rint(self._states[angles, :1] / self._turn)
         far = float(self._distances(self._states).max())
@@ -250,28 +257,32 @@ class Neighbours:
         self._note()
         return True
 
-    def _advance(self, states: np.ndarray, time: float) -> int | None:
-        """Steps taken by the motion; None where a state isn't finite."""
+    def _advance(self, states: np.ndarray, time: float, most: int) -> tuple[int, float] | None:
+        """Steps taken by the motion, at most so many, and the time that it got to; None where a state isn't
+        finite.
+        """
         # a rounded time is another time, for loads that depend on it
         wrong = self._pushes.clock * abs(self._time) * self._factor
         shifts = np.concatenate([[0.0], wrong * self._random.standard_normal(NEIGHBOURS)])
-        found = self._lanes.advance(states, self._time + shifts, time + shifts)
-        if found is None or not np.isfinite(found[0]).all():
+        found = self._lanes.advance(states, self._time + shifts, time + shifts, most)
+        if found is None or not np.isfinite(found[0]).all() or self.steps > self._most_steps:
             return None
-        self._states = found[0]
-        return max(found[1], 1)
+        self._states, taken, reached = found
+        return max(taken, 1), reached
 
-    def _push(self, own: float, sizes: np.ndarray, moved: np.ndarray, elapsed: float = 0.0) -> None:
-        """Add errors to the neighbours: ``own`` of each size, and of the series over a time."""
+    def _push(self, own: float, sizes: np.ndarray, moved: np.ndarray, taken: int = 0) -> None:
+        """Add errors to the neighbours: ``own`` of each size, and of the series over some steps."""
         normal = self._random.standard_normal((len(sizes), NEIGHBOURS))
         pushed = own * sizes[:, None] * normal
         pushed[~moved] = 0.0
-        if elapsed and self._pushes.shared:
+        if taken and self._pushes.shared:
             alike = self._random.standard_normal((len(sizes), NEIGHBOURS)) * (self._largest > 0)[:, None]
             pushed += own / self._pushes.own * self._pushes.shared * float(sizes[self._felt].max()) * alike
-        if elapsed and self._series is not None:
-            wrong = self._series.rate(self._states[:, 0], self._time) * elapsed / self._epsilon
-            pushed += self._pushes.series * wrong[:, None]
+        if taken and self._series is not None:
+            wrong = self._pushes.series * self._series.of_step(self._states[:, 0], self._time) / self._epsilon
+            # one step stands for all of the stretch: they add up, or walk where their errors change sign
+            times = taken + math.sqrt(taken) * self._random.standard_normal(NEIGHBOURS)
+            pushed += wrong[:, None] * times
         pushed[~self._felt] = 0.0
         self._states[:, 1:] += self._factor * pushed
 
