@@ -37,7 +37,7 @@ _FIRST_PUSHES = 2.0**-40
 """Distance that stands for one epsilon, at first."""
 _STEPS_AT_ONCE = 192.0
 _FEWEST_STRETCHES, _MOST_STRETCHES, _FEWEST_OF_WINDOW = 32, 512, 12
-"""Between pushes where growth is slow: so many steps, or so many stretches of the whole. Stretches are counted
+"""Between pushes where growth is slow: so many steps, or so many stretches of the whole. They are counted
 in steps, among which those of a close passage are many, not in time, of which they take little."""
 _FEWEST_STEPS, _FEWEST_OF_ALL = 6.0, 12
 """In a stretch, whose last one is cut short, of the shortest motions; but so many stretches at any rate."""
