@@ -56,7 +56,6 @@ class IntegrationLoop:
         self.check = check
         self.progress = Progress(clock.count, first)
         self.buffer = SampleBuffer(clock, receiver, pacing, first)
-        self._saved = first
         self.ways = WayFinder(corrected, clock, precision, pacing)
         self.last = clock.at(clock.count - 1)
         self.stepper.destination = float(self.last)
@@ -91,10 +90,9 @@ class IntegrationLoop:
             stop = self.check(self.progress) or self._out_of_steps()
             if stop is None:
                 if self.receiver.due():
-                    if not self._hand_over(least=self._saved + 1):
+                    if not self.buffer.whole and not self._hand_over():
                         return self.progress
                     self.receiver.save(self.position())
-                    self._saved = self.buffer.handed
                 stop = self._interruptible_round()
             if stop is not None:
                 return self._ended(stop)
@@ -162,9 +160,9 @@ class IntegrationLoop:
             self.progress.status = status
         return self.progress
 
-    def _hand_over(self, *, patiently: bool = False, least: int | None = None) -> bool:
+    def _hand_over(self, *, patiently: bool = False) -> bool:
         """Hand over what is collected; False where the receiver ended the run with one of the samples."""
-        refused = self.buffer.hand_over(patiently=patiently, least=least)
+        refused = self.buffer.hand_over(patiently=patiently)
         self.progress.next_sample = self.buffer.handed
         if refused is None:
             return True

@@ -95,15 +95,16 @@ class SampleBuffer:
         """A step boundary before the first sample that waits; None where none does."""
         return self._boundaries[0] if self._boundaries else None
 
-    def hand_over(
-        self, *, patiently: bool = False, least: int | None = None
-    ) -> tuple[int, StepBoundary] | None:
+    @property
+    def whole(self) -> bool:
+        """Whether so many are handed over that the receiver saves them at the least cost."""
+        return self.handed % self._receiver.rows_together == 0
+
+    def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
         """Give what is collected to the receiver.
 
         Args:
-            patiently: only where it is much, or old; of much the rest waits that the receiver can better
-                save with what follows.
-            least: so many samples are handed over at least, and the rest waits likewise.
+            patiently: only where it is much, or old; of much as many samples as make it ``whole``.
 
         Returns:
             Where the receiver wants no sample past one of them: its index and a boundary before it; the
@@ -112,13 +113,11 @@ class SampleBuffer:
         waiting, rows = self.count - self.handed, self._pacing.rows_at_once
         waited = time.perf_counter() - self._handed_at
         old = waited >= self._pacing.patience
-        if patiently and waiting < min(rows, self._most) and not old:
+        if not waiting or (patiently and waiting < min(rows, self._most) and not old):
             return None
-        stop = self.count
-        if least is not None or (patiently and not old):
-            stop = self._round(self.handed + 1 if least is None else least)
-        if stop <= self.handed:
-            return None
+        stop = self.count - self.count % self._receiver.rows_together
+        if old or not patiently or stop <= self.handed:
+            stop = self.count
         started = self._handed_at = time.perf_counter()
         whole, boundaries = self._waiting_until(stop)
         handed = len(whole)
@@ -148,13 +147,6 @@ class SampleBuffer:
             self._boundaries.insert(0, boundaries[-1])
             blocks[-1] = blocks[-1].rows(0, cut)
         return SampleBlock.joined(blocks), dict(zip(firsts, boundaries, strict=False))
-
-    def _round(self, least: int) -> int:
-        """So many of the samples found that the receiver can save them at the least cost, where those are as
-        many as asked for and the others few; else all.
-        """
-        stop = self.count - self.count % self._receiver.rows_together
-        return stop if stop >= least and self.count - stop < self._most else self.count
 
     def took(self, work: str, rows: int, seconds: float) -> None:
         """Learn how many samples may wait: as many as each work on them gets done in the time of a chunk."""

@@ -115,9 +115,13 @@ class SegmentWriter:
 
     @property
     def due(self) -> bool:
-        """Whether what is collected is large, or the last segment so old that losing the time would hurt."""
-        large = self._collected.rows * self._row_bytes >= self._limits.bytes
-        return large or time.monotonic() - self._saved >= self._limits.seconds
+        """Whether what is collected is large, and ends with a chunk where it fills any, or the last segment
+        so old that losing the time would hurt.
+        """
+        rows = self._collected.rows
+        large = rows * self._row_bytes >= self._limits.bytes
+        fitting = rows < netcdf.CHUNK_ROWS or (self.saved_rows + rows) % netcdf.CHUNK_ROWS == 0
+        return (large and fitting) or time.monotonic() - self._saved >= self._limits.seconds
 
     def flush(self, checkpoint: Arrays, events: Arrays) -> None:
         """Write what is collected, which may be nothing but the checkpoint; on return it is saved.
