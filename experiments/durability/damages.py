@@ -14,7 +14,7 @@ import xarray
 import rigidsim
 from experiments.durability.judging import Tally
 from experiments.durability.processes import await_moment, child, exit_code, work_on
-from experiments.durability.scenes import FREQUENT, SCENES, same, text_of
+from experiments.durability.scenes import SCENES, same, text_of, tuning_of
 from rigidsim.errors import RunFolderError
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import read_chain
@@ -136,7 +136,7 @@ def _damage_begun(
     if whole is None:
         return
     log = out.with_name("log")
-    code = exit_code(child(lambda: rigidsim.resume(out, tuning=FREQUENT), log))
+    code = exit_code(child(lambda: rigidsim.resume(out, tuning=tuning_of(out.name)), log))
     if not tally.expect(code == 0, f"{what}: {log.read_text()[-300:]}"):
         return
     with rigidsim.open_run(out).dataset as dataset:

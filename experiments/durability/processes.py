@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rigidsim
 from experiments.durability.judging import names
-from experiments.durability.scenes import FREQUENT
+from experiments.durability.scenes import tuning_of
 from rigidsim.errors import RigidsimError
 
 
@@ -47,9 +47,10 @@ def exit_code(pid: int) -> int:
 def work_on(folder: Path, text: str) -> Callable[[], object]:
     """Begin the run of a folder, or go on with it."""
     begun = (folder / "segments").exists() or (folder / "dataset.h5").exists()
+    tuning = tuning_of(folder.name)
     if begun:
-        return lambda: rigidsim.resume(folder, tuning=FREQUENT)
-    return lambda: rigidsim.run(rigidsim.parse(text), out=folder.parent, force=True, tuning=FREQUENT)
+        return lambda: rigidsim.resume(folder, tuning=tuning)
+    return lambda: rigidsim.run(rigidsim.parse(text), out=folder.parent, force=True, tuning=tuning)
 
 
 def await_moment(pid: int, folder: Path, kind: str, delay: float, nth: int) -> bool:

@@ -29,6 +29,7 @@ GRAVITY = '[[loads]]\nkind = "uniform_gravity"\n'
 # end, samples, [integrator], rest, [output]
 SCENES = {
     "double_dense": (4000, 16001, "", "", ""),
+    "double_chunks": (8000, 120_001, "", "", ""),  # segments of whole chunks
     "double_sparse": (60000, 13, "", "", ""),
     "double_driven": (3000, 3001, "", DRIVEN, ""),
     "double_euler": (1000, 2001, 'formulation = "euler_angles"', GRAVITY, ""),
@@ -59,6 +60,13 @@ def text_of(name: str, longer: int = 1) -> str:
 
 FREQUENT = Tuning(Pacing(chunk_seconds=0.01, patience=0.03), SegmentLimits(bytes=400_000, seconds=0.03))
 """Segments some thirty times a second instead of once in thirty seconds."""
+_CHUNKS = Tuning(Pacing(chunk_seconds=0.01), SegmentLimits(bytes=1_500_000))
+"""Segments of one or two chunks, which they end with."""
+
+
+def tuning_of(name: str) -> Tuning:
+    """How often the runs of a scene save."""
+    return _CHUNKS if name == "double_chunks" else FREQUENT
 
 
 class Undisturbed:
