@@ -18,5 +18,6 @@ Importing this package loads nothing heavy.
 | `work_precision` | the figure of `rigidsim tradeoff`: error against cost |
 | `viewer` | `open_viewer`, `screenshot` |
 | `solids` | triangle meshes of bodies, from the outlines of their shapes |
+| `rows` | what pictures need of a dataset, as arrays |
 | `thinning` | reading a bounded number of rows of a dataset of any length |
 """

@@ -12,10 +12,10 @@ from rigidsim.look.readable_time import TimeWords
 from rigidsim.look.roles import drifts
 
 if TYPE_CHECKING:
-    import xarray
+    from rigidsim.look.rows import Table, Variable
 
 
-def read_config(dataset: xarray.Dataset) -> dict[str, Any]:
+def read_config(dataset: Table) -> dict[str, Any]:
     """The embedded config as a dictionary; empty when there is none or it can't be read."""
     try:
         return tomllib.loads(str(dataset.attrs.get("config", "")))
@@ -23,12 +23,12 @@ def read_config(dataset: xarray.Dataset) -> dict[str, Any]:
         return {}
 
 
-def title_of(dataset: xarray.Dataset) -> str:
+def title_of(dataset: Table) -> str:
     """Title of the run: attribute `title`, else the config's name."""
     return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
 
 
-def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset, notes: list[str]) -> str:
+def summary_page(dataset: Table, thinned: Table, notes: list[str]) -> str:
     """Markdown: what was run, what was conserved, how the picture is scaled, the config.
 
     Args:
@@ -63,14 +63,14 @@ def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset, notes: list[s
     return "\n".join(lines)
 
 
-def largest_drift(variable: xarray.DataArray) -> float:
+def largest_drift(variable: Variable) -> float:
     """Largest magnitude of a drift over the rows given; NaN when there is none that is finite."""
     magnitude = np.abs(np.asarray(variable.values, dtype=np.float64))
     magnitude = magnitude[np.isfinite(magnitude)]
     return float(magnitude.max()) if magnitude.size else float("nan")
 
 
-def _invariants(thinned: xarray.Dataset) -> list[tuple[str, ...]]:
+def _invariants(thinned: Table) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for base, drift in drifts(thinned).items():
         initial = ""
@@ -82,13 +82,13 @@ def _invariants(thinned: xarray.Dataset) -> list[tuple[str, ...]]:
     return rows
 
 
-def _span(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
+def _span(dataset: Table, thinned: Table) -> str:
     start, end = (float(thinned["time"].values[i]) for i in (0, -1))
     words = TimeWords.of(dataset.attrs, start, end)
     return f"{words.moment(start)} to {words.moment(end)}"
 
 
-def _samples(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
+def _samples(dataset: Table, thinned: Table) -> str:
     total, shown = dataset.sizes["time"], thinned.sizes["time"]
     return f"{total:,}" if total == shown else f"{total:,}, shown {shown:,}"
 

@@ -18,7 +18,7 @@ from rigidsim.look.roles import drift_of, put_back_of
 from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
-    import xarray
+    from rigidsim.look.rows import Table, Variable
 
 Color = tuple[int, int, int]
 
@@ -70,7 +70,7 @@ class Plot:
     series: list[Series] = field(default_factory=list)
 
 
-def plan_plots(dataset: xarray.Dataset) -> list[Plot]:
+def plan_plots(dataset: Table) -> list[Plot]:
     """Plots for every numeric variable along time, in the order in which they are shown.
 
     Drifts become log10 of their magnitude in a common plot. Scalars of the same unit share a
@@ -140,7 +140,7 @@ def _with_unit(text: str, unit: str) -> str:
     return f"{text} [{pretty_unit(unit)}]" if pretty_unit(unit) else text
 
 
-def _variables(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:
+def _variables(dataset: Table) -> Iterator[Variable]:
     # Angles before quaternions, because people read them; the rest as recorded.
     names = sorted(map(str, dataset.data_vars), key=lambda name: name != "euler_angles")
     for name in names:
@@ -149,12 +149,12 @@ def _variables(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:
             yield variable.transpose("time", ...)
 
 
-def _columns(variable: xarray.DataArray) -> NDArray[np.float64]:
+def _columns(variable: Variable) -> NDArray[np.float64]:
     values = np.asarray(variable.values, dtype=np.float64).reshape(variable.shape[0], -1)
     return values[:, :_MOST_SERIES]
 
 
-def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
+def _series(variable: Variable, position: int, floor: float) -> Series:
     name = str(variable.name)
     values = _columns(variable)
     count = values.shape[1]
@@ -166,8 +166,9 @@ def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
         labels = [name.replace("_", " ")]
     else:
         labels = []
-    if variable.ndim == 2 and variable.dims[1] in variable.coords:
-        components = [str(label) for label in variable.coords[variable.dims[1]].values[:count]]
+    across = str(variable.dims[1]) if variable.ndim == 2 else ""
+    if across in variable.coords:
+        components = [str(label) for label in variable.coords[across].values[:count]]
         labels = [f"{labels[0]} {c}" for c in components] if labels else components
     if len(labels) != count:
         base = labels[0] if labels else name.replace("_", " ")
@@ -175,7 +176,7 @@ def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
     return Series(name, labels, _colors(variable, count, position), values)
 
 
-def _colors(variable: xarray.DataArray, count: int, position: int) -> list[Color]:
+def _colors(variable: Variable, count: int, position: int) -> list[Color]:
     dimension = variable.dims[1] if variable.ndim == 2 else ""
     if dimension in ("body_axis", "space_axis") and count == 3:
         return list(_VECTOR)

@@ -18,7 +18,7 @@ from rigidsim.look.thinning import thinned_indices
 from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
-    import xarray
+    from rigidsim.look.rows import Table
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]
@@ -91,7 +91,7 @@ class Stage:
     origin: bool = False
 
 
-def build_stages(dataset: xarray.Dataset) -> tuple[list[Stage], list[str]]:
+def build_stages(dataset: Table) -> tuple[list[Stage], list[str]]:
     """Stages for a thinned dataset, and notes on their scales for the summary page.
 
     The first stage shows the body. A position that moves by more than `NEAR` reaches can't be shown
@@ -208,7 +208,7 @@ def plane_view(points: Array) -> tuple[float, float]:
     return float(elevation), float(azimuth)
 
 
-def _vectors(dataset: xarray.Dataset, attitude: Array | None) -> tuple[list[Arrow], list[Trail], list[str]]:
+def _vectors(dataset: Table, attitude: Array | None) -> tuple[list[Arrow], list[Trail], list[str]]:
     arrows: list[Arrow] = []
     trails: list[Trail] = []
     notes: list[str] = []
@@ -257,7 +257,7 @@ def _longest(vectors: Array) -> float:
     return float(np.nanmax(norms)) if np.isfinite(norms).any() else 0.0
 
 
-def _values(dataset: xarray.Dataset, name: str, width: int) -> Array | None:
+def _values(dataset: Table, name: str, width: int) -> Array | None:
     if name not in dataset or dataset[name].ndim != 2 or dataset[name].shape[1] != width:
         return None
     return np.asarray(dataset[name].values, dtype=np.float64)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.roles import is_residual
+from rigidsim.look.rows import Rows
 
 if TYPE_CHECKING:
     import xarray
+
+AnyTable = TypeVar("AnyTable", "xarray.Dataset", Rows)
 
 ROWS_AT_ONCE = 1 << 21
 
@@ -76,12 +79,7 @@ class KeptRows:
         return {name: np.concatenate(pieces) for name, pieces in self._pieces.items()}
 
 
-def thin(
-    dataset: xarray.Dataset,
-    rows: int,
-    at_once: int = ROWS_AT_ONCE,
-    kept: KeptRows | None = None,
-) -> xarray.Dataset:
+def thin(dataset: AnyTable, rows: int, at_once: int = ROWS_AT_ONCE, kept: KeptRows | None = None) -> AnyTable:
     """The rows of `thinned_indices`, in memory; residuals are left out.
 
     Only variables that have a time dimension, and of those only the rows asked for, are read:
@@ -98,15 +96,11 @@ def thin(
         raise ValueError("the dataset has no time coordinate: nothing to show along time")
     count = dataset.sizes["time"]
     indices = thinned_indices(count, rows)
-    names = [
+    names: list[str] = [
         str(name)
         for name, variable in dataset.data_vars.items()
         if "time" in variable.dims and variable.dtype.kind in "fiub" and not is_residual(variable)
     ]
-    wanted = dataset[names]
-    known = None if kept is None else kept.columns(count)
-    if known is not None and all(name in known for name in _along_time(wanted)):
-        return _replaced(wanted, known)
     stride = _stride(count, rows)
     # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
     # kilobytes of notes for every chunk that it touches, hence pieces.
@@ -114,6 +108,12 @@ def thin(
     slices = [slice(first, min(first + piece, count), stride) for first in range(0, count, piece)]
     if (count - 1) % stride:
         slices.append(slice(count - 1, count))
+    if isinstance(dataset, Rows):
+        known = None if kept is None else kept.columns(count)
+        if known is not None and known.keys() >= {"time", *names}:
+            return dataset.replaced(names, known)
+        return dataset.taken(names, slices)
+    wanted = dataset[names]
     parts = [wanted.isel(time=part).load() for part in slices]
     if len(parts) == 1:
         return parts[0]
@@ -123,23 +123,6 @@ def thin(
     if joined.sizes["time"] != len(indices):  # concat must neither merge nor sort
         raise AssertionError("thinning lost rows")
     return joined.transpose("time", ...)
-
-
-def _along_time(dataset: xarray.Dataset) -> list[str]:
-    return [str(name) for name, variable in dataset.variables.items() if "time" in variable.dims]
-
-
-def _replaced(dataset: xarray.Dataset, known: Mapping[str, NDArray[np.float64]]) -> xarray.Dataset:
-    """The dataset with other rows."""
-    import xarray
-
-    found = {str(name): variable for name, variable in dataset.variables.items()}
-    for name in _along_time(dataset):
-        shape = (-1, *(dataset.sizes[dim] for dim in found[name].dims[1:]))
-        found[name] = xarray.Variable(found[name].dims, known[name].reshape(shape), found[name].attrs)
-    coordinates = {name: found.pop(name) for name in map(str, dataset.coords)}
-    bare = xarray.Coordinates(coordinates, indexes={})
-    return xarray.Dataset(found, coords=bare, attrs=dataset.attrs).load()
 
 
 def _stride(count: int, rows: int) -> int:

@@ -15,10 +15,10 @@ from rigidsim.look.clock import build_clock
 from rigidsim.look.page import summary_page, title_of
 from rigidsim.look.plots import Plot, Series, plan_plots
 from rigidsim.look.stage import build_stages
-from rigidsim.look.thinning import KeptRows, thin, thinned_indices
+from rigidsim.look.thinning import AnyTable, KeptRows, thin, thinned_indices
 
 if TYPE_CHECKING:
-    import xarray
+    from rigidsim.look.rows import Table
 
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 _ROW_BYTES = 600  # at most: some twenty variables
@@ -26,7 +26,7 @@ _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 
 def write_timeline(
-    dataset: xarray.Dataset, path: Path, *, rows: int = 100_000, kept: KeptRows | None = None
+    dataset: AnyTable, path: Path, *, rows: int = 100_000, kept: KeptRows | None = None
 ) -> int:
     """Write a dataset as a rerun recording with its own layout.
 
@@ -91,7 +91,7 @@ def write_timeline(
     return count
 
 
-def _turns(dataset: xarray.Dataset, seconds: np.ndarray) -> float:
+def _turns(dataset: Table, seconds: np.ndarray) -> float:
     """Turns of the body during the run, from its mean rate; 0 when the rate isn't known."""
     if "angular_velocity" not in dataset:
         return 0.0

@@ -19,9 +19,9 @@ from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.folder import RunFolder
+from rigidsim.store.recorded_rows import recorded_rows
 from rigidsim.store.segments import SegmentWriter
 from rigidsim.store.summary import Summary
-from rigidsim.store.validated_open import open_dataset
 from rigidsim.store.variables import Extra
 
 
@@ -127,7 +127,7 @@ def with_timeline(
     path = folder.timeline
     observer.phase("timeline")
     try:
-        with open_dataset(folder.dataset, indexed=False) as dataset:  # memory goes with the rows
+        with recorded_rows(folder.dataset) as dataset:
             write_timeline(dataset, path, rows=output.timeline_rows, kept=kept)
     except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
         why = error.strerror if isinstance(error, OSError) else None

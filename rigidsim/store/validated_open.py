@@ -33,10 +33,8 @@ def open_dataset(path: Path, *, indexed: bool = True) -> xarray.Dataset:
     """
     import xarray
 
-    if path.is_symlink():
-        raise RunFolderError(f"{path}: is a symbolic link; a run's files are files of its folder")
     try:
-        _inspect(path)
+        inspect(path)
         options: dict[str, Any] = {} if indexed else {"create_default_indexes": False}
         opened = xarray.open_dataset(path, engine="h5netcdf", **options)
     except RunFolderError:
@@ -51,10 +49,16 @@ def _first_line(error: Exception) -> str:
     return text.splitlines()[0][:200]
 
 
-def _inspect(path: Path) -> None:
-    """Refuse what the labels of the file promise and its content doesn't keep."""
+def inspect(path: Path) -> None:
+    """Refuse what the labels of the file promise and its content doesn't keep.
+
+    Raises:
+        RunFolderError: that is so.
+    """
     import h5py
 
+    if path.is_symlink():
+        raise RunFolderError(f"{path}: is a symbolic link; a run's files are files of its folder")
     with h5py.File(path, "r") as file:
         _check_version(file.attrs.get("schema_version"), path)
         if len(file) > _MOST_VARIABLES:
@@ -97,7 +101,7 @@ def _check_numbers(item: Any, name: str, path: Path) -> None:
     """Every row that is declared is there: none would be read as a fill value."""
     if item.dtype.kind not in "fiuSOV" or item.dtype.hasobject:
         raise RunFolderError(f"{path}: the variable {name!a} holds no numbers")
-    if item.attrs.get("CLASS", b"") == b"DIMENSION_SCALE" and name != "time" and _bare_dimension(item):
+    if item.attrs.get("CLASS", b"") == b"DIMENSION_SCALE" and name != "time" and is_bare_dimension(item):
         return
     size = item.size or 0
     if item.chunks is None:
@@ -109,8 +113,8 @@ def _check_numbers(item: Any, name: str, path: Path) -> None:
         raise RunFolderError(f"{path}: the variable {name!a} declares {size} numbers that it lacks")
 
 
-def _bare_dimension(item: Any) -> bool:
-    """A dimension without coordinate values stands in netCDF-4 files as an empty variable."""
+def is_bare_dimension(item: Any) -> bool:
+    """Whether it is a dimension without coordinate values, which netCDF-4 keeps as an empty variable."""
     name = item.attrs.get("NAME", b"")
     return isinstance(name, bytes) and name.startswith(
         b"This is a netCDF dimension but not a netCDF variable"

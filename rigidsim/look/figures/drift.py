@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+    from rigidsim.look.rows import Variable
+
 Array = NDArray[np.float64]
 
 TYPICAL, MOST = 0.5, 50.0
@@ -82,7 +84,7 @@ def drift_panel(axes: Axes, dataset: xarray.Dataset) -> None:
     axes.set_ylabel("relative drift")
 
 
-def _magnitude(drift: xarray.DataArray, rows: int) -> Array:
+def _magnitude(drift: Variable, rows: int) -> Array:
     """The largest over the components, a gap where it is zero."""
     table = np.abs(np.asarray(drift.transpose("time", ...).values, dtype=np.float64)).reshape(rows, -1)
     largest = table.max(axis=1)
