@@ -25,6 +25,7 @@ from rigidsim.model.planar import SPIN, PlanarStates, planar_states, spin_equati
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.step_limiter import PACE, arguments, pace_derivative, roots
+from rigidsim.model.tangents import GROWTH, tangent_block
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.orbits import KeplerOrbit
@@ -88,6 +89,8 @@ def assemble_states(
     if work_is_needed(m):
         blocks.append(_work_block(m))
     blocks += _pace_block(m, joined(blocks))
+    if GROWTH in (requirements.record or ()):
+        blocks.append(tangent_block(m, blocks))
     return m, blocks
 
 

@@ -10,6 +10,9 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
 from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
 
+TANGENT = "tangent_"
+"""What names of a tangent vector's states begin with."""
+
 
 def plain_angles(m: Kinematics) -> list[Symbolic]:
     """Euler angles of the scene's sequence without their turns."""

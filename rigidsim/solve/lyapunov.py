@@ -20,6 +20,7 @@ import numpy as np
 
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
+from rigidsim.model.tangents import moving_names, own_names
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 
@@ -158,32 +159,13 @@ def lyapunov_spectrum(
 
 
 def motion_states(system: System) -> list[int]:
-    """Positions of the states whose offsets are offsets of the motion: the body's own, and those that act on
-    it and feel it as well (such as a load with a memory).
-    """
-    attitude = system.mechanics.attitude
-    own = {*_BODY, *(attitude.names if attitude is not None else ())}
+    """Positions of the states whose offsets are offsets of the motion (``rigidsim.model.tangents``)."""
     reads = {
         name: set(hy.get_variables(right))
         for name, (_, right) in zip(system.states, system.equations, strict=True)
     }
-    acting = _reached(own, reads)
-    read_by = {name: {other for other in reads if name in reads[other]} for name in reads}
-    feeling = _reached(own, read_by)
-    return [i for i, name in enumerate(system.states) if name in own or name in acting & feeling]
-
-
-_BODY = ("wx", "wy", "wz", "gx", "gy", "gz", "x", "y", "z", "vx", "vy", "vz")
-
-
-def _reached(start: set[str], ways: Mapping[str, set[str]]) -> set[str]:
-    """All names that ways lead to, in any number of steps."""
-    found: set[str] = set()
-    ahead = {name for name in start if name in ways}
-    while ahead:
-        ahead = {name for place in ahead for name in ways[place] if name in ways} - found
-        found |= ahead
-    return found
+    moving = moving_names(own_names(system.mechanics), reads)
+    return [i for i, name in enumerate(system.states) if name in moving]
 
 
 def tangent_equations(system: System, moving: Sequence[int]) -> list[tuple[Symbolic, Symbolic]]:

@@ -20,6 +20,7 @@ from dataclasses import field
 import numpy as np
 
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.compiled import compiled_function
@@ -144,9 +145,10 @@ class Neighbours:
             group: [names.index(n) for n in members if n in names] for group, members in groups.items()
         }
         grouped = {i for places in self._places.values() for i in places}
-        alone = [[i] for i, n in enumerate(names) if i not in grouped and n not in _APART]
+        apart = {n for n in names if n in _APART or n.startswith(TANGENT)}
+        alone = [[i] for i, n in enumerate(names) if i not in grouped and n not in apart]
         self._groups = [*filter(None, self._places.values()), *alone]
-        self._felt = np.array([n not in _APART for n in names])
+        self._felt = np.array([n not in apart for n in names])
         exponents = system.state_exponents
         self._units = np.ldexp(1.0, np.array([exponents[i] for i in self._places["rates"][:3]], np.int32))
         self._angles = list(system.angle_states)

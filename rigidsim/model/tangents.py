@@ -1,0 +1,171 @@
+"""A tangent vector carried along with a motion: how much a small displacement has grown.
+
+Its equations are the motion's variational ones (Benettin et al. 1980, Meccanica 15, 9; what is made of its
+length: ``rigidsim.solve.indicators``). It is carried 2**-900 of its size: step control is relative to the
+largest state, of which it is never a part, so that the motion takes the same steps with and without it. Where
+equations are compiled in compact mode (beyond double precision) no bit of the motion moves; elsewhere the
+compiler may round a product otherwise. Past a growth of e**500 the vector would come near the motion's own
+states; long before, the motion is known to be chaotic, and its growth is recorded as NaN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import heyoka as hy
+
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables.observable import Observable, only_when_named
+from rigidsim.model.planar import ANGLE, SPIN
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import StateBlock, joined
+from rigidsim.model.state_names import TANGENT
+from rigidsim.scene.registry import register_observable
+
+GROWTH = "tangent_growth"
+SMALL = 900
+"""The vector is carried 2**-SMALL of its size."""
+LARGEST = 500.0
+"""Growth, as a logarithm, past which it is no longer carried small."""
+_RATES, _VERTICAL = ("wx", "wy", "wz"), ("gx", "gy", "gz")
+_FLIGHT = ("x", "y", "z", "vx", "vy", "vz")
+_GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+def own_names(m: Mechanics) -> list[str]:
+    """States of the body itself, as far as they are carried: rates, attitude or vertical, place and speed."""
+    names = list(m.attitude.names) if m.attitude is not None else []
+    if m.attitude is not None and m.attitude.kind == "planar":
+        return [*names, SPIN]
+    if m.attitude is None and m.vertical is not None:
+        names = list(_VERTICAL)
+    return [*_RATES, *names, *(_FLIGHT if m.velocity is not None else ())]
+
+
+def moving_names(own: Iterable[str], reads: Mapping[str, set[str]]) -> set[str]:
+    """States whose offsets are offsets of the motion: the body's own, and those that act on it and feel it as
+    well (such as a load with a memory).
+
+    Args:
+        reads: of each state the names in its derivative.
+    """
+    own = set(own)
+    acting = _reached(own, reads)
+    read_by = {name: {other for other in reads if name in reads[other]} for name in reads}
+    feeling = _reached(own, read_by)
+    return {name for name in reads if name in own or name in acting & feeling}
+
+
+def _reached(start: set[str], ways: Mapping[str, set[str]]) -> set[str]:
+    """All names that ways lead to, in any number of steps."""
+    found: set[str] = set()
+    ahead = {name for name in start if name in ways}
+    while ahead:
+        ahead = {name for place in ahead for name in ways[place] if name in ways} - found
+        found |= ahead
+    return found
+
+
+def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
+    """The tangent vector of a motion, whose states are those of the blocks before."""
+    whole = joined(before)
+    variables = whole.variables
+    own = own_names(m)
+    reads = {
+        name: set(hy.get_variables(right)) for name, right in zip(whole.names, whole.derivatives, strict=True)
+    }
+    moving = moving_names(own, reads)
+    equations = list(zip(variables, whole.derivatives, strict=True))
+    first = variables[whole.names.index(own[0])]
+    # the derivative by one initial value obeys the equations that any tangent vector does
+    varied = hy.var_ode_sys(equations, [first]).sys[len(variables) :]
+    names = {old: name for (old, _), name in zip(varied, whole.names, strict=True)}
+    to: dict[Symbolic, Symbolic] = {
+        old: hy.make_vars(TANGENT + name) if name in moving else hy.expression(0.0)
+        for old, name in names.items()
+    }
+    kept = [(name, hy.subs(right, to)) for (_, right), name in zip(varied, whole.names, strict=True)]
+    start = _direction(m, own)
+    return StateBlock(
+        [TANGENT + name for name, _ in kept if name in moving],
+        [right for name, right in kept if name in moving],
+        [start.get(name, m.scene.context.zero) for name, _ in kept if name in moving],
+        exponents=[e for name, e in zip(whole.names, whole.unit_exponents, strict=True) if name in moving],
+        why=f"{GROWTH}: a displacement, so small that no step of the motion knows of it",
+    )
+
+
+def _weights(m: Mechanics, names: Sequence[str]) -> list[int]:
+    """Binary exponents that make offsets of states comparable: angles in rad, rates in 1 / internal time."""
+    rates = dict(zip(_RATES, m.scaling.rates, strict=True))
+    attitude = m.attitude
+    turned = attitude is not None and attitude.kind == "quaternion"
+    weights = []
+    for name in names:
+        if name == ANGLE and attitude is not None:
+            weights.append(attitude.angle_unit)
+        elif turned and attitude is not None and name in attitude.names:
+            weights.append(1)  # half angles
+        else:
+            weights.append(rates.get(name, 0))
+    return weights
+
+
+def _direction(m: Mechanics, names: Sequence[str]) -> dict[str, object]:
+    """Where the vector points at the start: no special direction, always the same one. mpf."""
+    context = m.scene.context
+    parts = [math.copysign(0.5 + (n * _GOLDEN) % 1.0, (-1) ** n) for n in range(1, len(names) + 1)]
+    length = math.sqrt(math.fsum(x * x for x in parts))
+    weights = _weights(m, names)
+    return {
+        name: context.ldexp(context.mpf(x / length), -SMALL - weight)
+        for name, x, weight in zip(names, parts, weights, strict=True)
+    }
+
+
+def _growth(m: Mechanics) -> list[Symbolic]:
+    """ln of the vector's length over the initial one; NaN past ``LARGEST``."""
+    names = own_names(m)
+    terms = []
+    for name, weight in zip(names, _weights(m, names), strict=True):
+        scaled = 2.0 ** (SMALL + weight) * hy.make_vars(TANGENT + name)
+        terms.append(scaled * scaled)
+    growth = 0.5 * hy.log(hy.sum(terms))
+    lost = hy.log(hy.expression(-1.0))
+    return [hy.select(hy.lt(growth, LARGEST), growth, lost)]
+
+
+def _absent(m: Mechanics) -> str | None:
+    """Why a scene can't have a tangent vector."""
+    integrator = m.scene.config.integrator
+    if m.attitude is not None and m.attitude.kind == "euler_angles":
+        return f'formulation = "{integrator.formulation}" has singularities that the vector would feel'
+    driven = any(
+        load.orbit is not None for load in m.loads
+    )  # whose phase keeps the steps of any motion short
+    if not driven and all(w == 0 for w in m.scene.angular_velocity):
+        return "the body is at rest, where steps are as long as one likes; give it a small rate"
+    if not driven and m.attitude is not None and m.attitude.kind == "planar":
+        return 'without an orbit nothing in a plane keeps the steps short; choose formulation = "quaternion"'
+    if integrator.precision == "single":
+        return "single precision can't hold a vector that small; choose double"
+    if m.surfaces.found:
+        return "where the equations switch, at a kink or jump, variational equations end"
+    if integrator.method == "closed_form":
+        return 'a closed form takes no steps along which a vector could be carried; choose method = "taylor"'
+    return None
+
+
+register_observable(
+    Observable(
+        GROWTH,
+        (),
+        "1",
+        "natural logarithm of the growth of a small displacement",
+        _growth,
+        needs=("attitude",),
+        by_default=only_when_named,
+        absent=_absent,
+    )
+)

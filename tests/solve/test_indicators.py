@@ -1,0 +1,108 @@
+"""How a displacement grows: as closed forms and the whole spectrum say, and without moving a step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import config, loaded, run_text
+
+import rigidsim
+from rigidsim.solve.indicators import indicators
+from rigidsim.solve.problem import prepare
+
+pytestmark = pytest.mark.compact
+
+SPIN = "angular_velocity = [0, 0, 1.1]\neuler_angles = [0, 0, 0.4]"
+GRADIENT = (
+    'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+    "orbit = {semi_major_axis = 1, eccentricity = 0.1}"
+)
+
+
+def hyperion(time: str, integrator: str = "", growth: bool = True) -> str:
+    """A body in spin-orbit coupling, chaotic: errors grow e-fold every 8 time units."""
+    record = 'record = ["quaternion"' + (', "tangent_growth"]' if growth else "]")
+    return config("principal_moments = [1, 1.2, 1.35]", SPIN, GRADIENT, time, integrator, record)
+
+
+@pytest.mark.parametrize("axis", [1, 2], ids=["intermediate", "extreme"])
+def test_a_displacement_from_a_permanent_rotation(runs: Path, axis: int) -> None:
+    """About the intermediate axis it grows like e^(k w t), k^2 = (B - A) (C - B) / (A C), else like t."""
+    rates = [0, 0, 0]
+    rates[axis] = 1
+    text = config(
+        "principal_moments = [1, 2, 3]",
+        f"angular_velocity = {rates}",
+        time="end = 60\nsamples = 301",
+        output='record = ["tangent_growth"]',
+    )
+    data = loaded(run_text(text, runs))
+    t, growth = data.time.values, data.tangent_growth.values
+    if axis == 1:
+        exponent = np.sqrt(1 / 3)
+        assert np.diff(growth)[-50:] == pytest.approx(exponent * 0.2, rel=1e-9)
+        found = indicators(t, growth[:, None])
+        assert found.largest_exponent[0] == pytest.approx(exponent, rel=0.1)
+        assert found.megno[0] == pytest.approx(exponent * 60 / 2, rel=0.1)
+    else:  # a rate across the axis turns around, one along it turns the attitude away
+        assert np.exp(growth[-1]) < 3 * 60
+
+
+def test_the_motion_is_the_same_with_and_without(runs: Path) -> None:
+    """To the last bit where code is compact."""
+    time = "end = 60\nsamples = 61"
+    for integrator in ('formulation = "planar"', 'formulation = "quaternion"'):
+        without, along = (
+            loaded(run_text(hyperion(time, integrator, growth), runs)) for growth in (False, True)
+        )
+        assert (without.quaternion.values == along.quaternion.values).all()
+
+
+def test_growth_agrees_with_the_spectrum_and_with_128_bits(runs: Path) -> None:
+    """The largest exponent of a chaotic spin, within what its convergence leaves open."""
+    time = "end = 600\nsamples = 2401"
+    run = run_text(hyperion(time, 'formulation = "quaternion"'), runs, "output.lyapunov=true")
+    data = loaded(run)
+    found = indicators(data.time.values, data.tangent_growth.values[:, None])
+    chaos = run.summary["lyapunov"]
+    assert chaos["chaotic"]
+    spread = chaos["moved_over_second_half"]
+    assert found.largest_exponent[0] == pytest.approx(chaos["largest_exponent"], abs=2 * spread + 0.02)
+    assert found.megno[0] > 20
+    short = "end = 60\nsamples = 121"
+    plain = loaded(run_text(hyperion(short), runs)).tangent_growth.values
+    wide = loaded(run_text(hyperion(short, 'precision = "quadruple"'), runs)).tangent_growth.values
+    assert np.abs(plain - wide).max() < 1e-9
+
+
+def test_a_regular_spin_has_a_megno_of_two() -> None:
+    """Growth of ln(1 + c t) beside an oscillation, as quasi-periodic motion has it; chaos is exponential."""
+    t = np.linspace(0, 1e5, 200_001)
+    regular = np.log1p(3 * t) + 0.5 * np.sin(1.3 * t)
+    chaotic = 0.01 * t
+    lost = np.where(t < 5e4, chaotic, np.nan)
+    found = indicators(t, np.stack([regular, chaotic, lost], axis=1))
+    assert found.megno[0] == pytest.approx(2, abs=0.01)
+    assert found.megno[1] == pytest.approx(0.01 * 1e5 / 2, rel=1e-6)
+    assert found.largest_exponent[1:] == pytest.approx([0.01, 0.01])
+    assert found.until[2] == pytest.approx(5e4, abs=1)
+    assert found.fli[1] == pytest.approx(1000)
+    assert np.isnan(indicators(t[:2], np.full((2, 1), np.nan)).megno).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (hyperion("end = 1", 'formulation = "euler_angles"'), "singularities"),
+        (hyperion("end = 1", 'precision = "single"'), "choose double"),
+        (
+            config(initial="angular_velocity = [0, 0, 0]", output='record = ["tangent_growth"]'),
+            "the body is at rest",
+        ),
+    ],
+)
+def test_what_has_no_tangent_vector_is_refused(text: str, why: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=why):
+        prepare(rigidsim.parse(text.replace("end = 1\n", "end = 1\nsamples = 2\n")))
