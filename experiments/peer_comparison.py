@@ -37,6 +37,7 @@ _STYLES = {
     "bare heyoka, attitude in the orbital frame": ("black", "--", "s", 3.5),
     "bare heyoka, cos(n t) explicit": ("black", ":", "^", 3),
     "bare heyoka, 80 bit": ("#888888", "-", "o", 3.5),
+    "rigidsim, formulation auto": (BLUE, "-", "s", 4),
     "rigidsim, quaternion": (BLUE, "-", "o", 4),
     "rigidsim, invariants held": ("#4393c3", "--", "D", 4),
     "rigidsim, closed form": (BLUE, "", "*", 13),

@@ -12,6 +12,7 @@ from experiments.peers.scenes import Scene
 from rigidsim.session.guards import Observer
 
 TITLES = {
+    "auto": "rigidsim, formulation auto",
     "quaternion": "rigidsim, quaternion",
     "rotation_matrix": "rigidsim, rotation matrix",
     "euler_angles": "rigidsim, Euler angles",
@@ -24,6 +25,8 @@ TITLES = {
 
 def knobs(variant: str, scene: Scene) -> list[float]:
     """Tolerances, or accuracies; what this version or scene refuses is skipped by ``prepare``."""
+    if variant == "auto":  # elsewhere that is the quaternion
+        return [m * 10.0**-n for n in range(5, 13) for m in (1, 0.3)] if scene.orbit_rate else []
     if variant == "accuracy":
         return [1e-6, 1e-9, 1e-12]
     if variant == "closed_form":

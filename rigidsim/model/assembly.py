@@ -15,12 +15,14 @@ from rigidsim.model.equations import (
 )
 from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
 from rigidsim.model.kinematics import in_common_unit
+from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.needs import work_is_needed
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.orbital_frame import orbital_states
+from rigidsim.model.paired_products import paired_rates, paired_states
 from rigidsim.model.planar import SPIN, PlanarStates, planar_states, spin_equation
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
@@ -103,6 +105,10 @@ def _attitude(
         return None
     if formulation == "euler_angles":
         return euler_states(scene, rates, sequence)
+    if plan.paired:
+        (load,) = plan.loads
+        assert isinstance(load, GravityGradient)
+        return paired_states(scene, rates, load, plan.scaling, number)
     if plan.frame_orbit is not None:
         unit = scene.context.ldexp(scene.context.one, plan.scaling.time)
         return orbital_states(scene, rates, plan.frame_orbit, plan.orbit_tags[plan.frame_orbit], unit, number)
@@ -141,10 +147,14 @@ def _rotation_blocks(m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
         for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
     ]
     exponents = [e - scaling.time for e in scaling.rates]
-    blocks = [StateBlock(RATES, rate_equations(m, m.torque), initial, exponents=exponents, why=why["rates"])]
+    derivatives = paired_rates(m) if plan.paired else rate_equations(m, m.torque)
+    blocks = [StateBlock(RATES, derivatives, initial, exponents=exponents, why=why["rates"])]
     if m.attitude is not None:
         reason = why["attitude"]
-        if m.attitude.orbital is not None:
+        if plan.paired:
+            reason += "; as two axes of the frame that turns with the orbit, seen from the body: at a loose "
+            reason += "tolerance, since that takes half the products"
+        elif m.attitude.orbital is not None:
             reason += "; relative to the frame that turns with the orbit, where the gradient takes a third "
             reason += "fewer products"
         blocks.append(StateBlock(m.attitude.names, m.attitude.derivatives, m.attitude.initial, why=reason))
@@ -180,7 +190,8 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
     for load in m.loads:
         if load.orbit is not None and load.orbit in placed:
             titles = ", ".join(dict.fromkeys(placed.pop(load.orbit)))
-            blocks.append(replace(m.orbit_block(load.orbit), why=f"{titles}: where its source is"))
+            block = m.orbit_block(load.orbit)
+            blocks.append(replace(block, why=block.why or f"{titles}: where its source is"))
         own = load.extra_states(m)
         if own is not None:
             blocks.append(replace(own, why=own.why or f"{load.title}: where its source is"))

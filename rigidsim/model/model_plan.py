@@ -10,6 +10,7 @@ from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbital_frame import corotating_orbit
+from rigidsim.model.paired_products import pairs_products
 from rigidsim.model.parity import refuse_odd_loads
 from rigidsim.model.planar import Plane, asked_plane, gradient_plane
 from rigidsim.model.scaling import Scaling, choose_scaling
@@ -29,6 +30,7 @@ class ModelPlan:
         loads: all that act, all uniform fields as one.
         orbit_tags: of each prescribed orbit, what makes the names of its states unique.
         frame_orbit: the orbit in whose frame the attitude is carried; None where that is space.
+        paired: whether its equations are those of ``rigidsim.model.paired_products``.
         surfaces: on which the equations change.
         plane: that the motion stays in, where its formulation is planar.
     """
@@ -40,6 +42,7 @@ class ModelPlan:
     numbers: ScaledNumbers
     orbit_tags: Mapping[KeplerOrbit, str]
     frame_orbit: KeplerOrbit | None
+    paired: bool
     surfaces: Surfaces
     plane: Plane | None = None
 
@@ -73,14 +76,17 @@ def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
     for number, load in enumerate(scene.loads, start=1):
         if getattr(load, "orbit", None) is not None:
             tags.setdefault(load.orbit, str(number))  # type: ignore[attr-defined]
+    numbers = scaled_numbers(scene, scaling)
+    orbit = corotating_orbit(scene, loads, requirements.formulation)
     return ModelPlan(
         scene,
         loads,
         requirements,
         scaling,
-        scaled_numbers(scene, scaling),
+        numbers,
         tags,
-        corotating_orbit(scene, loads, requirements.formulation),
+        orbit,
+        pairs_products(scene, loads, orbit, scaling, numbers),
         surfaces_of(scene),
         plane,
     )

@@ -22,7 +22,7 @@ from rigidsim.model import rotations
 from rigidsim.model.formulations import AttitudeStates, OrbitalFrame, quaternion_kinematics
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
@@ -56,7 +56,6 @@ def orbital_states(
         tag: makes the names of the orbit's states unique.
         time_unit: internal unit of time, seconds (mpf).
     """
-    context = scene.context
     names = ["pw", "px", "py", "pz"]
     p = list(hy.make_vars(*names))
     half_motion = as_factor(number(orbit.mean_motion * time_unit / 2))
@@ -66,35 +65,16 @@ def orbital_states(
         turning + half_motion * along
         for turning, along in zip(quaternion_kinematics(p, rates), carried_along, strict=True)
     ]
-    half = orbit.eccentric_anomaly(context, scene.start) / 2
-    cosine, sine = context.cos(half), context.sin(half)
-    plane = attitude.product(_turn(context, orbit.ascending_node, 3), _turn(context, orbit.inclination, 1))
-    w0, *v0 = attitude.product(plane, [cosine, context.zero, context.zero, sine])
-    initial = attitude.product([w0, *(-v for v in v0)], list(scene.quaternion))
-
-    pair = [f"cos_half_anomaly{tag}", f"sin_half_anomaly{tag}"]
-    c, s = hy.make_vars(*pair)
-    orbital = StateBlock(
-        pair, [-(half_motion * s), half_motion * c], [cosine, sine], [hy.sqrt(c * c + s * s)]
-    )
-    zero = rotations.constant(0.0)
-    turned = [
-        hy.sum([c * w, -(s * z)]),
-        hy.sum([c * x, -(s * y)]),
-        hy.sum([c * y, s * x]),
-        hy.sum([c * z, s * w]),
-    ]
-    quaternion = rotations.quaternion_product([as_factor(number(x)) for x in plane], turned)
+    initial = relative_attitude(scene, orbit)
+    orbital = half_turn(scene, orbit, tag, time_unit, number)
     relative = rotations.quaternion_matrix(p)
-    cosine2, sine2 = c * c - s * s, 2.0 * (s * c)
-    along = [[cosine2, -sine2, zero], [sine2, cosine2, zero], [zero, zero, rotations.constant(1.0)]]
-    tilt = [[as_factor(number(x)) for x in row] for row in attitude.rotation_matrix(plane)]
+    matrix, quaternion = in_space(scene, orbit, orbital.variables, relative, p, number)
     return AttitudeStates(
         "quaternion",
         names,
         derivatives,
         initial,
-        rotations.multiply(tilt, rotations.multiply(along, relative)),
+        matrix,
         quaternion,
         "state",
         defect=(
@@ -104,6 +84,65 @@ def orbital_states(
         ),
         orbital=OrbitalFrame(direction=relative[0], normal=relative[2], states=orbital),
     )
+
+
+def relative_attitude(scene: Scene, orbit: KeplerOrbit) -> list[Any]:
+    """The initial quaternion from body axes to the orbital frame (mpf)."""
+    context = scene.context
+    cosine, sine = _start(scene, orbit)
+    w, *v = attitude.product(_plane(context, orbit), [cosine, context.zero, context.zero, sine])
+    return attitude.product([w, *(-x for x in v)], list(scene.quaternion))
+
+
+def half_turn(scene: Scene, orbit: KeplerOrbit, tag: str, time_unit: Any, number: Rounder) -> StateBlock:
+    """Cosine and sine of half the angle that the orbital frame has turned by."""
+    half_motion = as_factor(number(orbit.mean_motion * time_unit / 2))
+    pair = [f"cos_half_anomaly{tag}", f"sin_half_anomaly{tag}"]
+    c, s = hy.make_vars(*pair)
+    initial = list(_start(scene, orbit))
+    return StateBlock(pair, [-(half_motion * s), half_motion * c], initial, [hy.sqrt(c * c + s * s)])
+
+
+def in_space(
+    scene: Scene,
+    orbit: KeplerOrbit,
+    half: Sequence[Symbolic],
+    relative: SymbolicMatrix,
+    quaternion: list[Symbolic],
+    number: Rounder,
+) -> tuple[SymbolicMatrix, list[Symbolic]]:
+    """From the orbital frame to space: R, and the quaternion.
+
+    Args:
+        half: cosine and sine of half the angle that the orbital frame has turned by.
+        relative, quaternion: attitude relative to the orbital frame.
+    """
+    plane = _plane(scene.context, orbit)
+    c, s = half
+    w, x, y, z = quaternion
+    zero = rotations.constant(0.0)
+    turned = [
+        hy.sum([c * w, -(s * z)]),
+        hy.sum([c * x, -(s * y)]),
+        hy.sum([c * y, s * x]),
+        hy.sum([c * z, s * w]),
+    ]
+    in_plane = rotations.quaternion_product([as_factor(number(x)) for x in plane], turned)
+    cosine2, sine2 = c * c - s * s, 2.0 * (s * c)
+    along = [[cosine2, -sine2, zero], [sine2, cosine2, zero], [zero, zero, rotations.constant(1.0)]]
+    tilt = [[as_factor(number(x)) for x in row] for row in attitude.rotation_matrix(plane)]
+    return rotations.multiply(tilt, rotations.multiply(along, relative)), in_plane
+
+
+def _plane(context: Any, orbit: KeplerOrbit) -> list[Any]:
+    """Quaternion of the orbit's plane."""
+    return attitude.product(_turn(context, orbit.ascending_node, 3), _turn(context, orbit.inclination, 1))
+
+
+def _start(scene: Scene, orbit: KeplerOrbit) -> tuple[Any, Any]:
+    """Cosine and sine of half the orbital frame's angle at the start (mpf)."""
+    half = orbit.eccentric_anomaly(scene.context, scene.start) / 2
+    return scene.context.cos(half), scene.context.sin(half)
 
 
 def _turn(context: Any, angle: Any, axis: int) -> list[Any]:

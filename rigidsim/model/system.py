@@ -19,6 +19,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import ModelPlan, plan_model
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
+from rigidsim.model.paired_products import even_order
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling, largest_rates
 from rigidsim.model.state_blocks import StateBlock, joined
@@ -116,6 +117,10 @@ class System:
     def wide(self) -> bool:
         """Whether the equations are too long to be compiled unrolled."""
         return self.plan.wide
+
+    def series_tolerance(self, tolerance: float) -> float:
+        """What the engine is given for a tolerance: it says which order the series have."""
+        return even_order(tolerance)[0] if self.plan.paired else tolerance
 
     @cached_property
     def rate_bound(self) -> Any:

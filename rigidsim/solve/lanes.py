@@ -268,7 +268,12 @@ class SeriesErrors:
         number: Any = np.longdouble if wide else float
         initial = [number(float(x)) for x in system.initial]
         self._integrator = hy.taylor_adaptive(
-            system.equations, initial, tol=number(tried), compact_mode=True, opt_level=0, fp_type=number
+            system.equations,
+            initial,
+            tol=number(system.series_tolerance(tried)),
+            compact_mode=True,
+            opt_level=0,
+            fp_type=number,
         )
 
     def of_step(self, state: np.ndarray, time: float) -> np.ndarray:

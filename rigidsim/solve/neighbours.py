@@ -48,7 +48,7 @@ _LONGER = 1.5
 _CALM, _WILD = 4.0, 16.0
 """Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
 _MOST_CLOSER = 40
-_APART = ("pace", "work")
+_APART = ("pace", "work", "stride")
 """States that nothing feels."""
 _GROUPS: dict[str, tuple[str, ...]] = {
     "rates": ("wx", "wy", "wz"),
@@ -105,7 +105,13 @@ def _function(expressions: list[Symbolic], variables: list[Symbolic]) -> Callabl
     if all(x in variables for x in expressions):
         places = [variables.index(x) for x in expressions]
         return lambda states: states[places]
-    return compiled_function(expressions, variables, compact_mode=True, opt_level=0)
+    compiled = compiled_function(expressions, variables, compact_mode=True, opt_level=0)
+
+    def evaluate(states: np.ndarray) -> np.ndarray:
+        """At one time for all: a frame that turns with time doesn't change how far they are apart."""
+        return compiled(np.ascontiguousarray(states), time=np.zeros(states.shape[1]))
+
+    return evaluate
 
 
 class Neighbours:

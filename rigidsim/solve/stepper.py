@@ -120,6 +120,9 @@ class Stepper:
         options["compact_mode"] = self.precision.compact or system.wide
         if self._tolerance is not None:
             options["tol"] = self._tolerance
+            if system.plan.paired:
+                eased = system.series_tolerance(float(self._tolerance))
+                options["tol"] = self.precision.number(system.scene.context.mpf(eased))
         initial = self.precision.array(system.initial)
         if not self.has_events:
             return compiled_engine(system.equations, initial, **options)
