@@ -126,10 +126,20 @@ def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Ex
         apply_overrides(table, overrides, what)
     except ConfigError as error:
         raise error.at(source) from None
+    config = validated(table, source)
+    run = written(text, overrides, table, source, what) if overrides else text
+    return Experiment(run, config, source, text, tuple(line.strip() for line in overrides))
+
+
+def validated(table: dict[str, Any], source: str) -> Config:
+    """The tables of a config, validated.
+
+    Raises:
+        ConfigError: with every problem found.
+    """
     problems = long_integers(table)
     if problems:
         raise ConfigError(problems, source)
-    problems = []
     if not table:
         problems.append(Problem("config", f"it is empty; {NEW}"))
     model = config_model()
@@ -141,8 +151,7 @@ def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Ex
         problems += [problem for problem in found if problem.where not in named]
     if problems:
         raise ConfigError(problems, source)
-    run = written(text, overrides, table, source, what) if overrides else text
-    return Experiment(run, config, source, text, tuple(line.strip() for line in overrides))
+    return config
 
 
 def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:

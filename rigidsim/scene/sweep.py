@@ -11,15 +11,15 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.config import Experiment, parse
+from rigidsim.scene.config import Experiment, parse, validated
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.overrides import key_steps
+from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.sweep_table import SweepTable
 from rigidsim.scene.swept_values import AxisValues, axis_values
 from rigidsim.scene.toml_text import parse_toml
-from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.validation_messages import nearest, shown
 
 MOST_MEMBERS = 100_000_000
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")
@@ -175,6 +175,19 @@ class Sweep:
         except ConfigError as error:
             raise self.blamed(member, error) from None
 
+    def worked_out(self, member: int) -> Experiment:
+        """As ``experiment_of`` in a tenth of the time, without the member's own text: to try it out.
+
+        Raises:
+            ConfigError: as there.
+        """
+        try:
+            table = parse_toml(self.base.text, self.base.source)
+            apply_overrides(table, self.overrides(member))
+            return exchanged(self.base, config=validated(table, self.base.source))
+        except ConfigError as error:
+            raise self.blamed(member, error) from None
+
     def blamed(self, member: int, error: ConfigError) -> ConfigError:
         """An error that names the member beside the key."""
         named = ", ".join(
@@ -313,10 +326,11 @@ def _json_schema(model: Any) -> dict[str, Any]:
 def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
     """SI unit of the numbers that a key takes ("1" for none), and how many they are (0: a plain number).
 
-    What the schema doesn't know is left for the members' own validation to refuse.
-
     Args:
         tables: of the config: which keys a load has depends on its kind.
+
+    Raises:
+        ValueError: no such key.
     """
     schema = _json_schema(config_model())
     nodes: list[Mapping[str, Any]] = [schema]
@@ -330,9 +344,20 @@ def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
                 found.append(node["properties"][step])
             elif isinstance(step, str) and isinstance(node.get("additionalProperties"), Mapping):
                 found.append(node["additionalProperties"])
+        if not found and isinstance(step, str):
+            _refuse_unknown(step, nodes, schema, value)
         nodes = found
         value = _inside(value, step)
     return _unit(nodes, schema), _length(nodes, schema)
+
+
+def _refuse_unknown(
+    key: str, nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any], value: Any
+) -> None:
+    """For a key that none of the tables has that may stand there."""
+    allowed = sorted({n for node in _alternatives(nodes, schema, value) for n in node.get("properties", {})})
+    if allowed:
+        raise ValueError(f'unknown key "{key[:60]}"{nearest(key, allowed)}; allowed: {", ".join(allowed)}')
 
 
 def _inside(value: Any, step: str | int) -> Any:

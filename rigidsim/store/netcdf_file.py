@@ -62,6 +62,10 @@ class NetcdfFile:
         """Declare a dimension, once or again; of size 0 it is unlimited, since netCDF knows no empty ones."""
         self._sizes.setdefault(name, size)
 
+    def has(self, name: str) -> bool:
+        """Whether a variable of this name was created."""
+        return name in self._variables
+
     def variable(
         self,
         name: str,
@@ -86,6 +90,30 @@ class NetcdfFile:
             chunk_rows = _LEAST_CHUNK_ROWS
         chunk = None if chunk_rows is None else (chunk_rows, *(max(1, size) for size in shape[1:]))
         return self._created(name, dims, _DOUBLE, attributes, _new_dataset(chunk, gzip))
+
+    def table(
+        self,
+        name: str,
+        dims: Sequence[str],
+        attributes: Mapping[str, Any],
+        *,
+        chunk: Sequence[int] | None,
+        gzip: int | None,
+        whole: bool = False,
+    ) -> h5d.DatasetID:
+        """Create a variable of doubles, or of whole numbers, in chunks of any shape.
+
+        Returns:
+            What ``write_box`` writes to.
+        """
+        how = _new_dataset(None if chunk is None else tuple(chunk), gzip)
+        return self._created(name, dims, _INTEGER if whole else _DOUBLE, attributes, how)
+
+    def texts(self, name: str, dim: str, texts: Sequence[str], attributes: Mapping[str, Any]) -> None:
+        """Write texts along a dimension that isn't theirs alone."""
+        self.dimension(dim, len(texts))
+        created = self._created(name, (dim,), _TEXT, attributes, _new_dataset())
+        _write(created, np.array(texts, dtype=_TEXT.numpy), _TEXT)
 
     def labels(self, name: str, labels: Sequence[str], attributes: Mapping[str, Any]) -> None:
         """Declare a dimension whose coordinate is texts."""
@@ -160,6 +188,15 @@ def write_rows(variable: h5d.DatasetID, first: int, values: np.ndarray) -> None:
     there = variable.get_space()
     there.select_hyperslab((first, *(0 for _ in shape)), values.shape)
     variable.write(h5s.create_simple(values.shape), there, values, mtype=_DOUBLE.held)
+
+
+def write_box(variable: h5d.DatasetID, first: Sequence[int], values: np.ndarray) -> None:
+    """Write a box of a variable whose first corner is given."""
+    of = _INTEGER if values.dtype.kind == "i" else _DOUBLE
+    values = np.ascontiguousarray(values, of.numpy)
+    there = variable.get_space()
+    there.select_hyperslab(tuple(first), values.shape)
+    variable.write(h5s.create_simple(values.shape), there, values, mtype=of.held)
 
 
 def _write(created: h5d.DatasetID, values: np.ndarray, of: _Type) -> None:

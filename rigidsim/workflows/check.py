@@ -8,12 +8,14 @@ from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.records import dataclass
+from rigidsim.scene.sweep import Sweep
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.solve.problem import prepare
 from rigidsim.store.summary import Caution
 from rigidsim.store.understood import Body, Span, Start
 from rigidsim.workflows.read import load
+from rigidsim.workflows.sweep_check import check_sweep
 
 
 @dataclass(frozen=True)
@@ -59,8 +61,12 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
         overrides: ``KEY=VALUE`` texts, as of ``rigidsim.load``.
     """
     try:
-        prepared = prepare(load(path, overrides=overrides))
-        refuse_taken_names(prepared)
+        experiment = load(path, overrides=overrides)
+        if experiment.config.sweep is None:
+            prepared = prepare(experiment)
+            refuse_taken_names(prepared)
+        else:
+            prepared = check_sweep(Sweep.of(experiment))
     except ConfigError as error:
         return Checked(error.source or str(path), problems=tuple(error.problems))
     scene = prepared.scene

@@ -190,6 +190,7 @@ REFUSED = {
     "the output itself": ('axes."output.record" = {values = [["energy"]]}', "can't be swept"),
     "sphere for a number": (f"{RATE} = {{sphere = 1, count = 3}}", "take a vector"),
     "a count that is none": (f"{RATE} = {{linspace = [0, 1, 2.5]}}", "whole numbers from 1"),
+    "unknown key": ('axes."initial.angular_velocty[2]" = {values = [1]}', 'did you mean "angular_velocity"'),
     "a bad name": (f'{RATE} = {{values = [1], name = "a b"}}', "letters, digits and underscores"),
 }
 
@@ -205,5 +206,5 @@ def test_what_is_no_sweep_is_refused(case: str) -> None:
 
 def test_a_member_that_cannot_be_is_named() -> None:
     with pytest.raises(ConfigError) as caught:
-        swept('axes."initial.angular_velocty[2]" = {values = [1, 2]}').experiment_of(1)
-    assert "member 1 (angular_velocty_2 = 2)" in str(caught.value)
+        swept('axes."time.samples" = {values = [2, 2.5]}').experiment_of(1)
+    assert "member 1 (samples = 2.5)" in str(caught.value)

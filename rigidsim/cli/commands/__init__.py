@@ -7,6 +7,7 @@ COMMANDS = (
     "new",
     "check",
     "run",
+    "sweep",
     "resume",
     "verify",
     "plan",

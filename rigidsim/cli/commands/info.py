@@ -15,7 +15,18 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
     from rigidsim.cli import tables
     from rigidsim.cli.page import page
     from rigidsim.store.run import open_run
+    from rigidsim.store.sweep_folder import is_sweep
 
+    if is_sweep(run_path):
+        from rigidsim.cli.sweep_screens import print_sweep
+        from rigidsim.store.sweep_run import open_sweep
+
+        found = open_sweep(run_path)
+        if as_json:
+            print(json.dumps(found.summary))
+        else:
+            print_sweep(found)
+        return
     opened = open_run(run_path)
     if as_json:
         print(json.dumps(opened.summary))

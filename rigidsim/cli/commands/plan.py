@@ -22,7 +22,20 @@ def plan(
     from rigidsim.workflows.plan import plan as make_plan
     from rigidsim.workflows.read import load
 
-    made = make_plan(load(config, overrides=overrides or []), out=out)
+    experiment = load(config, overrides=overrides or [])
+    if experiment.config.sweep is not None:
+        from rigidsim.cli.sweep_screens import print_sweep_plan
+        from rigidsim.scene.sweep import Sweep
+        from rigidsim.workflows.sweep_plan import plan_sweep
+
+        whole = plan_sweep(Sweep.of(experiment))
+        if as_json:
+            print(json.dumps(whole))
+            return
+        print_sweep_plan(whole)
+        made = whole["member"]
+    else:
+        made = make_plan(experiment, out=out)
     if as_json:
         print(json.dumps(made))
     else:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+from pathlib import Path
+from typing import Annotated, NoReturn
 
 import typer
 
 from rigidsim.cli.options import JsonOption, RunPath, print_run
+from rigidsim.errors import RigidsimError
 
 
 def resume(
@@ -20,6 +23,9 @@ def resume(
             "--set", metavar="KEY=VALUE", help="A guard of this session, such as limits.max_steps=1000000."
         ),
     ] = None,
+    workers: Annotated[
+        int, typer.Option("--workers", metavar="N", min=1, help="Of a sweep: processes that run members.")
+    ] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Go on with an interrupted, killed or guarded run; the result is bit for bit the uninterrupted one.
@@ -28,9 +34,31 @@ def resume(
 
     Example: rigidsim resume runs/intermediate_axis
     """
+    from rigidsim.store.sweep_folder import is_sweep
+
+    if is_sweep(run_path):
+        if until is not None or overrides:
+            raise RigidsimError(
+                "resume: --until and --set are for single runs; change the config of a sweep and give "
+                "rigidsim sweep CONFIG again, which computes only what is new"
+            )
+        _resume_sweep(run_path, workers, as_json)
     from rigidsim.session import progress
     from rigidsim.workflows.resume import resume as go_on
 
     with progress.observer() as observer:
         result = go_on(run_path, until=until, overrides=overrides or [], observer=observer)
     raise typer.Exit(print_run(result, as_json))
+
+
+def _resume_sweep(path: Path, workers: int, as_json: bool) -> NoReturn:
+    from rigidsim.cli.sweep_screens import observer, print_sweep
+    from rigidsim.workflows.sweep import resume_sweep
+
+    with observer() as watching:
+        result = resume_sweep(path, workers=workers, observer=watching)
+    if as_json:
+        print(json.dumps(result.summary))
+    else:
+        print_sweep(result)
+    raise typer.Exit(int(result.summary["exit_code"]))

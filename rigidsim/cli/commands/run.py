@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rigidsim.cli.options import JsonOption, OutOption, SetOption, print_run
 from rigidsim.errors import RigidsimError
+
+if TYPE_CHECKING:
+    from rigidsim.scene.config import Experiment
 
 
 def run(
@@ -22,6 +26,14 @@ def run(
     ] = None,
     out: OutOption = Path("runs"),
     overrides: SetOption = None,
+    scan: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sweep",
+            metavar="KEY=SPEC",
+            help="Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -40,6 +52,8 @@ def run(
         from rigidsim.workflows.verify import embedded
 
         experiments.append(embedded(dataset, overrides=overrides or []))
+    if scan:
+        raise typer.Exit(_scanned(experiments, scan, out, force=force, as_json=as_json))
     if not experiments:
         raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
     for experiment in experiments:
@@ -60,3 +74,21 @@ def run(
         if code == 130:
             break
     raise typer.Exit(worst)
+
+
+def _scanned(experiments: list[Experiment], scan: list[str], out: Path, *, force: bool, as_json: bool) -> int:
+    """Each config swept over what ``--sweep`` says; the exit code."""
+    from rigidsim.cli.sweep_screens import observer, print_sweep
+    from rigidsim.workflows.sweep import scanned
+    from rigidsim.workflows.sweep import sweep as run_all
+
+    worst = 0
+    for experiment in experiments:
+        with observer() as watching:
+            result = run_all(scanned(experiment, scan), out=out, force=force, observer=watching)
+        if as_json:
+            print(json.dumps(result.summary))
+        else:
+            print_sweep(result)
+        worst = worst or int(result.summary["exit_code"])
+    return worst

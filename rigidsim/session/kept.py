@@ -1,0 +1,252 @@
+"""What is kept of a sweep's members, from their samples: last values, extremes, means, drifts, whole series.
+
+Everything here works on blocks of many members at once, and knows samples alone, not where they come from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+
+from rigidsim.scene.records import dataclass
+from rigidsim.store.variables import Variable, part_name
+
+ALWAYS = "always"
+"""The item of what is kept of every member, asked for or not."""
+
+
+@dataclass(frozen=True)
+class KeptVariable:
+    """One variable of the members of a tile.
+
+    Attributes:
+        dims: beside the members'.
+        values: (members, ...), float64 or int64.
+        item: what of ``[sweep] keep`` it belongs to, or ``ALWAYS``.
+    """
+
+    dims: tuple[str, ...]
+    values: np.ndarray
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    item: str = ALWAYS
+
+
+Kept = dict[str, KeptVariable]
+"""By name."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """The samples of some members.
+
+    Attributes:
+        variable: what they are samples of.
+        parts: float64 parts, each (members, samples, components); missing samples at the end are nan.
+    """
+
+    variable: Variable
+    parts: Sequence[np.ndarray]
+
+    def shaped(self, values: np.ndarray) -> np.ndarray:
+        """(members, components) or (members, samples, components) in the variable's own shape."""
+        return values.reshape(*values.shape[:-1], *self.variable.shape)
+
+    @property
+    def drift_of(self) -> str | None:
+        """The invariant whose drift it is."""
+        return self.variable.attributes.get("drift_of")
+
+
+def kept_of_series(
+    series: Sequence[Series], times: np.ndarray, lengths: np.ndarray, keep: Collection[str]
+) -> Kept:
+    """What is asked for, of recorded variables; drifts always.
+
+    Args:
+        series: of all recorded variables, time apart.
+        times: (samples,), or (members, samples) where each has its own, s.
+        lengths: samples that each member has, (members,).
+    """
+    found: Kept = {}
+    for one in series:
+        if one.drift_of is not None:
+            found |= _drifts(one, lengths)
+            continue
+        if "put_back_of" in one.variable.attributes:
+            continue
+        if "final" in keep:
+            found |= _final(one, lengths)
+        if "extremes" in keep:
+            found |= _extremes(one, times)
+        if "means" in keep:
+            found |= _means(one)
+    if "series" in keep:
+        found |= _series(series, times)
+    return found
+
+
+def _last(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Of (members, samples, components) the last sample that each member has, nan where it has none."""
+    rows = np.maximum(lengths - 1, 0)
+    last = values[np.arange(len(values)), rows]
+    return np.where((lengths > 0)[:, None], last, np.nan)
+
+
+def _final(one: Series, lengths: np.ndarray) -> Kept:
+    variable = one.variable
+    name = f"{variable.name}_final"
+    found = {}
+    for part, values in enumerate(one.parts):
+        attributes = variable.part_attributes(part)
+        if part:
+            attributes |= {"residual_of": name}
+        attributes.pop("exact_value", None)
+        attributes["long_name"] = f"{attributes.get('long_name', variable.name)}, at the last sample"
+        attributes.pop("coordinates", None)
+        found[part_name(name, part)] = KeptVariable(
+            variable.dims, one.shaped(_last(values, lengths)), attributes, "final"
+        )
+    return found
+
+
+def _extremes(one: Series, times: np.ndarray) -> Kept:
+    variable, values = one.variable, one.parts[0]
+    found = {}
+    units = variable.attributes.get("units", "1")
+    for what, filled, place in (("min", np.inf, np.argmin), ("max", -np.inf, np.argmax)):
+        rows = place(np.where(np.isnan(values), filled, values), axis=1)
+        extreme = np.take_along_axis(values, rows[:, None, :], axis=1)[:, 0]
+        when = times[rows] if times.ndim == 1 else np.take_along_axis(times, rows, axis=1)
+        when = np.where(np.isnan(extreme), np.nan, when)
+        words = {"min": "smallest", "max": "largest"}[what]
+        long_name = f"{words} {variable.attributes.get('long_name', variable.name)} at a sample"
+        common = {k: v for k, v in variable.attributes.items() if k in ("frame", "euler_sequence", "angle")}
+        found[f"{variable.name}_{what}"] = KeptVariable(
+            variable.dims, one.shaped(extreme), {"units": units, "long_name": long_name, **common}, "extremes"
+        )
+        found[f"{variable.name}_{what}_time"] = KeptVariable(
+            variable.dims, one.shaped(when), {"units": "s", "long_name": f"time of the {long_name}"},
+            "extremes",
+        )  # fmt: skip
+    return found
+
+
+def _means(one: Series) -> Kept:
+    variable = one.variable
+    present = ~np.isnan(one.parts[0])
+    count = np.maximum(present.sum(axis=1), 1)
+    total = sum(np.where(present, part, 0).sum(axis=1) for part in reversed(one.parts))
+    mean = np.where(present.any(axis=1), total / count, np.nan)
+    attributes = {
+        "units": variable.attributes.get("units", "1"),
+        "long_name": f"mean of the {variable.attributes.get('long_name', variable.name)} over the samples",
+    }
+    return {f"{variable.name}_mean": KeptVariable(variable.dims, one.shaped(mean), attributes, "means")}
+
+
+def _drifts(one: Series, lengths: np.ndarray) -> Kept:
+    values = one.parts[0]
+    size = np.abs(values[:, :, 0])
+    largest = np.where(lengths > 0, np.max(np.where(np.isnan(size), 0, size), axis=1, initial=0), np.nan)
+    attributes = {k: v for k, v in one.variable.attributes.items() if k != "coordinates"}
+    named = one.variable.attributes.get("long_name", one.variable.name)
+    return {
+        f"{one.variable.name}_largest": KeptVariable(
+            (), largest, {**attributes, "long_name": f"largest {named} at a sample, without its sign"}
+        ),
+        f"{one.variable.name}_final": KeptVariable(
+            (), _last(values, lengths)[:, 0], {**attributes, "long_name": f"{named} at the last sample"}
+        ),
+    }
+
+
+def _series(series: Sequence[Series], times: np.ndarray) -> Kept:
+    found: Kept = {}
+    for one in series:
+        for part, values in enumerate(one.parts):
+            attributes = {k: v for k, v in one.variable.part_attributes(part).items() if k != "coordinates"}
+            found[part_name(one.variable.name, part)] = KeptVariable(
+                ("sample", *one.variable.dims), one.shaped(values), attributes, "series"
+            )
+    rows = np.broadcast_to(times, (len(next(iter(found.values())).values), times.shape[-1]))
+    labels = {"units": "s", "long_name": "time of the scene"}
+    found["time"] = KeptVariable(("sample",), np.array(rows), labels, "series")
+    return found
+
+
+Points = Mapping[str, tuple[Variable, Sequence[np.ndarray]]]
+"""What was recorded at events, by name: of each member (times, ...)."""
+
+
+def kept_events(
+    name: str, times: Sequence[np.ndarray], most: int, points: Points, keep: Collection[str]
+) -> Kept:
+    """How often an event happened, and when; the first that fit.
+
+    Args:
+        times: of each member, s.
+        most: times that are kept of a member.
+        points: what was recorded there.
+    """
+    count = len(times)
+    found: Kept = {}
+    if "events" in keep:
+        table = _padded(times, most, ())
+        found[f"{name}_count"] = KeptVariable(
+            (), np.array([len(t) for t in times], dtype=np.int64),
+            {"long_name": f"how often {name} happened", "units": "1"}, "events",
+        )  # fmt: skip
+        labels = {"units": "s", "long_name": f"times of {name}, the first {most}"}
+        found[f"{name}_times"] = KeptVariable((f"{name}_occurrence",), table, labels, "events")
+        first = table[:, 0] if most else np.full(count, np.nan)
+        labels = {"units": "s", "long_name": f"first time of {name}"}
+        found[f"{name}_first"] = KeptVariable((), first, labels, "events")
+    if "section" in keep:
+        for what, (variable, values) in points.items():
+            labels = {k: v for k, v in variable.attributes.items() if k in ("units", "frame", "angle")}
+            labels["long_name"] = f"{variable.attributes.get('long_name', what)} at {name}"
+            found[f"{name}_{what}"] = KeptVariable(
+                (f"{name}_occurrence", *variable.dims), _padded(values, most, variable.shape), labels,
+                "section",
+            )  # fmt: skip
+        labels = {"units": "s", "long_name": f"times of {name}, the first {most}"}
+        found[f"{name}_time"] = KeptVariable(
+            (f"{name}_occurrence",), _padded(times, most, ()), labels, "section"
+        )
+    return found
+
+
+def _padded(rows: Sequence[np.ndarray], most: int, shape: tuple[int, ...]) -> np.ndarray:
+    table = np.full((len(rows), most, *shape), np.nan)
+    for row, values in zip(table, rows, strict=True):
+        taken = values[:most]
+        row[: len(taken)] = np.reshape(taken, (-1, *shape))
+    return table
+
+
+def joined(parts: Sequence[Kept], counts: Sequence[int]) -> Kept:
+    """What was kept of several groups of members as one, nan (0 of counts) where a group has none of it.
+
+    Args:
+        counts: members of each group.
+    """
+    names = dict.fromkeys(name for part in parts for name in part)
+    found: Kept = {}
+    for name in names:
+        like = next(part[name] for part in parts if name in part)
+        shapes = [part[name].values.shape[1:] for part in parts if name in part]
+        shape = tuple(max(sizes) for sizes in zip(*shapes, strict=True)) if shapes[0] else ()
+        whole = like.values.dtype.kind == "i"
+        table = np.full((sum(counts), *shape), 0 if whole else np.nan, dtype=like.values.dtype)
+        first = 0
+        for part, count in zip(parts, counts, strict=True):
+            if name in part:
+                values = part[name].values
+                place = (slice(first, first + count), *(slice(0, n) for n in values.shape[1:]))
+                table[place] = values
+            first += count
+        found[name] = KeptVariable(like.dims, table, like.attributes, like.item)
+    return found

@@ -1,0 +1,210 @@
+"""Members of a sweep, run: what is kept of each, how each ended, and why where it didn't come to its end."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
+from enum import Enum
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.scene.records import dataclass
+from rigidsim.session.kept import ALWAYS, Kept, KeptVariable, Series, joined, kept_events, kept_of_series
+from rigidsim.solve.status import Status
+from rigidsim.store.collected import JoinedBlocks
+from rigidsim.store.memory import MemoryRun
+from rigidsim.store.summary import Summary, WarningCode
+from rigidsim.store.variables import Variable
+
+
+class Outcome(Enum):
+    """How a member ended that has no status of a run."""
+
+    REFUSED = "refused"
+    FAILED = "failed"
+
+
+ENDED_WELL = (Status.FINISHED.value, Status.EVENT.value)
+OUTCOMES = (
+    *(s.value for s in (Status.FINISHED, Status.EVENT, Status.WALL_TIME, Status.MAX_STEPS, Status.MAX_DRIFT)),
+    *(s.value for s in (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED)),
+    *(o.value for o in Outcome),
+)
+"""How members can end; a dataset holds the place in this list, which only grows."""
+WARNINGS = tuple(code.value for code in WarningCode)
+
+
+@dataclass(frozen=True)
+class MemberResults:
+    """Some members, run.
+
+    Attributes:
+        kept: by name, each (members, ...).
+        reasons: by place among them, of those that didn't end well.
+        engines: by which members were run, with their numbers.
+        why_alone: code of the reason that members were run one by one; empty where none was.
+    """
+
+    kept: Kept
+    reasons: Mapping[int, str]
+    engines: Mapping[str, int] = field(default_factory=dict)
+    why_alone: str = ""
+
+    @classmethod
+    def together(cls, parts: Sequence[MemberResults]) -> MemberResults:
+        """Several groups of members as one, in order."""
+        counts = [len(part.kept["status"].values) for part in parts]
+        reasons: dict[int, str] = {}
+        first = 0
+        engines: dict[str, int] = {}
+        for part, count in zip(parts, counts, strict=True):
+            reasons |= {first + place: why for place, why in part.reasons.items()}
+            first += count
+            for engine, number in part.engines.items():
+                engines[engine] = engines.get(engine, 0) + number
+        why = next((part.why_alone for part in parts if part.why_alone), "")
+        return cls(joined([part.kept for part in parts], counts), reasons, engines, why)
+
+
+def status_codes(statuses: Sequence[str]) -> KeptVariable:
+    """How members ended, as numbers with their meanings."""
+    codes = np.array([OUTCOMES.index(status) for status in statuses], dtype=np.int64)
+    meanings = " ".join(re.sub(r"\W+", "_", outcome) for outcome in OUTCOMES)
+    attributes = {
+        "long_name": "how the member ended",
+        "flag_values": list(range(len(OUTCOMES))),
+        "flag_meanings": meanings,
+    }
+    return KeptVariable((), codes, attributes)
+
+
+def warning_bits(codes: Sequence[Sequence[str]]) -> KeptVariable:
+    """Warnings of each member, a bit for each kind."""
+    bits = [sum(1 << WARNINGS.index(code) for code in set(found)) for found in codes]
+    attributes = {
+        "long_name": "warnings of the member, a bit each",
+        "flag_masks": [1 << bit for bit in range(len(WARNINGS))],
+        "flag_meanings": " ".join(WARNINGS),
+    }
+    return KeptVariable((), np.array(bits, dtype=np.int64), attributes)
+
+
+def plain_variables(
+    *, steps: np.ndarray, reached: np.ndarray, bound: np.ndarray, attitude_error: np.ndarray
+) -> Kept:
+    """What is told of every member beside how it ended: (members,) each."""
+    return {
+        "steps": KeptVariable((), steps.astype(np.int64), {"long_name": "steps taken", "units": "1"}),
+        "time_reached": KeptVariable((), reached, {"long_name": "time of the last sample", "units": "s"}),
+        "drift_bound": KeptVariable(
+            (), bound, {"long_name": "relative drift that rounding alone explains", "units": "1"}
+        ),
+        "attitude_error": KeptVariable(
+            (),
+            attitude_error,
+            {"long_name": "estimated error of the attitude at the last sample; nan where none is estimated",
+             "units": "rad"},
+        ),
+    }  # fmt: skip
+
+
+def run_alone(
+    run: Callable[[], MemoryRun],
+    keep: Sequence[str],
+    most_events: int,
+    events: Sequence[str],
+    more: Callable[[MemoryRun], Kept] | None = None,
+) -> MemberResults:
+    """One member by itself; what goes wrong with it is recorded.
+
+    Args:
+        run: runs it.
+        keep, most_events: as of ``[sweep]``.
+        events: names of the scene's events.
+        more: what else is to be kept of the run.
+
+    Raises:
+        KeyboardInterrupt: the run was interrupted.
+    """
+    try:
+        result = run()
+    except ConfigError as error:
+        return failed(Outcome.REFUSED, "; ".join(str(problem) for problem in error.problems))
+    except RigidsimError as error:
+        return failed(Outcome.FAILED, str(error))
+    except (ArithmeticError, ValueError, RuntimeError, TypeError, LookupError) as error:
+        return failed(Outcome.FAILED, f"{type(error).__name__}: {error}")
+    summary = result.outcome
+    assert isinstance(summary, Summary)
+    if summary.status == Status.INTERRUPTED.value:
+        raise KeyboardInterrupt
+    kept = _kept_of_run(result, keep) | _events_of_run(result, keep, most_events, events)
+    bounds = [row.bound for row in summary.invariants.values()]
+    error_at_end = summary.accuracy.estimated_attitude_error
+    if summary.accuracy.certified is not None:
+        error_at_end = summary.accuracy.certified
+    kept |= {"status": status_codes([summary.status]), "warnings": warning_bits([summary.warning_codes])}
+    kept |= plain_variables(
+        steps=np.array([summary.cost.steps]),
+        reached=np.array([summary.time_reached]),
+        bound=np.array([max(bounds, default=np.nan)]),
+        attitude_error=np.array([np.nan if error_at_end is None else error_at_end]),
+    )
+    if "lyapunov" in keep:
+        spectrum = summary.lyapunov
+        largest = np.nan if spectrum is None else spectrum.largest_exponent
+        labels = {"units": "s-1", "long_name": "largest Lyapunov exponent"}
+        kept["lyapunov"] = KeptVariable((), np.array([largest]), labels, "lyapunov")
+    if more is not None and result.blocks:
+        kept |= more(result)
+    reasons = {} if summary.status in ENDED_WELL else {0: summary.message}
+    return MemberResults(kept, reasons, {"alone": 1})
+
+
+def failed(outcome: Outcome, reason: str) -> MemberResults:
+    """A member that gave no samples."""
+    nothing = np.array([np.nan])
+    kept = {"status": status_codes([outcome.value]), "warnings": warning_bits([[]])}
+    kept |= plain_variables(steps=np.array([0]), reached=nothing, bound=nothing, attitude_error=nothing)
+    return MemberResults(kept, {0: reason}, {"alone": 1})
+
+
+def _kept_of_run(result: MemoryRun, keep: Sequence[str]) -> Kept:
+    if not result.blocks:
+        return {}
+    joined_blocks = JoinedBlocks(result.blocks, result.variables)
+    series = []
+    for variable in result.variables:
+        if variable.name == "time" or "units" not in variable.attributes or _is_date(variable):
+            continue
+        parts = [
+            np.asarray(part, dtype=np.float64).reshape(1, -1, max(1, int(np.prod(variable.shape))))
+            for part in joined_blocks[variable.name]
+        ]
+        series.append(Series(variable, parts))
+    times = np.asarray(joined_blocks["time"][0], dtype=np.float64).reshape(-1)
+    return kept_of_series(series, times, np.array([len(times)]), keep)
+
+
+def _is_date(variable: Variable) -> bool:
+    return variable.name in ("year", "julian_date", "date")
+
+
+def _events_of_run(result: MemoryRun, keep: Sequence[str], most_events: int, events: Sequence[str]) -> Kept:
+    found: Kept = {}
+    recorded = {v.name: v for v in result.variables if "drift_of" not in v.attributes and v.name != "time"}
+    for name in events:
+        extras = {extra.name: extra for extra in result.extras}
+        times = extras[f"{name}_time"].values
+        points = {
+            what: (variable, [extras[f"{name}_{what}"].values])
+            for what, variable in recorded.items()
+            if f"{name}_{what}" in extras and not _is_date(variable)
+        }
+        found |= kept_events(name, [times], most_events, points, keep)
+    return found
+
+
+__all__ = ["ALWAYS", "ENDED_WELL", "OUTCOMES", "WARNINGS", "MemberResults", "Outcome", "run_alone"]

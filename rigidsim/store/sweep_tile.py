@@ -1,0 +1,111 @@
+"""Tiles: what was kept of some members of a sweep, sealed, written once, and read with distrust."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rigidsim.errors import RunFolderError
+from rigidsim.scene.records import dataclass
+from rigidsim.store.netcdf_file import writing
+from rigidsim.store.seal import check_seal, refuse_special, sealed
+
+_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class TileVariable:
+    """What a variable of a tile is.
+
+    Attributes:
+        dims: beside the members'.
+        item: what of ``[sweep] keep`` it belongs to.
+    """
+
+    dims: tuple[str, ...]
+    attributes: Mapping[str, Any]
+    item: str
+
+
+@dataclass(frozen=True)
+class Tile:
+    """Some members, run.
+
+    Attributes:
+        config_sha256: of the config that they are members of.
+        members: which they are, (n,) int64.
+        arrays: by name, (n, ...) float64 or int64; those without a number aren't there.
+        variables: what these are.
+        reasons: by place in the tile, why members didn't end well.
+        made: engines, versions, seconds, ...: what isn't the same each time it is made.
+    """
+
+    config_sha256: str
+    members: np.ndarray
+    arrays: Mapping[str, np.ndarray]
+    variables: Mapping[str, TileVariable]
+    reasons: Mapping[int, str] = field(default_factory=dict)
+    made: Mapping[str, Any] = field(default_factory=dict)
+
+    def image(self) -> bytes:
+        """The sealed file that holds it."""
+        described = {
+            name: {"dims": list(v.dims), "attributes": dict(v.attributes), "item": v.item}
+            for name, v in self.variables.items()
+        }
+        buffer = io.BytesIO()
+        with writing(buffer) as file:
+            file.attributes(
+                {
+                    "source": "rigidsim",
+                    "tile_format": _FORMAT,
+                    "config_sha256": self.config_sha256,
+                    "variables": json.dumps(described),
+                    "reasons": json.dumps({str(place): why for place, why in self.reasons.items()}),
+                    "made": json.dumps(dict(self.made)),
+                }
+            )
+            file.group("tile", {"members": self.members.astype(np.int64)})
+            file.group("kept", self.arrays)
+        return bytes(sealed(buffer))
+
+
+def read_tile(path: Path, config_sha256: str) -> Tile:
+    """A tile, its seal checked.
+
+    Args:
+        config_sha256: of the config that its members belong to.
+
+    Raises:
+        RunFolderError: torn, damaged, foreign, or of another sweep.
+    """
+    refuse_special(path)
+    check_seal(path)
+    try:
+        with h5py.File(path, "r") as file:
+            if int(file.attrs.get("tile_format", [0])[0]) != _FORMAT:
+                raise RunFolderError(f"{path}: is no tile that this version of rigidsim reads")
+            described = json.loads(file.attrs["variables"])
+            tile = Tile(
+                str(file.attrs["config_sha256"]),
+                np.asarray(file["tile"]["members"][()]),
+                {name: np.asarray(data[()]) for name, data in file["kept"].items()},
+                {
+                    name: TileVariable(tuple(v["dims"]), v["attributes"], v["item"])
+                    for name, v in described.items()
+                },
+                {int(place): str(why) for place, why in json.loads(file.attrs["reasons"]).items()},
+                json.loads(file.attrs["made"]),
+            )
+    except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
+        raise RunFolderError(f"{path}: can't be read as a tile ({error})") from None
+    if tile.config_sha256 != config_sha256:
+        raise RunFolderError(f"{path}: belongs to another sweep; remove it, and resume computes it again")
+    return tile

@@ -1,0 +1,96 @@
+"""What can be refused of a sweep before any of its members runs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.initial_values import check_start
+from rigidsim.scene.registry import OBSERVABLES
+from rigidsim.scene.scene import build_scene
+from rigidsim.scene.sweep import Sweep
+from rigidsim.session.event_variables import refuse_taken_names
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.store.sweep_dataset import RESERVED, SUFFIXES
+
+_ALL = 200
+"""As many members are all worked out; of more, each value of each axis once, and the corners."""
+_OF_AN_AXIS = 400
+_MOST_CORNERS = 64
+_MOST_TOLD = 10
+
+
+def check_sweep(sweep: Sweep) -> InitialValueProblem:
+    """Refuse a sweep with a member that can't be run; the first member, prepared.
+
+    Raises:
+        ConfigError: names members and keys.
+    """
+    _refuse_names(sweep)
+    _refuse_what_none_has(sweep)
+    try:
+        first = prepare(sweep.worked_out(0))
+        refuse_taken_names(first)
+    except ConfigError as error:
+        raise _blamed(sweep, 0, error) from None
+    problems: list[Problem] = []
+    for member in _tried(sweep):
+        try:
+            experiment = sweep.worked_out(member)
+            check_start(build_scene(experiment))
+        except ConfigError as error:
+            problems += _blamed(sweep, member, error).problems
+            if len(problems) >= _MOST_TOLD:
+                break
+    if problems:
+        raise ConfigError(problems, sweep.experiment.source)
+    return first
+
+
+def _blamed(sweep: Sweep, member: int, error: ConfigError) -> ConfigError:
+    if error.problems[0].where.startswith("[sweep] member"):
+        return error
+    return sweep.blamed(member, error)
+
+
+def _tried(sweep: Sweep) -> Iterator[int]:
+    """Members that are worked out before anything runs."""
+    if sweep.count <= _ALL:
+        yield from range(1, sweep.count)
+        return
+    if not sweep.product:
+        step = max(1, sweep.count // _OF_AN_AXIS)
+        yield from range(step, sweep.count, step)
+        yield sweep.count - 1
+        return
+    strides: list[int] = []
+    stride = 1
+    for size in reversed(sweep.shape):
+        strides.insert(0, stride)
+        stride *= size
+    for size, stride in zip(sweep.shape, strides, strict=True):
+        step = max(1, size // _OF_AN_AXIS)
+        yield from (index * stride for index in range(step, size, step))
+    ends = [(0, (size - 1) * stride) for size, stride in zip(sweep.shape, strides, strict=True)]
+    yield from (sum(corner) for corner in itertools.islice(itertools.product(*ends), 1, _MOST_CORNERS))
+
+
+def _refuse_names(sweep: Sweep) -> None:
+    taken = RESERVED | set(OBSERVABLES)
+    problems = []
+    for axis in sweep.axes:
+        if axis.name in taken or axis.name.endswith(SUFFIXES) or axis.name.endswith("_drift"):
+            what = f'is named "{axis.name}", a name that the dataset needs itself; give it another name'
+            problems.append(Problem(f'[sweep] axes."{axis.key}"', what))
+    if problems:
+        raise ConfigError(problems, sweep.experiment.source)
+
+
+def _refuse_what_none_has(sweep: Sweep) -> None:
+    """What is to be kept, and needs something that the config doesn't have."""
+    keep = sweep.table.keep
+    for name in ("events", "section"):
+        if name in keep and not sweep.base.config.events:
+            what = f'given "{name}", but the config has no [[events]]; add one, or leave it out'
+            raise ConfigError(Problem("[sweep] keep", what), sweep.experiment.source)

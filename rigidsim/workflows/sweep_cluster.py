@@ -1,0 +1,91 @@
+"""Tiles computed by the workers of a Dask cluster; their files come back here and are saved here.
+
+The workers need rigidsim and nothing of this machine's disk. Only a few tiles for each of their threads are
+out at any time, so that neither the scheduler nor this process ever holds many.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rigidsim.errors import RigidsimError, StoppedError
+from rigidsim.store.sweep_folder import Generation
+from rigidsim.workflows.sweep_members import tile_image
+from rigidsim.workflows.sweep_ways import task
+
+_AHEAD = 2  # tiles for each thread
+_MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
+_CONNECT_SECONDS = 20
+
+
+class Cluster:
+    """A Dask scheduler's workers.
+
+    Args:
+        address: of the scheduler, such as ``tcp://10.0.0.1:8786``.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+
+    def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
+        """See ``Way``.
+
+        Raises:
+            RigidsimError: Dask isn't installed, or no scheduler answers.
+            StoppedError: workers die again and again at the same tile.
+        """
+        distributed = _distributed()
+        try:
+            client = distributed.Client(self._address, timeout=_CONNECT_SECONDS, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise RigidsimError(
+                f"--scheduler {self._address}: no Dask scheduler answers ({error or type(error).__name__}); "
+                "start one with: dask scheduler"
+            ) from None
+        with client:
+            yield from self._stream(distributed, client, generation, list(reversed(tiles)))
+
+    def _stream(
+        self, distributed: Any, client: Any, generation: Generation, waiting: list[int]
+    ) -> Iterator[tuple[int, bytes]]:
+        deaths: Counter[int] = Counter()
+        running: dict[Any, int] = {}
+        finished = distributed.as_completed(loop=client.loop)
+        while waiting or running:
+            ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+            while waiting and len(running) < ahead:
+                tile = waiting.pop()
+                future = client.submit(tile_image, *task(generation, tile), pure=False, retries=2)
+                running[future] = tile
+                finished.add(future)
+            future = next(finished)
+            tile = running.pop(future)
+            try:
+                image = future.result()
+            except distributed.KilledWorker:
+                deaths[tile] += 1
+                if deaths[tile] >= _MOST_DEATHS:
+                    members = generation.members_of(tile)
+                    raise StoppedError(
+                        f"workers died again and again while members {members[0]} to {members[-1]} were in "
+                        "work; give workers more memory, or take a smaller [sweep] tile"
+                    ) from None
+                waiting.append(tile)
+                continue
+            except distributed.CancelledError:  # the scheduler lost it with the worker that had it
+                waiting.append(tile)
+                continue
+            yield tile, image
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise RigidsimError(
+            "--scheduler needs Dask, which isn't installed; pip install 'rigidsim[cluster]'"
+        ) from None
+    return distributed

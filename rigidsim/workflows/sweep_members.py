@@ -1,0 +1,108 @@
+"""Members of a sweep, computed tile by tile: in a batch where that is possible, else one by one."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Sequence
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.sweep import Sweep
+from rigidsim.session.kept import Kept, KeptVariable
+from rigidsim.session.members import MemberResults, run_alone
+from rigidsim.store import provenance
+from rigidsim.store.memory import MemoryRun
+from rigidsim.store.sweep_sources import plain
+from rigidsim.store.sweep_tile import Tile, TileVariable
+from rigidsim.workflows.analyse import analyse
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.run import run
+
+_LINES = 5  # of each signal's spectrum
+
+
+@lru_cache(maxsize=4)
+def sweep_of(config: str) -> Sweep:
+    """The sweep of a config's text, worked out once in a process."""
+    return Sweep.of(parse(config, source="the sweep's config"))
+
+
+def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> bytes:
+    """Run some members; returns the sealed file of their tile.
+
+    Args:
+        config: of the sweep.
+        keep: items to be kept, as of ``items_of``.
+
+    Raises:
+        KeyboardInterrupt: it was interrupted.
+    """
+    began, cpu = time.perf_counter(), time.process_time()
+    sweep = sweep_of(config)
+    results = run_members(sweep, members, [plain(item) for item in keep])
+    made = {
+        "engines": dict(results.engines),
+        "why_alone": results.why_alone,
+        "wall_seconds": time.perf_counter() - began,
+        "cpu_seconds": time.process_time() - cpu,
+        "finished_at": provenance.now(),
+        "cpu_model": provenance.cpu_model(),
+        **{f"version_{name}": version for name, version in provenance.versions().items()},
+    }
+    return Tile(
+        sweep.experiment.sha256,
+        np.array(members, dtype=np.int64),
+        {name: variable.values for name, variable in results.kept.items()},
+        {name: TileVariable(v.dims, v.attributes, v.item) for name, v in results.kept.items()},
+        results.reasons,
+        made,
+    ).image()
+
+
+def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> MemberResults:
+    """Run some members of a sweep, and keep what is asked for of each."""
+    events = [event.name for event in sweep.base.config.events]
+    most = sweep.table.most_events
+    more = frequencies_of if "frequencies" in keep else None
+    parts = []
+    for member in members:
+        parts.append(run_alone(partial(_run_alone, sweep, member), keep, most, events, more))
+    return MemberResults.together(parts)
+
+
+def alone(sweep: Sweep, member: int) -> Experiment:
+    """A member as it is run by itself."""
+    experiment = sweep.experiment_of(member)
+    if "lyapunov" in sweep.table.keep and not experiment.config.output.lyapunov:
+        experiment = experiment.having(["output.lyapunov=true"])
+    return experiment
+
+
+def _run_alone(sweep: Sweep, member: int) -> MemoryRun:
+    return run(alone(sweep, member), out=None)
+
+
+def frequencies_of(result: MemoryRun) -> Kept:
+    """The strongest lines of each signal, and its secular rate; nothing where it can't be analysed."""
+    try:
+        found = analyse(result, lines=_LINES)
+    except RigidsimError:
+        return {}
+    kept: Kept = {}
+    for signal in found.signals:
+        name = re.sub(r"\W+", "_", signal.name).strip("_")
+        for what, units in (("frequency", "rad/s"), ("amplitude", signal.units)):
+            table = np.full((1, _LINES), np.nan)
+            values = [float(getattr(line, what)) for line in signal.lines[:_LINES]]
+            table[0, : len(values)] = values
+            labels: dict[str, Any] = {"units": units, "long_name": f"{what} of the lines of {signal.name}"}
+            kept[f"{name}_{what}"] = KeptVariable(("line",), table, labels, "frequencies")
+        rate = np.array([np.nan if signal.rate is None else float(signal.rate)])
+        labels = {"units": f"{signal.units}/s", "long_name": f"secular rate of {signal.name}"}
+        kept[f"{name}_rate"] = KeptVariable((), rate, labels, "frequencies")
+    return kept

@@ -1,0 +1,308 @@
+"""Sweeps from config to dataset: labels, exactness against single runs, extension, shares, workers, kills."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import rigidsim
+from rigidsim.cli.app import app
+from rigidsim.errors import ConfigError, RunFolderError
+from rigidsim.store.sweep_folder import SweepFolder, Work, ranges_of
+from rigidsim.store.sweep_run import open_sweep
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.sweep import resume_sweep, scanned
+from rigidsim.workflows.sweep import sweep as run_sweep
+
+CONFIG = """\
+name = "box"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1, 0.05]
+[time]
+end = 5
+samples = 6
+[integrator]
+formulation = "rates"
+[output]
+estimate = false
+record = ["angular_velocity", "energy"]
+[[events]]
+name = "middle"
+expression = "wx"
+"""
+SWEEP = """\
+[sweep]
+keep = ["final"]
+tile = 2
+axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 3], name = "w3"}
+axes."body.principal_moments[2]" = {values = [2.5, 2.75], name = "C"}
+"""
+
+
+def swept(out: Path, text: str = CONFIG + SWEEP, **options: object) -> rigidsim.SavedSweep:
+    return run_sweep(parse(text), out=out, **options)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("sweeps")
+    everything = SWEEP.replace(
+        '["final"]', '["final", "extremes", "means", "events", "section", "series"]\nmost_events = 2'
+    )
+    assert swept(out, CONFIG + everything).finished
+    return out / "box"
+
+
+def test_members_are_single_runs_with_labels(folder: Path) -> None:
+    sweep = open_sweep(folder)
+    dataset = sweep.dataset
+    assert dict(dataset.sizes) == {"w3": 3, "C": 2, "time": 6, "body_axis": 3, "middle_occurrence": 2}
+    assert dataset.w3.values.tolist() == [0.1, 0.2, 0.3]
+    assert dataset.w3.attrs["units"] == "rad/s"
+    assert dataset.C.attrs["swept_key"] == "body.principal_moments[2]"
+    assert (dataset.status == 0).all()
+    changes = {"initial.angular_velocity[2]": 0.2, "body.principal_moments[2]": 2.75}
+    alone = rigidsim.run(parse(CONFIG), changes=changes, out=None)
+    cell, single = dataset.sel(w3=0.2, C=2.75), alone.dataset
+    np.testing.assert_array_equal(cell.time.values, single.time.values)
+    rates = single.angular_velocity.values
+    np.testing.assert_array_equal(cell.angular_velocity.values, rates)
+    np.testing.assert_array_equal(cell.angular_velocity_final.values, rates[-1])
+    np.testing.assert_array_equal(cell.angular_velocity_min.values, rates.min(axis=0))
+    np.testing.assert_array_equal(cell.angular_velocity_max.values, rates.max(axis=0))
+    at = single.time.values[rates.argmax(axis=0)]
+    np.testing.assert_array_equal(cell.angular_velocity_max_time.values, at)
+    np.testing.assert_allclose(cell.angular_velocity_mean.values, rates.mean(axis=0), rtol=1e-15)
+    assert cell.energy_drift_largest == abs(single.energy_drift).max()
+    assert cell.energy_drift_final == single.energy_drift[-1]
+    assert cell.steps == alone.summary["cost"]["steps"]
+    found = single.middle_time.values
+    assert cell.middle_count == len(found) >= 1
+    kept = min(2, len(found))
+    np.testing.assert_array_equal(cell.middle_times.values[:kept], found[:kept])
+    assert cell.middle_first == found[0]
+    np.testing.assert_array_equal(
+        cell.middle_angular_velocity.values[:kept], single.middle_angular_velocity.values[:kept]
+    )
+
+
+def test_every_reader_opens_it_and_it_is_chunked(folder: Path) -> None:
+    import netCDF4
+
+    with netCDF4.Dataset(folder / "dataset.h5") as file:
+        assert file["angular_velocity_final"].dimensions == ("w3", "C", "body_axis")
+        assert file.kind == "sweep"
+        assert "[sweep]" in file.config
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["outcomes"] == {"finished": 6}
+    assert sum(summary["engines"].values()) == 6
+
+
+def test_given_again_it_computes_nothing(folder: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    told = CliRunner().invoke(app, ["resume", str(folder)])
+    assert told.exit_code == 0, told.output
+    assert "nothing is left" in told.stderr
+    assert before == {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+
+
+def test_a_longer_axis_and_one_more_output_compute_only_what_is_new(tmp_path: Path) -> None:
+    first = swept(tmp_path)
+    tiles = SweepFolder(tmp_path / "box").tiles
+    before = {path.name: path.read_bytes() for path in tiles.iterdir()}
+    final = first.dataset.angular_velocity_final.load()
+    longer = SWEEP.replace("0.1, 3]", "0.1, 4]").replace('["final"]', '["final", "means"]')
+    second = swept(tmp_path, CONFIG + longer)
+    dataset = second.dataset
+    assert {p.name: p.read_bytes() for p in tiles.iterdir() if p.name in before} == before
+    work = SweepFolder(tmp_path / "box").generations()[-1].works
+    assert [(w.keep, w.ranges) for w in work] == [(("final", "means"), ((6, 8),)), (("means",), ((0, 6),))]
+    assert dataset.sizes["w3"] == 4
+    np.testing.assert_array_equal(dataset.angular_velocity_final.values[:3], final.values)
+    assert np.isfinite(dataset.angular_velocity_mean).all()
+    assert np.isfinite(dataset.angular_velocity_final).all()
+    with pytest.raises(RunFolderError, match="another experiment"):
+        swept(tmp_path, (CONFIG + SWEEP).replace("end = 5", "end = 6"))
+
+
+def test_a_thousand_columns_prolonged_by_a_hundred_are_a_hundred(tmp_path: Path) -> None:
+    from rigidsim.scene.sweep import Sweep
+    from rigidsim.store.sweep_sources import positions
+
+    short, long = (
+        Sweep.of(parse(f'{CONFIG}[sweep.axes]\n"time.end" = {{linspace = [1, {end}, {count}]}}\n'
+                       f'"initial.angular_velocity[0]" = {{values = [1, 2, 3]}}'))
+        for end, count in ((2, 1001), (2.1, 1101))
+    )  # fmt: skip
+    found = positions(long, short)
+    assert (found < 0).sum() == 100 * 3
+    np.testing.assert_array_equal(found[: 1001 * 3], np.arange(1001 * 3))
+    assert (positions(short, long) == np.arange(1001 * 3)).all()
+
+
+def test_ranges_of_members_and_their_places() -> None:
+    members = np.array([0, 1, 2, 5, 7, 8])
+    work = Work((), ranges_of(members))
+    assert work.ranges == ((0, 3), (5, 6), (7, 9))
+    np.testing.assert_array_equal(work.members(2, 5), [2, 5, 7])
+    np.testing.assert_array_equal(work.places(np.array([-1, 0, 2, 3, 5, 8, 9])), [-1, 0, 2, -1, 3, 5, -1])
+
+
+def test_a_failing_member_is_recorded_and_the_rest_go_on(tmp_path: Path) -> None:
+    text = (
+        CONFIG
+        + """
+[[loads]]
+kind = "torque"
+components = ["0", "0", "wz^3"]
+[sweep]
+mode = "zip"
+axes."initial.angular_velocity[2]" = {values = [0.1, 3]}
+"""
+    )
+    sweep = swept(tmp_path, text)
+    dataset = sweep.dataset
+    assert sweep.summary["outcomes"]["finished"] == 1
+    assert dataset.sizes["member"] == 2
+    assert dataset.angular_velocity_2.dims == ("member",)
+    assert "angular_velocity_2" in dataset.coords
+    assert dataset.failed_member.values.tolist() == [1]
+    assert str(dataset.failed_reason.values[0])
+    assert dataset.time_reached[1] < 5
+    assert any("didn't end well" in text for text in sweep.summary["warnings"])
+
+
+BAD = {
+    "one bad member among many": (
+        'axes."body.principal_moments[2]" = {linspace = [1.5, 3.5, 300], name = "C"}',
+        "triangle|largest is more than the sum",
+    ),
+    "unknown key": ('axes."initial.angular_velocty[2]" = {values = [1]}', 'did you mean "angular_velocity"'),
+    "name of the dataset's": ('axes."time.end" = {values = [1], name = "steps"}', "needs itself"),
+    "nothing to keep": ('keep = ["events"]\naxes."time.end" = {values = [1]}', "no \\[\\[events\\]\\]"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_sweeps_are_refused_before_work_begins(case: str, tmp_path: Path) -> None:
+    table, told = BAD[case]
+    config = CONFIG.partition("[[events]]")[0] if case == "nothing to keep" else CONFIG
+    with pytest.raises(ConfigError, match=told):
+        swept(tmp_path, f"{config}[sweep]\n{table}\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_shares_make_the_same_dataset(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(CONFIG + SWEEP)
+    run = CliRunner().invoke
+    for share, code in (("0:2", 0), ("2:9", 0)):
+        told = run(app, ["sweep", str(tmp_path / "c.toml"), "--out", str(tmp_path), "--tiles", share])
+        assert told.exit_code == code, told.output
+    found = open_sweep(tmp_path / "box")
+    assert found.finished
+    expected = open_sweep(folder).dataset.angular_velocity_final
+    np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
+    wrong = run(app, ["sweep", str(tmp_path / "c.toml"), "--out", str(tmp_path), "--tiles", "3"])
+    assert wrong.exit_code == 2
+
+
+def test_info_tells_how_far_a_sweep_is(tmp_path: Path) -> None:
+    swept(tmp_path, tiles=(0, 1))
+    told = CliRunner().invoke(app, ["info", str(tmp_path / "box")])
+    assert told.exit_code == 0
+    assert "2 of 6 members" in told.output
+    summary = open_sweep(tmp_path / "box").summary
+    assert (summary["status"], summary["tiles_done"], summary["tiles"]) == ("interrupted", 1, 3)
+    damaged = tmp_path / "box" / "tiles" / "g000-0000000.h5"
+    damaged.write_bytes(damaged.read_bytes()[:-200])
+    with pytest.raises(RunFolderError, match="torn or foreign"):
+        resume_sweep(tmp_path / "box")
+    damaged.unlink()
+    assert resume_sweep(tmp_path / "box").finished
+
+
+def test_a_quick_scan() -> None:
+    base = parse(CONFIG)
+    found = scanned(base, ["time.end=[1, 2]", "initial.angular_velocity[0] = linspace(0, 1, 5)"])
+    assert found.config.sweep is not None
+    ways = [axis.way for axis in found.config.sweep.axes.values()]
+    assert ways == ["values", "linspace"]
+    with pytest.raises(ConfigError, match="write KEY=SPEC"):
+        scanned(base, ["time.end"])
+
+
+def test_plan_and_check_know_sweeps(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text(CONFIG + SWEEP)
+    made = json.loads(CliRunner().invoke(app, ["plan", str(path), "--json"]).stdout)
+    assert (made["members"], made["tiles"], made["tile"]) == (6, 3, 2)
+    assert [axis["name"] for axis in made["axes"]] == ["w3", "C"]
+    assert made["predicted"]["total_seconds"] > 0
+    shown = CliRunner().invoke(app, ["check", str(path)])
+    assert shown.exit_code == 0
+    path.write_text(CONFIG + SWEEP.replace("2.75", "9"))
+    shown = CliRunner().invoke(app, ["check", str(path)])
+    assert shown.exit_code == 2
+    assert "member 1" in shown.output
+
+
+def _killed_sweep(tmp_path: Path, *options: str) -> SweepFolder:
+    """A sweep whose process group is killed when a tile is there."""
+    (tmp_path / "c.toml").write_text(CONFIG + SWEEP.replace("tile = 2", "tile = 1"))
+    folder = SweepFolder(tmp_path / "box")
+    command = [sys.executable, "-m", "rigidsim", "sweep", str(tmp_path / "c.toml"), "--out", str(tmp_path)]
+    process = subprocess.Popen([*command, *options], stderr=subprocess.DEVNULL, start_new_session=True)
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and process.poll() is None:
+        if len(list(folder.tiles.glob("g000-*.h5"))) >= 1:
+            break
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    return folder
+
+
+def test_a_killed_sweep_is_resumed_to_the_same_bits(folder: Path, tmp_path: Path) -> None:
+    killed = _killed_sweep(tmp_path)
+    assert not killed.summary.exists()
+    kept = {path.name: path.stat().st_mtime_ns for path in killed.tiles.glob("g000-*.h5")}
+    found = resume_sweep(killed.path)
+    assert found.finished
+    for name, modified in kept.items():  # nothing is computed twice
+        assert (killed.tiles / name).stat().st_mtime_ns == modified
+    expected = open_sweep(folder).dataset.angular_velocity_final
+    np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
+
+
+@pytest.mark.slow  # three processes that import everything
+def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: Path) -> None:
+    from rigidsim.workflows.sweep import SweepObserver
+
+    class Killer(SweepObserver):
+        killed = 0
+
+        def progressed(self, done: int) -> None:
+            children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+            workers = [int(c) for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
+            if workers and not self.killed:
+                self.killed = workers[0]
+                os.kill(self.killed, signal.SIGKILL)
+
+    killer = Killer()
+    text = CONFIG + SWEEP.replace("tile = 2", "tile = 1")
+    found = swept(tmp_path, text, workers=2, observer=killer)
+    assert found.finished
+    assert killer.killed
+    expected = open_sweep(folder).dataset.angular_velocity_final
+    np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
