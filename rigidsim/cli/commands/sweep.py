@@ -41,7 +41,7 @@ def sweep(
 
     Give the command again to go on after an interruption, or with a config whose axes are longer.
 
-    Example: rigidsim sweep configs/intermediate_axis_sweep.toml --workers 2
+    Example: rigidsim sweep configs/sweeps/first_flip.toml --workers 2
     """
     from rigidsim.cli.sweep_screens import observer, print_sweep
     from rigidsim.workflows.read import load
