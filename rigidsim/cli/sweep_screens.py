@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from rigidsim.cli.tables import console
+from rigidsim.cli.page import console
 from rigidsim.scene.sweep import Sweep
 from rigidsim.store.sweep_run import SavedSweep
 from rigidsim.workflows.sweep import SweepObserver
