@@ -21,11 +21,16 @@ else:
         """As ``dataclasses.dataclass`` with the same options, of which there are fewer.
 
         ``fields``, ``replace`` and ``asdict`` of the standard library work as ever. Fields are arguments of
-        ``__init__``, all of them; ``__post_init__`` is not called.
+        ``__init__``, all of them.
+
+        Raises:
+            TypeError: the class has a ``__post_init__``, which wouldn't be called, or a field that is no
+                argument or comes by its name alone.
         """
 
         def made(cls: type) -> type:
             dataclasses.dataclass(init=False, repr=False, eq=False)(cls)
+            _refuse_what_is_missing(cls)
             methods = {"__init__": _first_init(cls), "__eq__": _equal, "__signature__": _Signature()}
             if cls.__dict__.get("__hash__") is None:  # none of its own; None beside an __eq__ of its own
                 methods["__hash__"] = _hash if frozen else None
@@ -39,6 +44,16 @@ else:
             return cls
 
         return made if cls is None else made(cls)
+
+
+def _refuse_what_is_missing(cls: Any) -> None:
+    if hasattr(cls, "__post_init__"):
+        raise TypeError(f"{cls.__name__} has a __post_init__: use the standard library's dataclass")
+    for field in dataclasses.fields(cls):
+        if (
+            not field.init and field.default is MISSING and field.default_factory is MISSING
+        ) or field.kw_only:
+            raise TypeError(f"{cls.__name__}.{field.name}: use the standard library's dataclass")
 
 
 def _first_init(cls: type) -> Callable[..., None]:

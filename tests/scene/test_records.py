@@ -110,3 +110,20 @@ class Sent:
 
 def test_records_travel_between_processes() -> None:
     assert pickle.loads(pickle.dumps(Sent(3))) == Sent(3)
+
+
+def test_what_these_records_lack_is_refused_where_a_class_is_defined() -> None:
+    with pytest.raises(TypeError, match="__post_init__"):
+
+        @records.dataclass
+        class Checked:
+            a: int
+
+            def __post_init__(self) -> None:
+                raise AssertionError
+
+    with pytest.raises(TypeError, match=r"Named\.a"):
+
+        @records.dataclass
+        class Named:
+            a: int = field(kw_only=True)
