@@ -71,6 +71,7 @@ def estimate_errors(
     waypoints: Waypoints | None = None,
     stepper: Stepper | None = None,
     nearest: float = 1.0,
+    uneven: float = math.inf,
     go_on: Callable[[], bool] = lambda: True,
     margins: Margins = MARGINS,
 ) -> Estimate | None:
@@ -83,6 +84,7 @@ def estimate_errors(
         waypoints: some of its step boundaries, where growth is looked at besides the beginning.
         stepper: of the run; it is used where that is good enough, and left as it was.
         nearest: singular factor of the run's chart where it was smallest.
+        uneven: its longest step over its shortest.
         go_on: asked again and again; False ends it.
 
     Returns:
@@ -102,7 +104,7 @@ def estimate_errors(
             law = round_off_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
             return _by_comparison(prepared, exact_error(prepared, form, trail), law, duration, margins)
     lost = math.pi / float(prepared.precision.epsilon)
-    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, lost)
+    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, uneven, lost)
     found = follow(course, margins, go_on)
     if not go_on():
         return None

@@ -46,6 +46,7 @@ class Course:
         waypoints: boundaries of its steps; None where there are none.
         stepper: of the run; it, or copies of its engine, are used where that is good enough.
         nearest: singular factor of the run's chart where it was smallest; 1 for charts that are changed.
+        uneven: its longest step over its shortest.
         lost: errors in epsilons past which nothing is to be learnt.
     """
 
@@ -56,6 +57,7 @@ class Course:
     waypoints: Waypoints | None
     stepper: Stepper | None
     nearest: float
+    uneven: float
     lost: float
 
     def at(self, share: float) -> float:
@@ -112,8 +114,8 @@ def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Follo
 
 def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:
     part = min(1.0, _affordable(course, margins) / max(course.steps, 1))
-    flight = "x" in course.prepared.system.states
-    if part < 1 and (flight or not _waypoints(course, part, margins)):
+    passes = "x" in course.prepared.system.states and course.uneven > margins.uneven
+    if part < 1 and (passes or not _waypoints(course, part, margins)):
         part = max(part, min(1.0, margins.all_steps / course.steps))
     found, tight = _follow(course, part, TOLERANCE, margins, go_on)
     spread, steps = found.spread, course.steps
@@ -137,7 +139,7 @@ def _affordable(course: Course, margins: Margins) -> float:
     if dearer is None:
         return course.steps
     budget = margins.share * dearer * course.steps  # in steps of double precision
-    cheap = margins.at_any_rate / course.terms
+    cheap = (margins.at_any_rate if course.own is not None else margins.compiled) / course.terms
     own = budget / (NEIGHBOURS + 1) if course.own is not None else 0.0
     return max(cheap, own, (budget - margins.unrolling) / margins.lane)
 
@@ -171,7 +173,9 @@ def _follow(
         reached = (spread.times[-1] - start) / (course.end - start) if spread.times else 0.0
         return Followed(spread, min(first, reached)), tight
     length = (part - first) / len(waypoints) * (course.end - start)
-    return Followed(spread, first, len(seen), part - first, _more(spread, start + length, seen)), tight
+    least = 1.0 if _same_states(course.prepared) else margins.between_windows
+    more = _more(spread, start + length, seen, least)
+    return Followed(spread, first, len(seen), part - first, more), tight
 
 
 def _prepare(neighbours: Neighbours, steps: float, end: float) -> None:
@@ -181,7 +185,8 @@ def _prepare(neighbours: Neighbours, steps: float, end: float) -> None:
 def _waypoints(course: Course, part: float, margins: Margins) -> list[Waypoint]:
     """Where windows begin; none where the neighbours' states are others than the run's."""
     system = course.prepared.system
-    if course.waypoints is None or system.switches or not _same_states(course.prepared):
+    own = course.own is not None and part * course.steps < UNROLLED_FROM
+    if course.waypoints is None or system.switches or not (own or _same_states(course.prepared)):
         return []
     there = course.waypoints.between(part * course.steps, course.steps)
     count = int(part * course.steps * (1 - margins.beginning) / margins.window)
@@ -208,15 +213,15 @@ def _windows(
     return seen
 
 
-def _more(beginning: Spread, until: float, windows: list[Spread]) -> dict[str, float]:
-    """As of ``Followed``; the beginning as far as to a time."""
+def _more(beginning: Spread, until: float, windows: list[Spread], least: float) -> dict[str, float]:
+    """As of ``Followed``, at least so much; the beginning as far as to a time."""
     last = min(int(np.searchsorted(beginning.times, until)), len(beginning.times) - 1)
     found = {}
     for name in ("rates", "attitude", "position", "velocity"):
         known = max(getattr(beginning, name)[: last + 1])
         grown = [max(getattr(window, name), default=0.0) for window in windows]
         share = np.sqrt(np.mean(np.square(grown))) / known if known > 0 else 1.0
-        found[name] = max(1.0, float(share))
+        found[name] = max(least, float(share))
     return found
 
 

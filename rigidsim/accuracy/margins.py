@@ -23,10 +23,12 @@ class Margins:
         near, very_near: singular factors below which canonical momenta lose more than elsewhere.
         cut_off: of a tolerance, what a step is wrong by in motions with switching surfaces.
         at_any_rate: steps times terms of the equations' decomposition (to which a step's cost is in
-            proportion) that are followed whatever they cost: some 30 ms by the run's own integrator, or by
-            code that is compiled in 25 ms, on a machine that takes 1.9 us for a step of 66 terms.
-        all_steps: that are followed whatever they cost of flights, whose close passages windows would miss,
-            and where there are no windows.
+            proportion) that are followed whatever they cost, by the run's own integrator: some 30 ms on a
+            machine that takes 3 us for a step of 66 terms; ``compiled``: by code that takes 15 to 60 ms to
+            compile.
+        all_steps: that are followed whatever they cost of flights with close passages, which windows would
+            miss, and where there are no windows.
+        uneven: longest step of a flight over its shortest, from which it passes something closely.
         share: of the run's cost that may be spent, where errors grow as those of stable motions do.
         lane: cost of a step of all neighbours, unrolled, over one of the run in double precision;
             ``unrolling``: of compiling that, in such steps.
@@ -35,6 +37,8 @@ class Margins:
         dearer: a step in other precisions than one in double precision, roughly.
         windows: through the rest of the run, at most; ``window``: steps of each at least; ``beginning``:
             part of the steps that are followed from the start on, where there are windows.
+        between_windows: by how much more errors grow at least where states have singularities, which may be
+            passed between windows.
         stable: amplification up to which a motion is as stable as the law of rounding takes it to be.
         wary_power: of time that errors grow with in the beginning, from which ``all_steps`` are followed.
         power, most_power: of time that errors grow with, at least and at most, where no more was followed.
@@ -53,8 +57,10 @@ class Margins:
     near: float = 0.2
     very_near: float = 0.01
     cut_off: float = 0.1
-    at_any_rate: int = 250_000
+    at_any_rate: int = 150_000
+    compiled: int = 75_000
     all_steps: int = 20_000
+    uneven: float = 10.0
     share: float = 0.05
     lane: float = 0.3
     unrolling: float = 1e5
@@ -63,6 +69,7 @@ class Margins:
     windows: int = 16
     window: int = 256
     beginning: float = 0.6
+    between_windows: float = 2.0
     dearer: tuple[tuple[str, float], ...] = (("single", 0.3), ("double", 1.0), ("extended", 10.0))
     stable: float = 4.0
     wary_power: float = 2.0

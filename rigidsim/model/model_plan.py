@@ -52,11 +52,12 @@ class ModelPlan:
         return any(load.wide for load in self.loads)
 
 
-def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
+def plan_model(scene: Scene, extra_loads: Sequence[Load] = (), scaling: Scaling | None = None) -> ModelPlan:
     """Decide on the least system that a scene needs.
 
     Args:
         extra_loads: given from Python, beside those of the config.
+        scaling: where it is known, from another formulation of the same motion; its loads are in order then.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a load that depends on the
@@ -67,9 +68,10 @@ def plan_model(scene: Scene, extra_loads: Sequence[Load] = ()) -> ModelPlan:
     loads: list[Load] = [*UniformGravity.of(scene), *scene.loads]  # type: ignore[list-item]
     requirements = choose_requirements(scene, loads)
     requirements, plane = _planar(scene, loads, requirements)
-    unknown = [load for load in loads if load.amplitude(scene) is None]
-    refuse_odd_loads(scene, requirements, unknown)
-    scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
+    if scaling is None:
+        unknown = [load for load in loads if load.amplitude(scene) is None]
+        refuse_odd_loads(scene, requirements, unknown)
+        scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if requirements.canonical or plane is not None:
         scaling = replace(scaling, rates=(0, 0, 0))
     tags: dict[KeplerOrbit, str] = {}

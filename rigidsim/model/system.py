@@ -287,18 +287,21 @@ class System:
         return self.parameters > 0
 
 
-def build_system(scene: Scene, number: Rounder, extra_loads: Sequence[Load] = ()) -> System:
+def build_system(
+    scene: Scene, number: Rounder, extra_loads: Sequence[Load] = (), scaling: Scaling | None = None
+) -> System:
     """Build the least system that the scene needs.
 
     Args:
         number: from an mpf to the working precision's scalar, rounded once.
         extra_loads: beside those of the config.
+        scaling: where it is known (``plan_model``).
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.
         OverflowError: numbers that neither the states nor the dataset can hold.
     """
-    system = System(plan_model(scene, extra_loads), number)
+    system = System(plan_model(scene, extra_loads, scaling), number)
     attitude = system.mechanics.attitude
     if system.requirements.canonical:
         _refuse_singular_start(scene, attitude)

@@ -67,6 +67,7 @@ class Diagnostics:
             waypoints=waypoints,
             stepper=stepper,
             nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
+            uneven=progress.largest_step / max(progress.smallest_step, 1e-300),
             go_on=go_on,
         )
         return replace(self, estimate=found)

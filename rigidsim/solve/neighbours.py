@@ -19,11 +19,10 @@ from dataclasses import field
 
 import numpy as np
 
-from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
-from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.attitude_chords import attitude_chords
 from rigidsim.solve.lanes import NEIGHBOURS, Lanes, SeriesErrors
 
 _HOPELESS_STEPS = 32_768
@@ -100,18 +99,8 @@ class Pushes:
     clock: float = 0.3
 
 
-def _function(expressions: list[Symbolic], variables: list[Symbolic]) -> Callable[[np.ndarray], np.ndarray]:
-    """Of states (states, lanes); states themselves need not be compiled."""
-    if all(x in variables for x in expressions):
-        places = [variables.index(x) for x in expressions]
-        return lambda states: states[places]
-    compiled = compiled_function(expressions, variables, compact_mode=True, opt_level=0)
-
-    def evaluate(states: np.ndarray) -> np.ndarray:
-        """At one time for all: a frame that turns with time doesn't change how far they are apart."""
-        return compiled(np.ascontiguousarray(states), time=np.zeros(states.shape[1]))
-
-    return evaluate
+def _length(vector: np.ndarray) -> float:
+    return math.sqrt(float(vector @ vector))
 
 
 class Neighbours:
@@ -143,17 +132,19 @@ class Neighbours:
         self._epsilon, self._series = epsilon, series
         names, attitude = system.states, system.mechanics.attitude
         groups: dict[str, tuple[str, ...]] = dict(_GROUPS)
-        self._quaternion: Callable[[np.ndarray], np.ndarray] | None = None
+        self._chords = attitude_chords(system)
         if attitude is not None:
             groups["attitude"] = tuple(attitude.names)
-            self._quaternion = _function(attitude.quaternion, system.variables)
         self._places = {
             group: [names.index(n) for n in members if n in names] for group, members in groups.items()
         }
         grouped = {i for places in self._places.values() for i in places}
         apart = {n for n in names if n in _APART or n.startswith(TANGENT)}
         alone = [[i] for i, n in enumerate(names) if i not in grouped and n not in apart]
-        self._groups = [*filter(None, self._places.values()), *alone]
+        groups_of_places = [*filter(None, self._places.values()), *alone]
+        self._members = np.zeros((len(groups_of_places), len(names)))
+        for row, places in enumerate(groups_of_places):
+            self._members[row, places] = 1.0
         self._felt = np.array([n not in apart for n in names])
         exponents = system.state_exponents
         self._units = np.ldexp(1.0, np.array([exponents[i] for i in self._places["rates"][:3]], np.int32))
@@ -168,9 +159,11 @@ class Neighbours:
         self._random = np.random.default_rng(0)  # the same pushes each time
         self._factor = _FIRST_PUSHES  # distance for one epsilon
         self._largest = np.abs(initial)
+        self._weigh()
         self._time, self.steps = start, 0
         self._pace(end, steps, fewest)
         self._stretch = self._longest
+        self._apart: np.ndarray = np.zeros(NEIGHBOURS)
         self.spread = Spread()
 
     def _pace(self, end: float, steps: float, fewest: float) -> None:
@@ -221,13 +214,13 @@ class Neighbours:
         spread = self.spread
         if not spread.times:
             return False
-        if (spread.rates if self._quaternion is None else spread.attitude)[-1] < lost:
+        if (spread.rates if self._chords is None else spread.attitude)[-1] < lost:
             return False
         return not self._places["position"] or spread.position[-1] * self._epsilon > spread.extent
 
     def _go(self, until: float) -> bool:
         """One stretch, as long as growth allows; False where the motion can't be followed."""
-        before, distances = self._states.copy(), self._distances(self._states)
+        before, distances = self._states.copy(), self._apart
         for _ in range(_MOST_CLOSER):
             time = min(self._time + self._stretch, until)
             if until - time < 0.01 * self._stretch:
@@ -255,13 +248,15 @@ class Neighbours:
         self._time = time
         largest = np.maximum(np.abs(before[:, 0]), np.abs(self._states[:, 0]))
         self._largest = np.maximum(self._largest, largest)
+        self._weigh()
         moved = before[:, 0] != self._states[:, 0]  # what stands still isn't rounded
+        if angles := self._angles:  # which grow, and step control with them
+            self._states[angles] -= self._turn * np.rint(self._states[angles, :1] / self._turn)
         self._push(self._pushes.own * math.sqrt(taken), largest, moved, taken)
-        angles = self._angles  # which grow, and step control with them
-        self._states[angles] -= self._turn * np.rint(self._states[angles, :1] / self._turn)
-        far = float(self._distances(self._states).max())
+        far = float(self._apart.max())
         if far > _LARGEST:
             self._states = self._drawn_in(self._states, _DRAWN_IN * _LARGEST / far)
+            self._apart = _DRAWN_IN * _LARGEST / far * self._apart
         self._note()
         return True
 
@@ -293,6 +288,7 @@ class Neighbours:
             pushed += wrong[:, None] * times
         pushed[~self._felt] = 0.0
         self._states[:, 1:] += self._factor * pushed
+        self._apart = self._distances(self._states)
 
     def _drawn_in(self, states: np.ndarray, factor: float) -> np.ndarray:
         """Neighbours nearer by a factor, in the same directions."""
@@ -304,37 +300,27 @@ class Neighbours:
     def _distances(self, states: np.ndarray) -> np.ndarray:
         """Of each neighbour (neighbours,), relative to the size of what is apart."""
         apart = states[:, 1:] - states[:, :1]
-        found = np.zeros(NEIGHBOURS)
-        for places in self._groups:
-            size = max(float(np.linalg.norm(states[places, 0])), float(self._largest[places].max()))
-            if size > 0:
-                found = np.maximum(found, np.sqrt((apart[places] ** 2).sum(axis=0)) / size)
+        found: np.ndarray = np.sqrt((self._weights @ (apart * apart)).max(axis=0))
         return found
 
+    def _weigh(self) -> None:
+        """Of squared differences in squared distances; states that never moved are none to be near to."""
+        sizes = (self._members * self._largest).max(axis=1, keepdims=True)
+        self._weights = np.where(sizes > 0, self._members / np.maximum(sizes, 1e-150) ** 2, 0.0)
+
     def _note(self) -> None:
-        spread, apart = self.spread, (self._states[:, 1:] - self._states[:, :1]) / self._factor
-
-        def mean(group: str) -> float:
-            places = self._places[group]
-            return float(np.linalg.norm(apart[places])) / math.sqrt(NEIGHBOURS) if places else 0.0
-
+        spread, motion = self.spread, self._states[:, 0]
+        wrong = np.sqrt((((self._states[:, 1:] - motion[:, None]) / self._factor) ** 2).mean(axis=1))
+        places, units = self._places, self._units
+        rates = places["rates"][:3]
+        size = _length(units * motion[rates])
         spread.times.append(self._time)
         spread.steps.append(self.steps)
-        rates, units = self._places["rates"][:3], self._units
-        size = float(np.linalg.norm(units * self._states[rates, 0]))
-        wrong = float(np.linalg.norm(units[:, None] * apart[rates])) / math.sqrt(NEIGHBOURS)
-        spread.rates.append(wrong / size if size > 0 else 0.0)
-        spread.attitude.append(self._turned())
-        spread.position.append(mean("position"))
-        spread.velocity.append(mean("velocity"))
-        here, speed = (self._states[self._places[group], 0] for group in ("position", "velocity"))
-        spread.extent = max(spread.extent, float(np.linalg.norm(here)))
-        spread.fastest = max(spread.fastest, float(np.linalg.norm(speed)))
-
-    def _turned(self) -> float:
-        """Root mean square angle between the neighbours' attitudes and the motion's, in epsilons."""
-        if self._quaternion is None:
-            return 0.0
-        found = self._quaternion(self._states)
-        apart = found[:, 1:] - found[:, :1]
-        return 2 * float(np.linalg.norm(apart)) / self._factor / math.sqrt(NEIGHBOURS)
+        spread.rates.append(_length(units * wrong[rates]) / size if size > 0 else 0.0)
+        turned = 0.0 if self._chords is None else self._chords.between(self._states)
+        spread.attitude.append(turned / self._factor)
+        spread.position.append(_length(wrong[places["position"]]))
+        spread.velocity.append(_length(wrong[places["velocity"]]))
+        if places["position"]:
+            spread.extent = max(spread.extent, _length(motion[places["position"]]))
+            spread.fastest = max(spread.fastest, _length(motion[places["velocity"]]))

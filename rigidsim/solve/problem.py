@@ -264,4 +264,6 @@ def double_twin(prepared: InitialValueProblem) -> System:
     plain = replace(
         prepared.scene, config=config.model_copy(update={"integrator": integrator, "output": output})
     )
-    return build_system(plain, precision_of("double").number, prepared.python_loads)
+    canonical = prepared.system.requirements.canonical  # whose rates are no states and have no scales
+    scaling = None if canonical else prepared.system.scaling
+    return build_system(plain, precision_of("double").number, prepared.python_loads, scaling)

@@ -1,0 +1,77 @@
+"""How far apart the attitudes of nearby states are, without compiling anything where that is possible."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
+from rigidsim.solve.compiled import compiled_function
+
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class AttitudeChords:
+    """Coordinates of an attitude in which small angles are lengths.
+
+    Attributes:
+        of: coordinates (n, lanes) of states (states, lanes).
+        angle: rad for a distance of 1.
+    """
+
+    of: Callable[[np.ndarray], np.ndarray]
+    angle: float
+
+    def between(self, states: np.ndarray) -> float:
+        """Root mean square angle between the attitudes of all lanes but the first and that of the first."""
+        found = self.of(states)
+        apart = found[:, 1:] - found[:, :1]
+        return self.angle * math.sqrt(float((apart**2).sum()) / apart.shape[1])
+
+
+def attitude_chords(system: System) -> AttitudeChords | None:
+    """Those of a system's attitude; None where it carries none.
+
+    A quaternion's chord is half the angle; nine direction cosines differ by its sqrt(2)-fold. Euler angles
+    are turned into a quaternion, what else there is is compiled (40 ms).
+    """
+    attitude, names = system.mechanics.attitude, system.states
+    if attitude is None:
+        return None
+    if all(x in system.variables for x in attitude.quaternion):
+        places = [system.variables.index(x) for x in attitude.quaternion]
+        return AttitudeChords(lambda states: states[places], 2.0)
+    held = [names.index(name) for name in attitude.names] if attitude.orbital is None else []
+    if held and attitude.kind == "rotation_matrix":
+        return AttitudeChords(lambda states: states[held], math.sqrt(0.5))
+    if held and attitude.kind == "euler_angles":
+        return AttitudeChords(lambda states: _quaternion(attitude, states[held]), 2.0)
+    compiled = compiled_function(attitude.quaternion, system.variables, compact_mode=True, opt_level=0)
+
+    def evaluate(states: np.ndarray) -> np.ndarray:
+        """At one time for all: a frame that turns with time doesn't change how far they are apart."""
+        return compiled(np.ascontiguousarray(states), time=np.zeros(states.shape[1]))
+
+    return AttitudeChords(evaluate, 2.0)
+
+
+def _quaternion(attitude: AttitudeStates, angles: np.ndarray) -> np.ndarray:
+    """The product of three turns (4, lanes), about the axes of the sequence in turn."""
+    cosines, sines = np.cos(angles / 2), np.sin(angles / 2)
+    found = np.zeros((4, angles.shape[1]))
+    found[0] = 1.0
+    for axis, c, s in zip(attitude.sequence, cosines, sines, strict=True):
+        n = _AXES.index(axis) + 1
+        following, before = n % 3 + 1, (n + 1) % 3 + 1
+        turned = c * found
+        turned[0] -= s * found[n]
+        turned[n] += s * found[0]
+        turned[following] += s * found[before]
+        turned[before] -= s * found[following]
+        found = turned
+    return found
