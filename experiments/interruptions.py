@@ -146,7 +146,8 @@ class Ending:
         """For the table."""
         if self.cpu is None:
             return f"had ended before (exit {self.code})"
-        return f"{self.cpu:.2f} s CPU, {self.wall:.2f} s wall, exit {self.code}"
+        why = "" if self.code == _INTERRUPTED else f": {self.said.strip()[-200:]}"
+        return f"{self.cpu:.2f} s CPU, {self.wall:.2f} s wall, exit {self.code}{why}"
 
 
 def interrupted(command: Sequence[str], folder: Path, line: str = "", seconds: float = 0.0) -> Ending:
