@@ -12,6 +12,7 @@ from support import same_bits
 
 import rigidsim
 from rigidsim.solve.compiled import Kept, compiled_engine, compiled_function
+from rigidsim.solve.problem import prepare
 
 x, v = hy.make_vars("x", "v")
 PENDULUM = [(x, v), (v, -hy.sin(x))]
@@ -34,6 +35,20 @@ def test_an_engine_of_ones_own_is_as_if_newly_compiled(scalar: Any) -> None:
     assert (first.state == fresh.state).all()
     first.state[:] = 0
     assert (second.state == fresh.state).all()
+
+
+def test_values_and_their_drifts_are_evaluated_once(free_body: Callable[..., str]) -> None:
+    """Momentum, its norm and energy are terms of their drifts: recording them adds nothing to be computed."""
+    system = prepare(rigidsim.parse(free_body())).system
+
+    def terms(outputs: list[Any]) -> int:
+        function = compiled_function(outputs, system.variables)
+        return len(function.dc) - len(system.variables) - len(outputs)
+
+    drifts = len(system.invariants)
+    values = system.outputs[:-drifts]
+    assert terms(values) > 40
+    assert terms(system.outputs) == terms(system.outputs[-drifts:])
 
 
 def test_functions_are_told_apart_by_the_sign_of_a_zero() -> None:
