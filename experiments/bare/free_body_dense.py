@@ -1,9 +1,10 @@
 """A free asymmetric body, many samples: rates, attitude, momentum, energy and their drifts by compiled
 functions, written by h5py with its shuffle and gzip filters.
 
-python free_body_dense.py OUT.h5 END SAMPLES [extended]
+python free_body_dense.py OUT.h5 END SAMPLES [extended [TOLERANCE]]
 
-With "extended" in 80-bit arithmetic, each value as the nearest double and what that leaves over.
+With "extended" in 80-bit arithmetic, each value as the nearest double and what that leaves over. The
+tolerance is heyoka's own (the type's epsilon) unless another is given.
 """
 
 import json
@@ -31,7 +32,8 @@ equations = [
     (qz, 0.5 * (qw * wz + qx * wy - qy * wx)),
 ]
 start = [number(1) / 10, number(1), number(1) / 20, number(1), number(0), number(0), number(0)]
-integrator = hy.taylor_adaptive(equations, start, fp_type=number)
+options = {"tol": number(sys.argv[5])} if len(sys.argv) > 5 else {}
+integrator = hy.taylor_adaptive(equations, start, fp_type=number, **options)
 times = np.arange(samples).astype(number) * number(end) / number(samples - 1)
 states = integrator.propagate_grid(times)[-1]
 

@@ -13,6 +13,7 @@ from experiments.benchmark import Result
 from experiments.benchmarking.rows import rows
 
 _PEERS = "left out"
+_PLAIN = ("sparse", "dense", "timeline", "extended", "extended_alike", "warm")
 
 
 def test_bounds_are_kept_or_not() -> None:
@@ -43,7 +44,7 @@ def test_every_row_gives_a_number(tmp_path: Path, capsys: pytest.CaptureFixture[
         if key.startswith("satellite") and _PEERS in result["note"]:
             continue
         assert 0.01 < result["ratio"] < 100, key
-        assert bool(result["estimated"]) == (key in ("sparse", "dense", "timeline", "extended", "warm"))
+        assert bool(result["estimated"]) == (key in _PLAIN)
     # a thousand seconds near the intermediate axis: errors grow to some thousand roundings (bounds: 2^16)
     for key, epsilon in (("dense", 2.0**-52), ("extended", 2.0**-63)):
         differences = found[key]["differences"]
