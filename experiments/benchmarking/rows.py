@@ -156,7 +156,7 @@ def rows(*, quick: bool) -> list[Row]:
             extended.run, extended.script("free_body_dense.py"), dataset=True,
         ),
         Row(
-            "extended_alike", f"80-bit, {_span(extended)}", "it at the tolerance of rigidsim", 1.02,
+            "extended_alike", f"80-bit, {_span(extended)}", "that script at the tolerance of rigidsim", 1.02,
             extended.run, extended.script("free_body_dense.py", _EXTENDED_TOLERANCE), dataset=True,
         ),
         Row(
