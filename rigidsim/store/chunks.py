@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -44,20 +44,21 @@ class Compressor:
         self._pool: ThreadPoolExecutor | None = None
         self._numbers = 0
 
-    def packed(self, values: np.ndarray) -> Future[bytes]:
-        """A whole chunk as it stands in a file, now or later.
+    def packed(self, chunks: Sequence[np.ndarray]) -> list[Future[bytes]]:
+        """Whole chunks as they stand in a file, now or later.
 
         Args:
-            values: not to be changed from now on.
+            chunks: one piece of work, best of some hundred kB; not to be changed from now on.
         """
-        self._numbers += values.size
+        done: list[Future[bytes]] = [Future() for _ in chunks]
+        self._numbers += sum(chunk.size for chunk in chunks)
         if self._pool is None and self._numbers > _FEWEST_FOR_THREADS:
             threads = min(_MOST_THREADS, _processors())
-            self._pool = ThreadPoolExecutor(threads, "rigidsim-chunks") if threads > 1 else None
+            self._pool = ThreadPoolExecutor(threads, "rigidsim-chunks") if threads else None
         if self._pool is not None:
-            return self._pool.submit(packed, values)
-        done: Future[bytes] = Future()
-        done.set_result(packed(values))
+            self._pool.submit(_pack, chunks, done)
+        else:
+            _pack(chunks, done)
         return done
 
     def close(self) -> None:
@@ -65,6 +66,14 @@ class Compressor:
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
             self._pool, self._numbers = None, 0
+
+
+def _pack(chunks: Sequence[np.ndarray], done: Sequence[Future[bytes]]) -> None:
+    for chunk, future in zip(chunks, done, strict=True):
+        try:
+            future.set_result(packed(chunk))
+        except BaseException as error:  # raised where the result is asked for
+            future.set_exception(error)
 
 
 class ChunkWriter:
@@ -81,7 +90,7 @@ class ChunkWriter:
             place: of its first number.
             values: not to be changed from now on.
         """
-        self._waiting.append((target, place, self._compressor.packed(values)))
+        self._waiting.append((target, place, *self._compressor.packed([values])))
         while self._waiting and (len(self._waiting) > _MOST_WAITING or self._waiting[0][2].done()):
             self._write_next()
 
@@ -96,7 +105,10 @@ class ChunkWriter:
 
 
 def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Those that aren't busy of late: beside other work threads save no time and cost a fifth more of it."""
+    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    return max(0, round(there - busy))
 
 
 class RowCutter:

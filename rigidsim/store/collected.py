@@ -51,10 +51,14 @@ class CollectedRows:
         if not self._fitting:
             self._blocks.append(block)
             return
+        full: list[tuple[str, np.ndarray]] = []
         for variable in self._variables:
             for name, values in zip(variable.part_names(), block[variable.name], strict=True):
-                for chunk in self._cutters[name].cut(values):
-                    self._packed[name].append(self._compressor.packed(chunk))
+                full += [(name, chunk) for chunk in self._cutters[name].cut(values)]
+        if full:
+            packed = self._compressor.packed([chunk for _, chunk in full])
+            for (name, _), content in zip(full, packed, strict=True):
+                self._packed[name].append(content)
 
     def write(self, created: Created) -> None:
         """Write them into a segment whose variables were declared for as many, compressed or not."""
@@ -70,9 +74,10 @@ class CollectedRows:
                     write_rows(created[name], 0, values)
 
     def _write_chunks(self, created: Created) -> None:
-        last = {}
-        for name, cutter in self._cutters.items():
-            last[name] = [self._compressor.packed(cutter.last.copy())] if cutter.filled else []
+        last = {
+            name: self._compressor.packed([cutter.last.copy()] if cutter.filled else [])
+            for name, cutter in self._cutters.items()
+        }
         for name, cutter in self._cutters.items():
             beside = (0,) * (cutter.last.ndim - 1)
             for number, chunk in enumerate(self._packed[name] + last[name]):

@@ -278,11 +278,11 @@ def test_a_dense_run_saves_whole_chunks_and_resumes_from_there(
     flush = SegmentWriter.flush
 
     def killed(self: SegmentWriter, *given: Any) -> None:
-        if self.count == 2:
+        if self.count == 1:
             raise RunFolderError("killed")
         flush(self, *given)
 
-    tuning = Tuning(segments=SegmentLimits(bytes=2_000_000))
+    tuning = Tuning(Pacing(rows_waiting=netcdf.CHUNK_ROWS), SegmentLimits(bytes=2_000_000))
     with monkeypatch.context() as patch:
         patch.setattr(SegmentWriter, "flush", killed)
         with pytest.raises(RunFolderError, match="killed"):
