@@ -324,12 +324,8 @@ def draw(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Expon
                   label="shortest axis", linewidth=1)  # fmt: skip
     tilt.semilogy(time, np.degrees(np.arctan2(np.hypot(*spin[:, :2].T), spin[:, 2])), color=ORANGE,
                   label="axis of rotation", linewidth=1)  # fmt: skip
-    tidy(
-        tilt,
-        "time (revolutions)",
-        "angle from the orbit's normal (deg)",
-        "A tilt of 0.01 rad doesn't stay one",
-    )
+    tidy(tilt, "time (revolutions)", "angle from the orbit's normal (deg)",
+         "A tilt of 0.01 rad doesn't stay one")  # fmt: skip
     tilt.legend(loc="lower right", fontsize=9)
     longitude, latitude = np.degrees(np.arctan2(spin[:, 1], spin[:, 0])), np.degrees(np.arcsin(spin[:, 2]))
     points = sky.scatter(longitude, latitude, c=time, s=2.5, cmap="viridis")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -18,15 +19,13 @@ import rigidsim.workflows.read  # noqa: F401  (tests that read configs below nee
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
-    """What is marked ``compact`` compiles in a tenth of the time to code that rounds otherwise: for
-    statements that hold whatever the last bit is.
+    """Tests run in code that compiles fast and rounds otherwise than that of real runs, since their
+    statements hold whatever the last bit is; those marked ``optimised`` in the code of real runs.
     """
-    marker = item.get_closest_marker("compact")
-    if marker is None or marker.args == (False,):
-        return (yield)
-    from support import compact_code
+    from support import remembered_lookups, unoptimised_code
 
-    with compact_code():
+    optimised = item.get_closest_marker("optimised") is not None
+    with remembered_lookups(), nullcontext() if optimised else unoptimised_code():
         return (yield)
 
 

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import heyoka as hy
 import numpy as np
 import pytest
 import xarray
 
 import rigidsim
-from rigidsim.accuracy import error_law
 from rigidsim.accuracy.comparison import angles_between  # noqa: F401  (for the tests)
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import Trial, try_setting
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve import precision, problem, projection
+from rigidsim.solve import compiled
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
@@ -47,16 +46,26 @@ EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadru
 
 def run_text(
     text: str,
-    out: Path,
-    *overrides: str,
+    *given: str | Path,
+    out: Path | None = None,
     timeline: bool = False,
     estimate: bool = False,
     tuning: Tuning | None = None,
-) -> rigidsim.SavedRun:
-    """Run a config text, without drawing, and without estimating its errors, unless asked for."""
+) -> rigidsim.Run:
+    """Run a config text, without drawing, and without estimating its errors, unless asked for; in memory
+    unless a folder is given, since to open a dataset takes longer than most runs.
+
+    Args:
+        given: overrides; a folder among them is ``out``.
+        out: where it is saved.
+    """
+    overrides = [x for x in given if isinstance(x, str)]
+    out = next((x for x in given if isinstance(x, Path)), out)
     asked = {"timeline": timeline, "estimate": estimate}
     settings = [*(f"output.{key}={str(value).lower()}" for key, value in asked.items()), *overrides]
-    return rigidsim.run(rigidsim.parse(text, overrides=settings), out=out, force=True, tuning=tuning)
+    return rigidsim.run(
+        rigidsim.parse(text, overrides=settings), out=out, force=out is not None, tuning=tuning
+    )
 
 
 run_estimated = partial(run_text, estimate=True)
@@ -115,15 +124,57 @@ def amplification(experiment: rigidsim.Experiment, points: int = 120) -> float:
 
 
 @contextmanager
-def compact_code() -> Iterator[None]:
-    """Everything is compiled in heyoka's compact mode, as in trials; see the marker ``compact``."""
+def unoptimised_code() -> Iterator[None]:
+    """What heyoka compiles isn't optimised, which takes a tenth of the time and rounds otherwise."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hy, "taylor_adaptive", _unoptimised(hy.taylor_adaptive, most=500))
+        patch.setattr(hy, "cfunc", _unoptimised(hy.cfunc, most=2000))
+        patch.setattr(compiled, "_functions", _FUNCTIONS)
+        patch.setattr(compiled, "_engines", _ENGINES)
+        yield
 
-    def compactly(name: str | int) -> precision.Precision:
-        return replace(precision.precision_of(name), compact=True)
+
+# in a store of their own: the descriptions don't tell such code from others
+_FUNCTIONS: compiled.Kept[Any] = compiled.Kept(32)
+_ENGINES: compiled.Kept[Any] = compiled.Kept(8)
+
+
+def _unoptimised(make: Callable[..., Any], most: int) -> Callable[..., Any]:
+    """Unrolled in machine numbers of at most so many operations, else compact: what is quicker to have.
+
+    Measured, compilation and 1000 steps, s: a top in double precision 0.05 + 0.01 unrolled, 0.02 + 0.03
+    compact, 0.09 + 0.02 compact and optimised; with its 49 variations 0.9 + 0.1, 0.07 + 0.25, and 0.15 + 0.05
+    at the first level of optimisation, which is what such long systems get.
+    """
+
+    def made(expressions: Any, *args: Any, **options: Any) -> Any:
+        right = [e[1] if isinstance(e, tuple) else e for e in getattr(expressions, "sys", expressions)]
+        machine = options.get("fp_type", float) in (float, np.float32)
+        small = machine and sum(map(len, right)) <= most
+        options["opt_level"] = int(make.__name__ == "taylor_adaptive" and len(right) > 20)
+        return make(expressions, *args, **{**options, "compact_mode": not small})
+
+    return made
+
+
+@contextmanager
+def remembered_lookups() -> Iterator[None]:
+    """h5netcdf looks each variable up in its file whenever it is touched, 600 times to open a small dataset,
+    which takes longer than most runs of the tests: here what was found is kept as long as its file is open.
+    """
+
+    def found(self: Any) -> Any:
+        if getattr(self, "_phony", False):
+            return None
+        file = self._root._h5file
+        kept = self.__dict__.get("_kept")
+        if kept is None or kept[0] is not file or not kept[1]:
+            kept = self.__dict__["_kept"] = file, file[self._h5path]
+        return kept[1]
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (problem, projection, error_law):
-            patch.setattr(module, "precision_of", compactly)
+        for kind in (h5netcdf.core.BaseObject, h5netcdf.dimensions.Dimension):
+            patch.setattr(kind, "_h5ds", property(found))
         yield
 
 

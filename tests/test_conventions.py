@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import rigidsim
 from rigidsim.scene import attitude
+from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.schema import EULER_SEQUENCES
 
 PAGE = (Path(__file__).parents[1] / "docs" / "conventions.md").read_text(encoding="utf-8")
 ANGLES = [0.4, 1.1, -2.3]

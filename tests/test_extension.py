@@ -90,7 +90,7 @@ def test_a_load_with_fields_is_usable_in_a_config(runs: Path) -> None:
     expected = (np.cross(moments * w, w) + torque) / moments
     np.testing.assert_allclose(rates, expected, rtol=0, atol=CLOSE * STIFFNESS)
 
-    run = run_text(text, runs)
+    run = run_text(text, out=runs)
     row = run.summary["invariants"]["energy"]
     assert 0 < row["largest_drift"] <= row["bound"]
     assert "angular_momentum" not in run.summary["invariants"]
@@ -143,13 +143,13 @@ TRANSVERSE = Observable(
 )  # fmt: skip
 
 
-def test_an_observable_is_recorded_by_its_name(runs: Path) -> None:
+def test_an_observable_is_recorded_by_its_name() -> None:
     with pytest.raises(ConfigError, match="transverse_rate_squared"):
         prepare(rigidsim.parse(config(output='record = ["transverse_rate_squared"]')))
     register_observable(TRANSVERSE)
-    assert "transverse_rate_squared" not in run_text(config(), runs).dataset  # only where it is named
+    assert "transverse_rate_squared" not in run_text(config()).dataset  # only where it is named
     named = config(output='record = ["angular_velocity", "transverse_rate_squared"]')
-    dataset = run_text(named, runs).dataset
+    dataset = run_text(named).dataset
     found = dataset["transverse_rate_squared"]
     assert found.attrs["units"] == "rad2 s-2"
     assert found.attrs["long_name"] == "square of the rate across the body's z axis"
@@ -159,13 +159,13 @@ def test_an_observable_is_recorded_by_its_name(runs: Path) -> None:
     np.testing.assert_allclose(found.values, rates[:, 0] ** 2 + rates[:, 1] ** 2, rtol=8 * 2.0**-53)
 
 
-def test_its_residuals_are_recorded_in_extended_precision(runs: Path) -> None:
+def test_its_residuals_are_recorded_in_extended_precision() -> None:
     register_observable(TRANSVERSE)
     text = config(
         integrator='precision = "extended"',
         output='record = ["angular_velocity", "transverse_rate_squared"]',
     )
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     assert np.any(dataset["transverse_rate_squared_lo"].values != 0)
     rates = wide(dataset, "angular_velocity")
     exact = rates[:, 0] ** 2 + rates[:, 1] ** 2

@@ -21,6 +21,8 @@ import pytest
 
 import rigidsim
 
+pytestmark = pytest.mark.optimised
+
 CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
 FILE = Path(__file__).parent / "data" / "fingerprints.json"
 ALLOWED = 1e-12

@@ -186,8 +186,8 @@ record = ["quaternion"]
 
 def needle_error(out: Path, end: str) -> float:
     text = NEEDLE.format(end=end)
-    ours = run_text(text, out, 'name="double"')
-    exact = run_text(text, out, 'name="extended"', 'integrator.precision="extended"')
+    ours = run_text(text, 'name="double"')
+    exact = run_text(text, 'name="extended"', 'integrator.precision="extended"')
     quaternions = ours.dataset["quaternion"].values.astype(np.longdouble)
     return float(angle_between(quaternions, wide(exact.dataset, "quaternion")).max())
 
@@ -204,7 +204,7 @@ def test_needle_top_over_a_second(runs: Path) -> None:
 
 
 @pytest.mark.parametrize(("inertia", "rate"), [(600, 0), (-600, 0), (0, 27), (0, -27), (-600, 27)])
-def test_scaling_a_scene_by_powers_of_two_changes_no_bit(inertia: int, rate: int, runs: Path) -> None:
+def test_scaling_a_scene_by_powers_of_two_changes_no_bit(inertia: int, rate: int) -> None:
     def scene(name: str, i: int, w: int) -> rigidsim.Run:
         text = f"""
         name = "{name}"
@@ -216,7 +216,7 @@ def test_scaling_a_scene_by_powers_of_two_changes_no_bit(inertia: int, rate: int
         end = "{_scaled(1000, 1, -w)}"
         samples = 101
         """
-        return run_text(text, runs)
+        return run_text(text)
 
     plain, scaled = scene("plain", 0, 0).dataset, scene("scaled", inertia, rate).dataset
     assert np.array_equal(scaled["quaternion"], plain["quaternion"])
@@ -231,7 +231,7 @@ def _scaled(numerator: int, denominator: int, exponent: int) -> str:
     return f"{numerator}/{denominator * 2**-exponent}"
 
 
-def test_kilometres_and_days_are_as_good_as_metres_and_seconds(runs: Path) -> None:
+def test_kilometres_and_days_are_as_good_as_metres_and_seconds() -> None:
     metres = """
     name = "metres"
     [body]
@@ -250,7 +250,7 @@ def test_kilometres_and_days_are_as_good_as_metres_and_seconds(runs: Path) -> No
         .replace('["1/86400", "2/86400", "3/86400"]', '["1 rad/day", "2 rad/day", "3 rad/day"]')
         .replace("8640000", '"100 day"')
     )
-    same_bits(run_text(metres, runs), run_text(days, runs))
+    same_bits(run_text(metres), run_text(days))
 
 
 def test_mars_precesses_under_the_sun_as_measured(runs: Path) -> None:

@@ -14,12 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from rigidsim.analysis.exponentials import Complexes, Grid, Reals, Sum, blocks
-from rigidsim.analysis.windows import Spectrum, hann, moments, peak, positions, spectrum
+from rigidsim.analysis.exponentials import Reals, Sum
+from rigidsim.analysis.refinement import Samples, error_growth, mirrored, refined, remainder
+from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
 from rigidsim.scene.records import dataclass
 
 _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
@@ -28,33 +28,7 @@ _NEAREST = 1.0  # bins between lines that can be told apart
 _MOST_CANDIDATES = 40  # peaks that may be no lines, before there are none
 _CLOSEST = 0.6  # bins to which they may move
 _STEPS = 3  # of Newton's method after each new line
-_MOST_STEPS = 25
 _HIGHEST_ORDER = 10
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Equidistant samples of a signal, from sample numbers.
-
-    Attributes:
-        parts: real and imaginary parts, (n,) float64; the value is the sum over the list.
-        real: whether imaginary parts are zero by nature.
-        bits: of the precision.
-        context: mpmath context with more digits than that.
-        late: by how much of a spacing samples are later than equidistant ones, (n,): times are rounded, in a
-            pattern that would show up as lines.
-    """
-
-    parts: tuple[tuple[Reals, Reals], ...]
-    real: bool
-    bits: int
-    context: Any
-    late: Reals | None = None
-
-    @property
-    def count(self) -> int:
-        """How many."""
-        return len(self.parts[0][0])
 
 
 @dataclass(frozen=True)
@@ -227,119 +201,6 @@ class _Search:
         self.total = refined(self.samples, self.total, self.order, steps=_STEPS)
 
 
-def mirrored(total: Sum, real: bool) -> Sum:
-    """With the mirror images of a real signal's lines."""
-    if not real:
-        return total
-    context = total.context
-    return replace(
-        total,
-        frequencies=(*total.frequencies, *(-f for f in total.frequencies)),
-        amplitudes=(*total.amplitudes, *(context.conj(a) for a in total.amplitudes)),
-    )
-
-
-def remainder(samples: Samples, total: Sum) -> Complexes:
-    """What is left of a signal, in double precision."""
-    whole = mirrored(total, samples.real)
-    left = whole.left_of(samples.parts, samples.bits)
-    if samples.late is not None and samples.bits <= 53 and (whole.frequencies or whole.polynomial):
-        left = left - samples.late * whole.slope().values()
-    return np.asarray(left.real + 0j if samples.real else left, dtype=np.complex128)
-
-
-def refined(samples: Samples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
-    """Newton's method from where a sum is, as long as it gains."""
-    if not total.frequencies and not total.polynomial:
-        return total
-    last = math.inf
-    for _ in range(steps):
-        left = remainder(samples, total)
-        change, moved, size = _step(samples, total, left, order)
-        if not size < 0.7 * last and steps == _MOST_STEPS and last < 1e-3:
-            break  # the last step was rounding already
-        total, last = moved, size
-        if change == 0:
-            break
-    return total
-
-
-def _step(samples: Samples, total: Sum, left: Complexes, order: int) -> tuple[float, Sum, float]:
-    """The largest change of an amplitude, the sum after the step, and the step's size over the signal's."""
-    context, count = total.context, total.count
-    whole = mirrored(total, samples.real)
-    lines, powers = len(whole.frequencies), len(whole.polynomial)
-    right = _products(whole, left, order)
-    matrix = _gram(whole, order)
-    found = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
-    polynomial = found[:powers]
-    change, turning = found[powers : powers + lines], found[powers + lines :]
-    own = lines // 2 if samples.real else lines
-    frequencies, amplitudes = [], []
-    for k in range(own):
-        amplitude = complex(whole.amplitudes[k])
-        # a exp(i pi D x), D in bins: the change with D is i pi x a exp(...)
-        shift = (turning[k] / amplitude).imag / math.pi if amplitude else 0.0
-        shift = float(np.clip(shift, -0.5, 0.5))
-        frequencies.append(total.frequencies[k] + context.mpf(shift) / count)
-        amplitudes.append(total.amplitudes[k] + context.mpc(complex(change[k])))
-    coefficients = [
-        c + context.mpc(complex(x.real if samples.real else x))
-        for c, x in zip(total.polynomial, polynomial, strict=True)
-    ]
-    largest = max([abs(complex(a)) for a in (*amplitudes, *coefficients)], default=0.0)
-    size = float(np.max(np.abs(found), initial=0.0))
-    moved = replace(
-        total,
-        polynomial=tuple(coefficients),
-        frequencies=tuple(frequencies),
-        amplitudes=tuple(amplitudes),
-    )
-    return size, moved, size / largest if largest else 0.0
-
-
-def _products(total: Sum, left: Complexes, order: int) -> Complexes:
-    """Windowed means of a remainder times powers of x, conj(exp(i w t)) and x conj(exp(i w t))."""
-    count = total.count
-    x = positions(count)
-    weighted = left * hann(count, order) / count
-    powers = [np.sum(weighted * x**m) for m in range(len(total.polynomial))]
-    if not total.frequencies:
-        return np.array(powers, dtype=np.complex128)
-    first, within = Grid(count).tables(total.frequencies)
-    inner = [
-        np.sum(np.conj(first) * (blocks(values) @ np.conj(within)), axis=0)
-        for values in (weighted, weighted * x)
-    ]
-    return np.concatenate([np.array(powers, dtype=np.complex128), *inner])
-
-
-def _gram(total: Sum, order: int) -> Complexes:
-    """Windowed means of the products of all columns, nearly: what it lacks the next step mends."""
-    count = total.count
-    places = np.array([float(f) for f in total.frequencies]) * count
-    powers, lines = len(total.polynomial), len(places)
-    places = np.concatenate([np.zeros(powers), places, places])
-    raised = np.concatenate([np.arange(powers), np.zeros(lines, int), np.ones(lines, int)])
-    distance = places[None, :] - places[:, None]
-    distance = (distance + count / 2) % count - count / 2
-    power = raised[None, :] + raised[:, None]
-    matrix = np.zeros(distance.shape, dtype=np.complex128)
-    for m in np.unique(power):
-        chosen = power == m
-        matrix[chosen] = moments(order, int(m), distance[chosen])
-    return matrix
-
-
-def _growth(total: Sum, order: int) -> Reals:
-    """By how much the error of each column's factor is larger than if it stood alone."""
-    matrix = _gram(total, order)
-    if not len(matrix):
-        return np.empty(0)
-    inverse = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
-    return np.sqrt(np.maximum(np.diag(inverse).real * np.diag(matrix).real, 1.0))
-
-
 def _judged(samples: Samples, total: Sum, order: int, search: _Search) -> Found:
     """With errors from what is left."""
     left = remainder(samples, total)
@@ -355,7 +216,7 @@ def _judged(samples: Samples, total: Sum, order: int, search: _Search) -> Found:
         return math.sqrt(float(np.mean(near**2))) if len(near) else float(found.sizes.max())
 
     # neighbours that are hard to tell apart make errors grow
-    growth = _growth(mirrored(total, samples.real), order)
+    growth = error_growth(mirrored(total, samples.real), order)
     powers, lines = len(total.polynomial), len(total.frequencies) * (2 if samples.real else 1)
     frequency_errors, amplitude_errors = [], []
     for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):

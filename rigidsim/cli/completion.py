@@ -47,8 +47,8 @@ def _keys(prefix: str, table: type[BaseModel]) -> Iterator[tuple[str, Any]]:
 
 
 def _values(key: str, annotation: Any) -> list[str]:
+    from rigidsim.scene.fields import EULER_SEQUENCES
     from rigidsim.scene.presets import PRESETS
-    from rigidsim.scene.schema import EULER_SEQUENCES
     from rigidsim.scene.shapes import SHAPES
 
     if key == "body.preset":

@@ -12,12 +12,13 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
+from rigidsim.scene.body_table import POINT_OR_NAME
 from rigidsim.scene.frame_table import PLANE_OR_NORMAL
 from rigidsim.scene.overrides import FLAG, apply_overrides, written
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LOAD_KINDS
-from rigidsim.scene.schema import POINT_OR_NAME, Config, config_model
+from rigidsim.scene.schema import Config, config_model
 from rigidsim.scene.toml_text import long_integers, parse_toml
 
 Overrides = Sequence[str] | Mapping[str, Any]

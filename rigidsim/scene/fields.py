@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    StrictStr,
+    WithJsonSchema,
+)
 from pydantic_core import PydanticCustomError
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
@@ -124,3 +133,22 @@ class ConfigTable(BaseModel):
     """A TOML table: unknown keys are errors, values never change after reading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True)
+
+
+EULER_SEQUENCES = tuple(
+    first + second + third
+    for first in "xyz"
+    for second in "xyz"
+    for third in "xyz"
+    if first != second != third
+)
+"""Axes of intrinsic rotations, one after the other."""
+
+
+def _sequence(value: str | None) -> str | None:
+    if value is not None and value not in EULER_SEQUENCES:
+        raise refuse(f"given {shown(value)}; allowed: {', '.join(EULER_SEQUENCES)} (intrinsic)")
+    return value
+
+
+EulerSequence = Annotated[StrictStr, AfterValidator(_sequence)]

@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal, Union
 
 from pydantic import (
-    AfterValidator,
-    Discriminator,
     Field,
     StrictBool,
     StrictInt,
     StrictStr,
-    Tag,
     create_model,
     field_validator,
     model_validator,
 )
 
+from rigidsim.scene.body_table import Body
 from rigidsim.scene.exact import ZERO, parse_number
 from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
 from rigidsim.scene.fields import (
@@ -30,11 +28,10 @@ from rigidsim.scene.fields import (
     AnyQuantity,
     ConfigTable,
     Dimensionless,
+    EulerSequence,
     Four,
     Instant,
-    Kilogram,
     Metre,
-    Moment,
     Momentum,
     Rate,
     Second,
@@ -45,7 +42,6 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.frame_table import Frame
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
-from rigidsim.scene.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.sweep_table import SweepTable
 from rigidsim.scene.validation_messages import nearest, shown
 
@@ -55,98 +51,6 @@ LARGEST_DIGITS = 250
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
 FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar")
 STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
-EULER_SEQUENCES = tuple(
-    first + second + third
-    for first in "xyz"
-    for second in "xyz"
-    for third in "xyz"
-    if first != second != third
-)
-
-
-POINT_OR_NAME = ("as a name", "as a point")
-"""Names of the alternatives of ``[body] reference``."""
-
-
-def _kind_of_reference(value: Any) -> str | None:
-    if isinstance(value, str):
-        return POINT_OR_NAME[0]
-    return POINT_OR_NAME[1] if isinstance(value, list) else None
-
-
-class PointMass(ConfigTable):
-    """One particle of a body of particles."""
-
-    mass: Kilogram
-    position: Triple[Metre]
-
-
-class _Shaped(ConfigTable):
-    shape: StrictStr | None = None
-
-    @field_validator("shape")
-    @classmethod
-    def _known_shape(cls, value: str | None) -> str | None:
-        if value is not None and value not in SHAPES:
-            raise refuse(f"given {shown(value)}{nearest(value, SHAPES)}; allowed: {', '.join(SHAPES)}")
-        return value
-
-
-if TYPE_CHECKING:
-    Solid = _Shaped
-else:
-    Solid = create_model(
-        "Solid",
-        __base__=_Shaped,
-        __doc__="A homogeneous shape with its dimensions (metres); see ``shapes.SHAPES`` for which it takes.",
-        **{key: ((list[Metre] if count > 1 else Metre) | None, None) for key, count in DIMENSIONS.items()},
-    )
-
-
-def _sequence(value: str | None) -> str | None:
-    if value is not None and value not in EULER_SEQUENCES:
-        raise refuse(f"given {shown(value)}; allowed: {', '.join(EULER_SEQUENCES)} (intrinsic)")
-    return value
-
-
-EulerSequence = Annotated[StrictStr, AfterValidator(_sequence)]
-
-
-class Part(Solid):
-    """One solid of a composite body, placed by its centre of mass, turned by a quaternion or Euler angles."""
-
-    shape: StrictStr
-    mass: Kilogram
-    position: Triple[Metre] = Field(default_factory=lambda: [ZERO] * 3)
-    quaternion: Four[Dimensionless] | None = None
-    euler_angles: Triple[Angle] | None = None
-    euler_sequence: EulerSequence | None = Field(
-        default=None, description="of euler_angles; that of [integrator] by default"
-    )
-
-
-class Body(Solid):
-    """``[body]``: exactly one source of inertia, and what loads need beside it."""
-
-    principal_moments: Triple[Moment] | None = None
-    inertia_tensor: Triple[Triple[Moment]] | None = None
-    points: Annotated[list[PointMass], Field(min_length=1)] | None = None
-    parts: Annotated[list[Part], Field(min_length=1)] | None = None
-    preset: StrictStr | None = None
-    mass: Kilogram | None = None
-    center_of_mass: Triple[Metre] | None = None
-    reference: (
-        Annotated[
-            Annotated[StrictStr, Tag(POINT_OR_NAME[0])] | Annotated[Triple[Metre], Tag(POINT_OR_NAME[1])],
-            Discriminator(
-                _kind_of_reference,
-                custom_error_type="kind_of_value",
-                custom_error_message='"center_of_mass", a landmark of the shape such as "corner", or a point '
-                "[x, y, z] is allowed",
-            ),
-        ]
-        | None
-    ) = None
 
 
 class Initial(ConfigTable):

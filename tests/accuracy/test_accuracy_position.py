@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import config
@@ -12,8 +10,6 @@ from support import run_estimated as run_text
 import rigidsim
 from rigidsim.accuracy.choice import wanted
 from rigidsim.errors import ConfigError
-
-pytestmark = pytest.mark.compact
 
 ATTRACTORS = config(
     "principal_moments = [1, 1.3, 1.6]\nmass = 1",
@@ -26,13 +22,13 @@ ATTRACTORS = config(
 )
 
 
-def test_the_path_is_certified_and_right(runs: Path) -> None:
-    run = run_text(ATTRACTORS, runs, "integrator.accuracy_position=1e-6")
+def test_the_path_is_certified_and_right() -> None:
+    run = run_text(ATTRACTORS, "integrator.accuracy_position=1e-6")
     accuracy = run.summary["accuracy"]
     assert not run.summary["warnings"]
     assert accuracy["requested"] is None
     assert accuracy["certified_position"] <= accuracy["requested_position"] == 1e-6
-    better = run_text(ATTRACTORS, runs, 'integrator.precision="extended"', 'name="better"')
+    better = run_text(ATTRACTORS, 'integrator.precision="extended"', 'name="better"')
     with run.dataset as ours, better.dataset as theirs:
         off = np.linalg.norm(ours["position"].values - theirs["position"].values, axis=1).max()
     assert off <= accuracy["certified_position"]
@@ -46,15 +42,15 @@ def test_the_stricter_of_both_accuracies_is_chosen_for() -> None:
     assert wanted(rigidsim.parse(ATTRACTORS)) is None
 
 
-def test_what_a_fixed_setting_misses_is_said(runs: Path) -> None:
+def test_what_a_fixed_setting_misses_is_said() -> None:
     fixed = ['integrator.precision="double"', "integrator.tolerance=1e-4", 'integrator.method="taylor"']
-    run = run_text(ATTRACTORS, runs, "integrator.accuracy_position=1e-12", *fixed)
+    run = run_text(ATTRACTORS, "integrator.accuracy_position=1e-12", *fixed)
     assert "not_certified" in run.summary["warning_codes"]
     assert any("accuracy_position = 1e-12 m was asked for" in text for text in run.summary["warnings"])
 
 
-def test_a_scene_without_a_path_refuses_an_accuracy_of_it(runs: Path) -> None:
+def test_a_scene_without_a_path_refuses_an_accuracy_of_it() -> None:
     with pytest.raises(ConfigError, match="the scene has no position"):
-        run_text(config(), runs, "integrator.accuracy_position=1e-6")
+        run_text(config(), "integrator.accuracy_position=1e-6")
     with pytest.raises(ConfigError, match="a length above 0"):
         rigidsim.parse(ATTRACTORS, overrides=["integrator.accuracy_position=0"])

@@ -25,8 +25,6 @@ from rigidsim.accuracy.trial import try_setting
 from rigidsim.errors import ConfigError
 from rigidsim.model.loads import LoadModel
 
-pytestmark = pytest.mark.compact
-
 FREE = """name = "free"
 [body]
 principal_moments = [1, 2, 2.5]

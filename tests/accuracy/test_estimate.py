@@ -18,8 +18,6 @@ from rigidsim.accuracy.trial import try_setting
 from rigidsim.solve.problem import prepare
 from rigidsim.store.variables import parts_in
 
-pytestmark = pytest.mark.compact
-
 COVERED = 3.0  # the campaign's measure (experiments/error_coverage.py): true at most 3 times the announced
 HONEST = 100.0  # and no scene of these is announced a hundred times as wrong as it is
 
@@ -63,9 +61,9 @@ COMET = config(
 )
 
 
-def test_chaos_that_sets_in_late_leaves_no_digits(runs: Path) -> None:
+def test_chaos_that_sets_in_late_leaves_no_digits() -> None:
     """An eccentric orbit: announced at 3.1e-9 by the growth of the beginning, 1.8 rad off."""
-    run = run_text(LATE, runs)
+    run = run_text(LATE)
     accuracy = run.summary["accuracy"]
     assert accuracy["estimated_attitude_error"] == pytest.approx(np.pi)
     assert 100 < accuracy["predictable_seconds"] < 2000
@@ -73,9 +71,9 @@ def test_chaos_that_sets_in_late_leaves_no_digits(runs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_instability_that_sets_in_after_half_of_a_long_run_is_seen(runs: Path) -> None:
+def test_an_instability_that_sets_in_after_half_of_a_long_run_is_seen() -> None:
     """In 85,000 steps, of which the first tenth shows nothing: announced at 4.4e-9 by that."""
-    run = run_text(DESPUN, runs)
+    run = run_text(DESPUN)
     accuracy = run.summary["accuracy"]
     assert run.summary["cost"]["steps"] > 60_000
     assert accuracy["estimated_attitude_error"] == pytest.approx(np.pi)
@@ -85,13 +83,13 @@ def test_an_instability_that_sets_in_after_half_of_a_long_run_is_seen(runs: Path
     assert "attitude_uncertain" in run.summary["warning_codes"]
 
 
-def test_what_part_of_a_long_run_was_examined_is_said(runs: Path) -> None:
+def test_what_part_of_a_long_run_was_examined_is_said() -> None:
     """A slow push leaves no closed form, and nothing amplifies errors; windows show that they are made ever
     faster, as the body spins up.
     """
     push = 'kind = "torque"\ncomponents = ["0", "0", "1e-4"]'
     text = scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "12000", push)
-    run = run_text(text, runs)
+    run = run_text(text)
     accuracy = run.summary["accuracy"]
     assert 0 < accuracy["examined_share"] < 0.5
     assert " windows beyond" in accuracy["estimated_how"]
@@ -108,9 +106,9 @@ def test_what_part_of_a_long_run_was_examined_is_said(runs: Path) -> None:
     assert whole.how.endswith(", over the run")
 
 
-def test_errors_grow_in_a_passage_that_no_beginning_shows(runs: Path) -> None:
+def test_errors_grow_in_a_passage_that_no_beginning_shows() -> None:
     """Near the middle axis, which is left after 500 s: announced at 1.8e-10, 3.7e-7 off."""
-    run = run_text(PASSAGES, runs)
+    run = run_text(PASSAGES)
     announced, true = run.summary["accuracy"]["estimated_attitude_error"], true_error(run, PASSAGES)
     assert true <= COVERED * announced <= COVERED * HONEST * true
     # neighbours alone, as where there is no closed form
@@ -122,9 +120,9 @@ def test_errors_grow_in_a_passage_that_no_beginning_shows(runs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_path_past_a_close_pericentre_is_estimated_too(runs: Path) -> None:
-    run = run_text(COMET, runs)
-    better = run_text(COMET, runs, 'integrator.precision="extended"', 'name="better"')
+def test_the_path_past_a_close_pericentre_is_estimated_too() -> None:
+    run = run_text(COMET)
+    better = run_text(COMET, 'integrator.precision="extended"', 'name="better"')
     accuracy = run.summary["accuracy"]
     announced, true = accuracy["estimated_attitude_error"], true_error(run, COMET)
     assert true <= COVERED * announced <= COVERED * HONEST * true
@@ -136,29 +134,29 @@ def test_the_path_past_a_close_pericentre_is_estimated_too(runs: Path) -> None:
 
 
 @pytest.mark.parametrize(("offset", "end"), [("0", "2000"), ("1e-4", "200")])
-def test_a_motion_that_keeps_its_digits_raises_no_alarm(offset: str, end: str, runs: Path) -> None:
+def test_a_motion_that_keeps_its_digits_raises_no_alarm(offset: str, end: str) -> None:
     """Errors beside the middle axis grow in each passage and shrink after it; on it they have nothing to
     grow from. Either was announced as lost.
     """
     text = scene("[1, 2, 3]", f"[{offset}, 1, {offset}]", end)
-    run = run_text(text, runs)
+    run = run_text(text)
     true = true_error(run, text, "quadruple")
     assert true <= COVERED * run.summary["accuracy"]["estimated_attitude_error"] < 1e-6
     assert not run.summary["warnings"]
 
 
-def test_a_loose_tolerance_is_estimated_by_what_it_cuts_off(runs: Path) -> None:
+def test_a_loose_tolerance_is_estimated_by_what_it_cuts_off() -> None:
     text = config(loads=GRADIENT, time="end = 60\nsamples = 2", integrator="tolerance = 1e-8")
-    run = run_text(text, runs)
+    run = run_text(text)
     announced, true = run.summary["accuracy"]["estimated_attitude_error"], true_error(run, text, "double")
     assert true > 1e-12  # far above rounding
     assert true <= COVERED * announced <= COVERED * HONEST * true
 
 
-def test_estimates_can_be_turned_off_and_change_no_bit(runs: Path) -> None:
+def test_estimates_can_be_turned_off_and_change_no_bit() -> None:
     text = scene("[1, 2, 3]", "[0.5, 0.25, 1]", "50", GRADIENT)
-    with_one = run_text(text, runs)
-    without = run_text(text, runs, "output.estimate=false", 'name="without"')
+    with_one = run_text(text)
+    without = run_text(text, "output.estimate=false", 'name="without"')
     assert "estimate" in with_one.summary["cost"]["cpu_by_phase"]
     assert "estimate" not in without.summary["cost"]["cpu_by_phase"]
     accuracy = without.summary["accuracy"]
@@ -170,8 +168,8 @@ def test_estimates_can_be_turned_off_and_change_no_bit(runs: Path) -> None:
 
 def test_an_estimate_is_the_same_each_time_and_after_resuming(runs: Path) -> None:
     text = scene("[1, 2, 3]", "[0.5, 0.25, 1]", "200", GRADIENT)
-    whole = run_text(text, runs).summary["accuracy"]
-    part = run_text(text, runs, "limits.max_steps=100", 'name="part"', tuning=IMPATIENT)
+    whole = run_text(text, out=runs).summary["accuracy"]
+    part = run_text(text, "limits.max_steps=100", 'name="part"', tuning=IMPATIENT, out=runs)
     assert part.status == "stopped: max_steps"
     assert part.summary["accuracy"]["estimated_how"] == "not estimated: the run has not ended"
     while part.status != "finished":
@@ -186,10 +184,10 @@ def test_a_request_to_stop_ends_the_estimate() -> None:
     assert estimate_errors(prepared, 18_000, 4000.0, go_on=lambda: next(asked, False)) is None
 
 
-def test_kinks_and_jumps_are_followed(runs: Path) -> None:
+def test_kinks_and_jumps_are_followed() -> None:
     """Neighbours come to switching surfaces at other times than the motion."""
     drag = 'kind = "torque"\ncomponents = ["-0.2*abs(wx)*wx", "-0.1*sign(wy)", "0.05*abs(wz)"]'
     text = scene("[1, 2, 3]", "[0.5, 0.25, 1]", "15", drag)
-    run = run_text(text, runs)
+    run = run_text(text)
     announced, true = run.summary["accuracy"]["estimated_attitude_error"], true_error(run, text)
     assert true <= COVERED * announced < 1e-11

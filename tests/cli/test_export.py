@@ -222,7 +222,6 @@ def sky(config: Config, rigidsim_command: Command) -> xarray.Dataset:
         return dataset.load()
 
 
-@pytest.mark.compact
 def test_tables_have_dates(sky: xarray.Dataset) -> None:
     lines = Path("sky.csv").read_text().splitlines()
     assert "# time 0 is 2029-04-13T21:46:00 TDB; dates are TDB, to 1e-14 s" in lines
@@ -237,7 +236,6 @@ def test_tables_have_dates(sky: xarray.Dataset) -> None:
     assert event[1].startswith("0.125,2029-04-13T21:46:00.125,")
 
 
-@pytest.mark.compact
 def test_stores_have_dates(sky: xarray.Dataset, rigidsim_command: Command) -> None:
     pytest.importorskip("zarr")
     parquet = pytest.importorskip("pyarrow.parquet")
@@ -250,7 +248,6 @@ def test_stores_have_dates(sky: xarray.Dataset, rigidsim_command: Command) -> No
     np.testing.assert_array_equal(dates, sky.date.values)
 
 
-@pytest.mark.compact
 def test_independent_readers_read_orbit_messages(sky: xarray.Dataset) -> None:
     """Epochs, frames and numbers as ``oem`` and ``ccsds-ndm`` see them."""
     moments = [str(moment)[:23] for moment in sky.date.values]
@@ -274,7 +271,6 @@ def test_independent_readers_read_orbit_messages(sky: xarray.Dataset) -> None:
     assert [row.epoch for row in rows][:2] == ["2029-04-13T21:46:00", "2029-04-13T21:46:00.25"]
 
 
-@pytest.mark.compact
 def test_an_independent_reader_reads_attitude_messages(sky: xarray.Dataset) -> None:
     """``brahe``; not ``ccsds-ndm`` 3.1, which raises a KeyError on every AEM 2.0 with quaternions (it looks
     for the field by the name of version 1), and would take the scalar for the first of the four.

@@ -48,9 +48,9 @@ def test_a_template_is_valid_and_means_nothing_else(scene: str, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("scene", marked("coin", "thrusters"))
-def test_a_template_runs(scene: str, tmp_path: Path) -> None:
+def test_a_template_runs(scene: str) -> None:
     """To its end, without a warning, and what its comments promise happens."""
-    run = support.run_text(templates.template(scene), tmp_path, "output.estimate=false")
+    run = support.run_text(templates.template(scene), "output.estimate=false")
     summary = run.summary
     stopped = scene in ("coin", "gyroscope")
     assert summary["status"] == ("finished: event" if stopped else "finished")

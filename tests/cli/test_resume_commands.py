@@ -15,6 +15,8 @@ from support import OFTEN, cases, same_bits
 
 import rigidsim
 
+pytestmark = pytest.mark.optimised  # as the processes that these are held against
+
 Config = Callable[..., str]
 Command = Callable[..., Any]
 Start = Callable[..., subprocess.Popen[str]]

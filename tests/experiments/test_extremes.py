@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 from support import config
@@ -48,28 +47,28 @@ def test_growth_is_no_faster_than_time_allows() -> None:
     assert math.log(motion_growth(prepared).factor) == pytest.approx(60 / math.sqrt(3), rel=0.01)
 
 
-def test_rates_without_an_attitude_say_that_their_digits_are_gone(runs: Path) -> None:
+def test_rates_without_an_attitude_say_that_their_digits_are_gone() -> None:
     text = scene(rates="[1e-15, 1, 1e-15]", end="400", record="angular_velocity")
-    run = run_text(text, runs, 'integrator.formulation="rates"')
+    run = run_text(text, 'integrator.formulation="rates"')
     assert any("angular velocity is uncertain" in warning for warning in run.summary["warnings"])
     assert run.summary["accuracy"]["estimated_attitude_error"] is None
-    stable = run_text(scene(record="angular_velocity"), runs, 'integrator.formulation="rates"')
+    stable = run_text(scene(record="angular_velocity"), 'integrator.formulation="rates"')
     assert not stable.summary["warnings"]
 
 
-def test_canonical_momenta_of_a_thin_rod_lose_the_ratio_of_its_moments(runs: Path) -> None:
+def test_canonical_momenta_of_a_thin_rod_lose_the_ratio_of_its_moments() -> None:
     """A rounded momentum is divided by the smallest moment to give a rate."""
     text = scene("[1e-12, 1, 1]", "[0.1, 1, 0.5]", end="50")
-    canonical = run_text(text, runs, 'integrator.formulation="canonical"').summary
-    quaternion = run_text(text, runs).summary
+    canonical = run_text(text, 'integrator.formulation="canonical"').summary
+    quaternion = run_text(text).summary
     lost = canonical["accuracy"]["estimated_attitude_error"]
     assert lost > 1e10 * quaternion["accuracy"]["estimated_attitude_error"]  # of 1e12, in a sample or two
     assert any("digits are gone" in warning for warning in canonical["warnings"])
     assert not quaternion["warnings"]
 
 
-def test_a_tolerance_below_epsilon_promises_no_more_than_epsilon(runs: Path) -> None:
-    below = run_text(scene(), runs, "integrator.tolerance=1e-25").summary
+def test_a_tolerance_below_epsilon_promises_no_more_than_epsilon() -> None:
+    below = run_text(scene(), "integrator.tolerance=1e-25").summary
     assert below["accuracy"]["estimated_attitude_error"] > 2.0**-52  # a last bit of the samples, and more
     assert not below["warnings"]
 
@@ -82,8 +81,8 @@ def test_a_tolerance_far_below_epsilon_is_refused(tolerance: str) -> None:
 
 
 @pytest.mark.parametrize("end", ["1e3", "1e9"])
-def test_the_error_of_a_closed_form_knows_no_horizon(end: str, runs: Path) -> None:
-    run = run_text(scene(end=end, integrator='method = "closed_form"'), runs)
+def test_the_error_of_a_closed_form_knows_no_horizon(end: str) -> None:
+    run = run_text(scene(end=end, integrator='method = "closed_form"'))
     assert run.summary["accuracy"]["estimated_attitude_error"] == 50 * 2.0**-52
     assert not run.summary["warnings"]
 
@@ -111,10 +110,10 @@ def test_numbers_beyond_single_precision_are_refused_there(rate: str) -> None:
 
 
 @pytest.mark.parametrize("power", [-200, 200])
-def test_the_unit_of_inertia_changes_no_bit(power: int, runs: Path) -> None:
+def test_the_unit_of_inertia_changes_no_bit(power: int) -> None:
     """Powers of two: scaling rounds nothing."""
-    plain = run_text(scene(), runs).dataset
+    plain = run_text(scene()).dataset
     moments = [f'"{m * 2 ** abs(power)}"' if power > 0 else f'"{m}/{2 ** abs(power)}"' for m in (1, 2, 3)]
-    scaled = run_text(scene(f"[{', '.join(moments)}]"), runs).dataset
+    scaled = run_text(scene(f"[{', '.join(moments)}]")).dataset
     with plain, scaled:
         assert (plain["quaternion"].values == scaled["quaternion"].values).all()

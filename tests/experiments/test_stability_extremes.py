@@ -28,7 +28,6 @@ def test_random_extremes_are_never_wrong_in_silence(data: st.DataObject) -> None
     assert verdict.kind in ("right", "announced", "refused"), verdict.line
 
 
-@pytest.mark.compact
 @pytest.mark.parametrize(
     ("name", "column", "kind"),
     [

@@ -282,6 +282,15 @@ def test_herpolhode_of_a_symmetric_body_is_a_circle(symmetric_top: Build) -> Non
     np.testing.assert_allclose(np.hypot(*plane.T), np.hypot(*plane[0]), rtol=1e-9)
 
 
+def test_a_symmetric_bodys_nutation_angle_is_constant_below_its_attitude(symmetric_top: Build) -> None:
+    page = figures.figure(symmetric_top(), "attitude")
+    assert titles(page)[-1] == "Nutation angle: the figure axis from the momentum"
+    angle = page.axes[-1].get_lines()[0].get_ydata()
+    rates = symmetric_top()["angular_velocity"].values[0]
+    expected = np.degrees(np.arccos(2 * rates[2] / np.linalg.norm(rates * [1, 1, 2])))  # cos = C w3 / L
+    np.testing.assert_allclose(angle, expected, rtol=1e-9)
+
+
 def test_motion_off_the_surfaces_is_drawn_without_them(symmetric_top: Build) -> None:
     dataset = symmetric_top()
     dataset.attrs["principal_moments"] = "[1, 2, 2]"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import mpmath
 import numpy as np
 import pytest
@@ -54,7 +52,7 @@ def against(a: mpmath.matrix, n: mpmath.matrix) -> tuple[mpmath.mpf, mpmath.mpf]
     return obliquity, mpmath.atan2((crossed(n, first).T * node)[0], (first.T * node)[0])
 
 
-def test_80_bits_reach_obliquity_and_longitude(runs: Path) -> None:
+def test_80_bits_reach_obliquity_and_longitude() -> None:
     """Against mpmath, from the recorded quaternion and rates: to 1e-18, and 64 bits with full turns."""
     moments = [1, 1.25, 2]
     run = run_text(
@@ -64,7 +62,6 @@ def test_80_bits_reach_obliquity_and_longitude(runs: Path) -> None:
             (), "end = 20\nsamples = 9", 'precision = "extended"',
             f'{NAMES}\n[frame]\nreference = ["0.1", "-0.2", 1]',
         ),
-        runs,
     )  # fmt: skip
     dataset = run.dataset
     with mpmath.workdps(50):
@@ -90,10 +87,10 @@ def test_80_bits_reach_obliquity_and_longitude(runs: Path) -> None:
         ['formulation = "quaternion"', 'method = "closed_form"', 'precision = "quadruple"'],
     ),
 )  # fmt: skip
-def test_turns_between_two_samples_are_those_of_the_motion(integrator: str, runs: Path) -> None:
+def test_turns_between_two_samples_are_those_of_the_motion(integrator: str) -> None:
     """L lies along Z: the node of the figure axis' equator is the first Euler angle, phi = L t / A."""
     time = "end = 1000\nsamples = 3"
-    run = run_text(config("principal_moments = [1, 1, 1.5]", PRECESSING, (), time, integrator, NAMES), runs)
+    run = run_text(config("principal_moments = [1, 1, 1.5]", PRECESSING, (), time, integrator, NAMES))
     node = run.dataset["node_longitude"].sel(axis="figure").values
     np.testing.assert_allclose(node, 0.3 + 2 * run.dataset["time"].values, rtol=0, atol=1e-9)
     assert np.isnan(run.dataset["node_longitude"].sel(axis="momentum").values[0])
@@ -104,7 +101,7 @@ def test_turns_between_two_samples_are_those_of_the_motion(integrator: str, runs
     assert run.summary["warning_codes"] == joined
 
 
-def test_dense_and_sparse_samples_agree_against_a_moving_orbit(runs: Path) -> None:
+def test_dense_and_sparse_samples_agree_against_a_moving_orbit() -> None:
     load = (
         'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
         'orbit = {semi_major_axis = 10, inclination = "5 deg", ascending_node = 0.4, node_rate = -0.01}'
@@ -113,7 +110,7 @@ def test_dense_and_sparse_samples_agree_against_a_moving_orbit(runs: Path) -> No
     output = f'{NAMES}\n[frame]\nreference = "orbit"'
     few, many = (
         run_text(config("principal_moments = [1, 1, 2]", start, load, f"end = 2000\nsamples = {count}",
-                        'hold_invariants = false', output), runs, f'name="samples_{count}"').dataset
+                        'hold_invariants = false', output), f'name="samples_{count}"').dataset
         for count in (5, 8001)
     )  # fmt: skip
     for name in ("node_longitude", "right_ascension", "obliquity"):
@@ -129,12 +126,12 @@ def test_dense_and_sparse_samples_agree_against_a_moving_orbit(runs: Path) -> No
     assert abs(difference - 2 * np.pi * np.rint(difference / (2 * np.pi))) < 1e-12
 
 
-def test_the_figure_axis_and_the_equator_of_an_ecliptic_scene(runs: Path) -> None:
+def test_the_figure_axis_and_the_equator_of_an_ecliptic_scene() -> None:
     """A pole at the ecliptic's own: right ascension 270 deg, declination 66.56 deg."""
     names = 'record = ["right_ascension", "declination", "figure_axis"]'
     frame = '[frame]\naxes = "ecliptic J2000"\nfigure_axis = "z"'
     body, start = "principal_moments = [3, 1, 2]", "angular_velocity = [0, 0, 1]"
-    run = run_text(config(body, start, (), "end = 1\nsamples = 2", "", names, frame), runs)
+    run = run_text(config(body, start, (), "end = 1\nsamples = 2", "", names, frame))
     tilt = np.radians(84381.406 / 3600)
     assert run.dataset["right_ascension"].values[0] == pytest.approx([-np.pi / 2] * 3)
     assert run.dataset["declination"].values[0] == pytest.approx([np.pi / 2 - tilt] * 3)
@@ -166,24 +163,24 @@ def test_axes_and_planes_that_a_scene_has_not_are_refused(
     assert what in problem.what
 
 
-def test_a_source_of_an_ephemeris_lends_the_ecliptic_of_date(runs: Path) -> None:
+def test_a_source_of_an_ephemeris_lends_the_ecliptic_of_date() -> None:
     """It turns towards the equator of J2000 by 46.81 arcsec a century (IAU 2006: Q_A's first term)."""
     load = 'kind = "gravity_gradient"\ngravitational_parameter = "1.327e20 m^3/s^2"\nephemeris = "sun"\n'
     start = 'angular_velocity = [0, 0, "1e-3 rad/s"]\neuler_angles = [0, "-84381.406 arcsec", 0]'
     text = config("principal_moments = [1, 1, 1.000000001]", start, load, 'end = "1 day"\nsamples = 2', "",
                   'record = ["obliquity"]\nestimate = false\n[frame]\nreference = "orbit"')  # fmt: skip
-    obliquity = np.degrees(run_text(text, runs).dataset["obliquity"].values[:, 0]) * 3600
+    obliquity = np.degrees(run_text(text).dataset["obliquity"].values[:, 0]) * 3600
     assert obliquity[0] == pytest.approx(84381.406, abs=1e-9)
     assert np.diff(obliquity)[0] * 36525 == pytest.approx(-46.811, abs=1e-3)
 
 
-def test_a_body_in_flight_has_the_plane_of_its_own_path(runs: Path) -> None:
+def test_a_body_in_flight_has_the_plane_of_its_own_path() -> None:
     body = "principal_moments = [1, 1.2, 1.5]\nmass = 1"
     start = "angular_velocity = [0.1, 0.2, 0.3]\nposition = [10, 0, 0]\nvelocity = [0, 0.2, 0.25]"
     load = 'kind = "central_gravity"\ngravitational_parameter = 1'
     names = 'record = ["obliquity", "andoyer_momenta", "position", "velocity", "angular_momentum"]'
     found = run_text(
-        config(body, start, load, "end = 5\nsamples = 3", "", f'{names}\n[frame]\nreference = "orbit"'), runs
+        config(body, start, load, "end = 5\nsamples = 3", "", f'{names}\n[frame]\nreference = "orbit"')
     ).dataset
     normal = np.cross(found["position"].values, found["velocity"].values)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import CONFIGS, Trial, amplification, angle_between, law, run_text, tried
 
 import rigidsim
 from rigidsim.errors import ConfigError
-from rigidsim.scene.schema import EULER_SEQUENCES
+from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.solve.problem import prepare
 
-pytestmark = pytest.mark.compact
 RECORD = 'output.record=["angular_velocity", "quaternion"]'
 STABLE = (
     "asymmetric_top",
@@ -102,7 +99,7 @@ def test_an_ignorable_angle_has_a_constant_momentum() -> None:
     assert "theta" in equations["p_theta"]
 
 
-def test_momenta_are_the_projections_of_the_angular_momentum(runs: Path) -> None:
+def test_momenta_are_the_projections_of_the_angular_momentum() -> None:
     path = next(path for path in CONFIGS if path.stem == "asymmetric_top")
     system = prepare(rigidsim.load(path, overrides=['integrator.formulation="canonical"'])).system
     momenta = [float(np.ldexp(float(system.initial[3 + i]), system.state_exponents[3 + i])) for i in range(3)]
@@ -114,7 +111,7 @@ def test_momenta_are_the_projections_of_the_angular_momentum(runs: Path) -> None
     assert momenta == pytest.approx([body @ vertical, body @ node, body[2]], abs=1e-15)
 
 
-def test_loads_without_a_potential_are_refused(runs: Path) -> None:
+def test_loads_without_a_potential_are_refused() -> None:
     text = """
     name = "damped"
     [body]
@@ -129,4 +126,4 @@ def test_loads_without_a_potential_are_refused(runs: Path) -> None:
     end = 1
     """
     with pytest.raises(ConfigError, match='given "canonical", but viscous_torque has no potential'):
-        run_text(text, runs, 'integrator.formulation="canonical"')
+        run_text(text, 'integrator.formulation="canonical"')

@@ -7,7 +7,6 @@ relative to the invariant's scale, leaves each step some tens of them (Brouwer 1
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 from support import EPSILON, config, run_text, tried
@@ -98,11 +97,10 @@ def test_invariants_are_kept(name: str, formulation: str, precision: str) -> Non
     assert any(drift > 0 for drift in trial.drifts.values())
 
 
-@pytest.mark.compact
 @pytest.mark.parametrize("precision", ["double", "extended"])
 @pytest.mark.parametrize("name", UNCARRIED)
-def test_energy_of_a_flight_is_kept(name: str, precision: str, runs: Path) -> None:
+def test_energy_of_a_flight_is_kept(name: str, precision: str) -> None:
     text = config(*SCENES[name][:3], "end = 20\nsamples = 101", f'precision = "{precision}"')
-    run = run_text(text, runs, 'output.record=["position", "energy"]')
+    run = run_text(text, 'output.record=["position", "energy"]')
     row = run.summary["invariants"]["energy"]
     assert 0 < row["largest_drift"] <= 50 * EPSILON[precision] * math.sqrt(run.summary["cost"]["steps"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import heyoka as hy
 import numpy as np
 import pytest
@@ -11,8 +9,6 @@ from support import config, run_text
 
 from rigidsim.formats.naming import Naming, labels
 from rigidsim.model.ephemeris import MEAN_DISTANCE, source_position
-
-pytestmark = pytest.mark.compact
 
 
 def at(body: str, seconds: float) -> tuple[float, float, float]:
@@ -51,7 +47,7 @@ def test_the_sun_comes_round_in_a_sidereal_year_and_the_moon_in_a_sidereal_month
     assert abs((end - begin + 180) % 360 - 180) < 15  # inequalities of up to 7.5 degrees at either end
 
 
-def test_the_torque_of_the_ephemeris_is_that_of_the_place(runs: Path) -> None:
+def test_the_torque_of_the_ephemeris_is_that_of_the_place() -> None:
     """The Sun nearly stands still in an hour: a fixed source in its place gives the same motion."""
     load = '[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.32712440018e20\n'
     text = """
@@ -68,8 +64,8 @@ def test_the_torque_of_the_ephemeris_is_that_of_the_place(runs: Path) -> None:
     longitude, latitude, distance = (at("sun", 1800.0)[i] for i in range(3))
     lon, lat = np.radians(longitude), np.radians(latitude)
     vector = distance * np.array([np.cos(lon) * np.cos(lat), np.sin(lon) * np.cos(lat), np.sin(lat)])
-    fixed = run_text(text + load + f"position = {[float(x) for x in vector]}", runs, 'name="fixed"')
-    moving = run_text(text + load + 'ephemeris = "sun"', runs, 'name="moving"')
+    fixed = run_text(text + load + f"position = {[float(x) for x in vector]}", 'name="fixed"')
+    moving = run_text(text + load + 'ephemeris = "sun"', 'name="moving"')
     a, b = (run.dataset["angular_velocity"].values[-1] for run in (fixed, moving))
     # the Sun moves by 7e-4 rad in the hour, 4e-4 rad to either side of the fixed place
     assert np.abs(a - b).max() < 1e-3 * np.abs(a).max()
@@ -78,7 +74,7 @@ def test_the_torque_of_the_ephemeris_is_that_of_the_place(runs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_time_zero_is_the_epoch(runs: Path) -> None:
+def test_time_zero_is_the_epoch() -> None:
     """A scene that begins a day after J2000 by its epoch is the one that begins then by its clock; without an
     epoch time zero is J2000, and the dataset says so.
     """
@@ -96,7 +92,7 @@ def test_time_zero_is_the_epoch(runs: Path) -> None:
         # TT - UTC was 64.184 s; TDB - TT is -1e-4 s
         "UTC": ["time.epoch=2000-01-02T11:58:55.816 UTC"],
     }
-    found = {name: run_text(text, runs, f"name={name}", *changes).dataset for name, changes in epochs.items()}
+    found = {name: run_text(text, f"name={name}", *changes).dataset for name, changes in epochs.items()}
     assert {data.attrs["axes"] for data in found.values()} == {"ecliptic J2000"}
     assert found["clock"].attrs["epoch"] == found["J2000"].attrs["epoch"] == "2000-01-01T12:00:00 TDB"
     assert found["epoch"].attrs["epoch"] == "2000-01-02T12:00:00 TDB"

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 
 from rigidsim.model.system import System
 from rigidsim.scene.config import parse
-from rigidsim.scene.schema import EULER_SEQUENCES
+from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.solve.problem import prepare
 
 # ---- (a) Euler's equations --------------------------------------------------------------------------------

@@ -12,8 +12,6 @@ from support import cases
 from rigidsim.errors import ConfigError
 from rigidsim.model.system import System
 
-pytestmark = pytest.mark.compact
-
 PULL = 'kind = "uniform_gravity"\nacceleration = [0, 0, -2]'
 TIMES = np.linspace(0, 10, 101)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import heyoka as hy
@@ -15,8 +14,6 @@ from support import run_text
 import rigidsim
 from rigidsim.model.loads import LoadModel
 from rigidsim.solve.problem import prepare
-
-pytestmark = pytest.mark.compact
 
 BODY = "principal_moments = [1, 1.5, 2]"
 REST, SPIN = "angular_velocity = [0, 0, 0]", "angular_velocity = [0, 0, 1]"
@@ -69,7 +66,7 @@ def test_a_load_that_is_zero_is_none() -> None:
 
 
 @pytest.mark.parametrize("size", ["1e-9", "1", "1e9"])
-def test_a_body_at_rest_is_measured_by_what_drives_it(size: str, runs: Path) -> None:
+def test_a_body_at_rest_is_measured_by_what_drives_it(size: str) -> None:
     """Whatever the size of the torque: the same relative drifts, and no warning without a cause."""
     text = f"""name = "driven"
 [body]
@@ -88,7 +85,7 @@ max_steps = 1000000
 """
     if size == "1e9":
         text = text.replace("end = 10", "end = 1e-3")
-    run = run_text(text, runs)
+    run = run_text(text)
     row = run.summary["invariants"]["energy_balance"]
     assert "at rest" not in row["scale_name"]
     assert 0 < row["largest_drift"] <= row["bound"]

@@ -17,8 +17,6 @@ from support import angle_between, law, run_text, wide
 from rigidsim.errors import ConfigError
 from rigidsim.model.system import System
 
-pytestmark = pytest.mark.compact
-
 ORBIT_KEYS = (
     "semi_major_axis", "eccentricity", "inclination", "ascending_node", "periapsis", "mean_anomaly",
     "node_rate", "periapsis_rate", "period",
@@ -177,7 +175,7 @@ def test_two_orbits_have_states_of_their_own() -> None:
     assert len(set(states)) == len(states) == 3 + 4 + 2 + 2 + 1  # and the work
 
 
-def test_fixed_source_keeps_energy(runs: Path) -> None:
+def test_fixed_source_keeps_energy() -> None:
     text = f"""name = "fixed"
 [body]
 principal_moments = [1, 1.75, 2]
@@ -187,7 +185,7 @@ angular_velocity = [0.1, 0.9, 0.2]
 {fixed_source(8.0, [1.0, 1.5, 0.5])}[time]
 end = 200
 """
-    run = run_text(text, runs)
+    run = run_text(text)
     row = run.summary["invariants"]["energy"]
     assert 0 < row["largest_drift"] <= row["bound"]
     potential = run.dataset["potential_energy"].values
@@ -220,7 +218,7 @@ def circulating_error(end: int, runs: Path) -> tuple[float, float]:
     """Largest error of the attitude against 80 bits, and what the law allows."""
     found = []
     for precision in ("double", "extended"):
-        run = run_text(CIRCULATING.format(end=end, precision=precision), runs / precision)
+        run = run_text(CIRCULATING.format(end=end, precision=precision))
         assert run.status == "finished"
         row = run.summary["invariants"]["jacobi_constant"]
         assert row["largest_drift"] <= row["bound"]
@@ -238,13 +236,13 @@ def test_attitude_on_a_circular_orbit_after_long(runs: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.compact(False)  # the bound is that of the code of real runs
+@pytest.mark.optimised  # the bound is that of the code of real runs
 def test_attitude_on_a_circular_orbit_after_very_long(runs: Path) -> None:
     """An explicit cos(n t) would be wrong by 1e-5 rad here (physics.md section 2)."""
     assert circulating_error(131072, runs)[0] < 1e-8
 
 
-def test_frequency_of_small_pitch_librations(runs: Path) -> None:
+def test_frequency_of_small_pitch_librations() -> None:
     """n sqrt(3 (B - A) / C), A along the radius and C along the normal (Lagrange 1780)."""
     a, b, c = 1.0, 1.75, 2.0
     expected = np.sqrt(3 * (b - a) / c)
@@ -261,7 +259,7 @@ orbit = {semi_major_axis = 1}
 end = 600
 every = 0.01
 """
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     rate = dataset["angular_velocity"].values[:, 2] - 1
     time = dataset["time"].values
     i = np.flatnonzero(rate[:-1] * rate[1:] < 0)
@@ -341,10 +339,8 @@ end = 30
 
 
 @pytest.mark.parametrize("formulation", ["rotation_matrix", "euler_angles"])  # others: test_conservation
-def test_central_gravity_keeps_energy_and_total_momentum(formulation: str, runs: Path) -> None:
-    run = run_text(
-        CENTRAL, runs, f'integrator.formulation="{formulation}"', 'integrator.euler_sequence="zxz"'
-    )
+def test_central_gravity_keeps_energy_and_total_momentum(formulation: str) -> None:
+    run = run_text(CENTRAL, f'integrator.formulation="{formulation}"', 'integrator.euler_sequence="zxz"')
     assert run.status == "finished"
     rows = run.summary["invariants"]
     assert {name for name, row in rows.items() if not row["numerical"]} == {
@@ -363,7 +359,7 @@ def test_central_gravity_keeps_energy_and_total_momentum(formulation: str, runs:
 
 
 @pytest.mark.parametrize("formulation", ["quaternion", "rates"])
-def test_damping_in_proportion_to_inertia(formulation: str, runs: Path) -> None:
+def test_damping_in_proportion_to_inertia(formulation: str) -> None:
     """tau = -c I w: abs(L) = L0 exp(-c t), E = E0 exp(-2 c t), the direction of L stays."""
     c, moments = 0.25, np.array([1.0, 1.75, 2.0])
     text = f"""name = "damped"
@@ -379,7 +375,7 @@ end = 16
 [integrator]
 formulation = "{formulation}"
 """
-    run = run_text(text, runs)
+    run = run_text(text)
     dataset, steps = run.dataset, run.summary["cost"]["steps"]
     names = {name for name, row in run.summary["invariants"].items() if not row["numerical"]}
     assert names == {"energy_balance"} | ({"angular_momentum_across"} if formulation != "rates" else set())
@@ -400,7 +396,7 @@ formulation = "{formulation}"
 
 
 @pytest.mark.parametrize("formulation", ["quaternion", "rates"])
-def test_power_of_a_constant_body_torque(formulation: str, runs: Path) -> None:
+def test_power_of_a_constant_body_torque(formulation: str) -> None:
     """dE/dt = w . tau: about a principal axis in closed form, else by the balance of energy."""
     text = """name = "driven"
 [body]
@@ -415,7 +411,7 @@ end = 20
 samples = 2001
 """
     override = f'integrator.formulation="{formulation}"'
-    run = run_text(text, runs, override)
+    run = run_text(text, override)
     row = run.summary["invariants"]["energy_balance"]
     assert 0 < row["largest_drift"] <= row["bound"]
     dataset = run.dataset
@@ -426,7 +422,7 @@ samples = 2001
     trapezoid = np.concatenate([[0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(time))])
     assert np.abs(work - trapezoid).max() < 1e-4 / 12 * 4
     spin = text.replace("[0.3, 0.2, 1]", "[0, 0, 1]").replace('["0.1", "-0.05", 0.2]', "[0, 0, 0.2]")
-    spun = run_text(spin, runs, override).dataset
+    spun = run_text(spin, override).dataset
     np.testing.assert_allclose(spun["angular_velocity"].values[:, 2], 1 + 0.1 * time, rtol=1e-14)
     np.testing.assert_allclose(spun["work"].values, (1 + 0.1 * time) ** 2 - 1, rtol=0, atol=9 * 1e-14)
 
@@ -517,7 +513,7 @@ def test_a_load_reads_the_attitude_and_the_path(formulation: str, sequence: str)
     np.testing.assert_allclose(derivative(system, state)[:3], expected, rtol=0, atol=CLOSE)
 
 
-def test_time_of_a_load_is_the_scenes(runs: Path) -> None:
+def test_time_of_a_load_is_the_scenes() -> None:
     """A run that starts at 3 s feels the torque of 3 s: w = w0 + (1 - cos) in closed form."""
     text = """name = "pushed"
 [body]
@@ -531,7 +527,7 @@ components = [0, 0, "sin(t)"]
 start = 3
 end = 12
 """
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     time = dataset["time"].values
     expected = 0.5 + np.cos(3) - np.cos(time)
     np.testing.assert_allclose(dataset["angular_velocity"].values[:, 2], expected, rtol=0, atol=50 * EPS)

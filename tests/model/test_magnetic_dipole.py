@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from equations import CLOSE, Random, array, derivative, general_body, matrix, observed, prepared
@@ -13,8 +11,6 @@ from support import angle_between, config, law, run_text, tried
 
 import rigidsim
 from rigidsim.errors import ConfigError
-
-pytestmark = pytest.mark.compact
 
 BODY = "principal_moments = [1, 1.5, 2]"
 START = "angular_velocity = [0.4, -0.7, 0.9]\nquaternion = [0.3, -0.5, 0.2, 0.75]"
@@ -73,13 +69,13 @@ def test_the_torque_is_the_moment_cross_the_field_in_any_body_axes() -> None:
         assert abs(observed(system, state)["energy"][0] - energy) <= CLOSE * (1 + abs(energy))
 
 
-def test_in_a_uniform_field_it_moves_like_the_heavy_top_with_the_same_torque(runs: Path) -> None:
+def test_in_a_uniform_field_it_moves_like_the_heavy_top_with_the_same_torque() -> None:
     """m x B is com x M g for m = M com and B = g: two loads, two codes, one motion."""
-    magnet = run_text(text("moment = [0.2, 0.1, 0.6]\nfield = [0, 0, -2]"), runs)
+    magnet = run_text(text("moment = [0.2, 0.1, 0.6]\nfield = [0, 0, -2]"))
     heavy = text("", extra="").replace("magnetic_dipole", "uniform_gravity").replace("magnet", "top")
     heavy = heavy.replace("[initial]", "mass = 2\ncenter_of_mass = [0.1, 0.05, 0.3]\n[initial]")
     heavy = heavy.replace('"uniform_gravity"', '"uniform_gravity"\nacceleration = [0, 0, -2]')
-    top = run_text(heavy, runs)
+    top = run_text(heavy)
     apart = angle_between(magnet.dataset["quaternion"].values, top.dataset["quaternion"].values).max()
     # two runs that each keep the law of a good integration (Brouwer 1937), tripled as everywhere
     steps = magnet.summary["cost"]["steps"]
@@ -88,17 +84,17 @@ def test_in_a_uniform_field_it_moves_like_the_heavy_top_with_the_same_torque(run
     assert magnet.summary["warnings"] == []
 
 
-def test_a_symmetric_body_keeps_its_spin_where_the_moment_is_axial(runs: Path) -> None:
+def test_a_symmetric_body_keeps_its_spin_where_the_moment_is_axial() -> None:
     symmetric = text("moment = [0, 0, 1]\nfield = [1, 0, 2]").replace("[1, 1.5, 2]", "[1, 1, 2]")
-    assert "angular_momentum_axial" in run_text(symmetric, runs).summary["invariants"]
+    assert "angular_momentum_axial" in run_text(symmetric).summary["invariants"]
     tilted = symmetric.replace("moment = [0, 0, 1]", "moment = [0.1, 0, 1]")
-    assert "angular_momentum_axial" not in run_text(tilted, runs).summary["invariants"]
+    assert "angular_momentum_axial" not in run_text(tilted).summary["invariants"]
 
 
-def test_along_an_orbit_it_agrees_with_another_integrator_of_the_plain_equations(runs: Path) -> None:
+def test_along_an_orbit_it_agrees_with_another_integrator_of_the_plain_equations() -> None:
     moment, inertia = np.array([2.0, -3.0, 5.0]) * 1e5, np.array([1, 1.5, 2])
     load = f"moment = {array(moment)}\n{ORBIT}\nsource_moment = {array(SOURCE)}"
-    run = run_text(text(load), runs)
+    run = run_text(text(load))
     assert run.summary["warnings"] == []
     assert list(run.summary["invariants"]) == ["energy_balance", "orbit_norm_1", "orbit_norm_2",
                                                "quaternion_norm"]  # fmt: skip

@@ -16,8 +16,6 @@ import rigidsim
 from rigidsim.errors import ConfigError
 from rigidsim.model.ephemeris import source_position
 
-pytestmark = pytest.mark.compact
-
 NAMES = 'record = ["quaternion", "roll_pitch_yaw", "libration", "nadir"{}]'
 BODY = 'principal_moments = ["0.9", 1, "0.4"]\nmass = 2'
 START = 'angular_velocity = ["0.1", "-0.9", "0.3"]\neuler_angles = ["0.4", "0.3", "0.2"]'
@@ -101,7 +99,7 @@ def ran(out: Path, loads: Any, **tables: str) -> xarray.Dataset:
         "time": "end = 6\nsamples = 4",
         "output": NAMES.format(""),
     } | tables
-    return loaded(run_text(config(loads=loads, **tables), out))
+    return loaded(run_text(config(loads=loads, **tables)))
 
 
 @pytest.mark.parametrize(
@@ -170,16 +168,14 @@ def polar(time: str, initial: str, record: str = '"roll_pitch_yaw", "nadir"', bo
     return config(body, initial, GRADIENT + orbit, time, 'euler_sequence = "zyx"', f"record = [{record}]")
 
 
-def test_a_satellite_at_rest_in_its_orbit_has_none_and_a_small_pitch_swings_at_its_frequency(
-    runs: Path,
-) -> None:
+def test_a_satellite_at_rest_in_its_orbit_has_none_and_a_small_pitch_swings_at_its_frequency() -> None:
     """n sqrt(3 (I_x - I_z)/I_y), Hughes 1986, ch. 9; a pendulum's frequency falls by (2 a)^2/16."""
-    rest = loaded(run_text(polar("end = 20\nsamples = 41", "angular_velocity = [0, -1, 0]"), runs))
+    rest = loaded(run_text(polar("end = 20\nsamples = 41", "angular_velocity = [0, -1, 0]")))
     assert np.abs(rest["roll_pitch_yaw"].values).max() < 1e-13
     assert np.abs(rest["nadir"].values - [0, 0, 1]).max() < 1e-13
     small = 1e-4
     start = f"angular_velocity = [0, -1, 0]\neuler_angles = [0, {small}, 0]"  # yaw, pitch, roll
-    swing = loaded(run_text(polar("end = 40\nsamples = 401", start), runs))
+    swing = loaded(run_text(polar("end = 40\nsamples = 401", start)))
     rate = np.sqrt(3 * (0.9 - 0.4) / 1)
     time, angles = swing["time"].values, swing["roll_pitch_yaw"].values
     assert np.abs(angles[:, 1] - small * np.cos(rate * time)).max() < small * (
@@ -188,22 +184,20 @@ def test_a_satellite_at_rest_in_its_orbit_has_none_and_a_small_pitch_swings_at_i
     assert np.abs(angles[:, [0, 2]]).max() < 1e-15
 
 
-def test_sparse_samples_keep_true_turns(runs: Path) -> None:
+def test_sparse_samples_keep_true_turns() -> None:
     """A satellite that spins in roll, eight turns between samples, and one that tumbles in the orbit's plane:
     its in-plane angle obeys a'^2 = a'(0)^2 - k sin(a)^2 with k = 3 (I_x - I_z)/I_y, as a pendulum.
     """
     spun = "angular_velocity = [200, 0, 0]\neuler_angles = [0, 0.1, 0]"
     stable = 'principal_moments = [1, "0.9", "0.4"]'
-    dense = loaded(run_text(polar("end = 1\nevery = 0.005", spun, '"roll_pitch_yaw"', stable), runs))
-    sparse = loaded(run_text(polar("end = 1\nevery = 0.25", spun, '"roll_pitch_yaw"', stable), runs))
+    dense = loaded(run_text(polar("end = 1\nevery = 0.005", spun, '"roll_pitch_yaw"', stable)))
+    sparse = loaded(run_text(polar("end = 1\nevery = 0.25", spun, '"roll_pitch_yaw"', stable)))
     every, few = (found["roll_pitch_yaw"].values for found in (dense, sparse))
     assert np.abs(np.diff(every, axis=0)).max() < 1.5  # so dense that it tells turns
     assert np.abs(few - every[::50]).max() < 1e-9
     assert few[-1, 0] > 150
     rate, k = 31.0, 3 * (0.9 - 0.4)
-    found = loaded(
-        run_text(polar("end = 12\nevery = 4", "angular_velocity = [0, 30, 0]", '"libration"'), runs)
-    )
+    found = loaded(run_text(polar("end = 12\nevery = 4", "angular_velocity = [0, 30, 0]", '"libration"')))
     turned, time = found["libration"].values[:, 0], found["time"].values
     assert np.abs(turned - (rate - k / (4 * rate)) * time).max() < 1e-3  # to first order in k / rate^2 = 2e-3
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from equations import EPS, derivative, prepared
@@ -13,8 +11,6 @@ from support import law, run_text, tried
 
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.model.system import System
-
-pytestmark = pytest.mark.compact
 
 BODY = "principal_moments = [1, 1.75, 2]"
 SPIN = "angular_velocity = [0.4, 0.9, 0.3]\nquaternion = [0.5, 0.1, -0.3, 0.7]"
@@ -93,24 +89,24 @@ def test_at_rest_in_the_orbital_frame_it_stays_bit_for_bit() -> None:
     assert carried["sin_half_anomaly1"] == 0.5
 
 
-def test_the_dataset_starts_with_the_attitude_that_was_given(runs: Path) -> None:
+def test_the_dataset_starts_with_the_attitude_that_was_given() -> None:
     """Rounding of a product of two rotations: a few units in the last place of 1."""
     text = TEXT.format(
         rates=[0.1, 0.2, 0.3], quaternion=[0.5, -0.5, 0.5, 0.5], strength=1, start=0, end=4, more="",
         orbit="inclination = 0.7, ascending_node = 2, mean_anomaly = 1", formulation="auto",
         precision="double",
     )  # fmt: skip
-    first = run_text(text, runs).dataset["quaternion"].values[0]
+    first = run_text(text).dataset["quaternion"].values[0]
     np.testing.assert_allclose(first, [0.5, -0.5, 0.5, 0.5], rtol=0, atol=4 * EPS)
 
 
-def test_events_read_the_attitude_in_space(runs: Path) -> None:
+def test_events_read_the_attitude_in_space() -> None:
     """A body that turns about the orbit's normal, in a gradient too weak to be felt."""
     text = TEXT.format(
         rates=[0, 0, 2], quaternion=[1, 0, 0, 0], strength=1e-12, start=0, end=3, orbit="mean_anomaly = 0",
         more='[[events]]\nname = "half"\nexpression = "qw"', formulation="auto", precision="double",
     )  # fmt: skip
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     # the torque turns the body by some 1e-11 rad at most, and q_w = cos(t)
     assert dataset["half_time"].values == pytest.approx([np.pi / 2], abs=1e-10)
 

@@ -18,8 +18,6 @@ from rigidsim.accuracy.error_law import motion_growth
 from rigidsim.model.loads import LoadModel
 from rigidsim.solve.problem import prepare
 
-pytestmark = pytest.mark.compact
-
 ROOT = Path(__file__).parents[2]
 FREE = """name = "free"
 [body]

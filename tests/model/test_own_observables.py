@@ -14,8 +14,6 @@ import pytest
 import rigidsim
 from rigidsim.scene.registry import OBSERVABLES
 
-pytestmark = pytest.mark.compact
-
 ROOT = Path(__file__).parents[2]
 
 

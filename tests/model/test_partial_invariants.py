@@ -7,7 +7,6 @@ relative to the invariant's scale, leaves each step some tens of them (Brouwer 1
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -17,8 +16,6 @@ from support import EPSILON, cases, config, run_text
 
 import rigidsim
 from rigidsim.solve.problem import prepare
-
-pytestmark = pytest.mark.compact
 
 ASYMMETRIC, SYMMETRIC, SPHERE = (
     f"principal_moments = {moments}\nmass = 1" for moments in ("[1, 1.75, 2]", "[1, 1, 1.5]", "[1, 1, 1]")
@@ -188,12 +185,12 @@ SCENES: dict[str, tuple[str, str, str, set[str]]] = {
 
 
 @pytest.mark.parametrize("name", cases(SCENES, list(SCENES)[::2]))
-def test_they_are_found_where_they_hold_and_kept(name: str, runs: Path) -> None:
+def test_they_are_found_where_they_hold_and_kept(name: str) -> None:
     body, start, loads, expected = SCENES[name]
     text = config(body, start, loads, "end = 10\nsamples = 41")
     found = prepare(rigidsim.parse(text)).system.invariants
     assert {i.name for i in found if not i.numerical} == expected
-    run = run_text(text, runs, "output.timeline=false")
+    run = run_text(text, "output.timeline=false")
     bound = 50 * EPSILON["double"] * math.sqrt(run.summary["cost"]["steps"])
     for invariant in expected:
         assert run.summary["invariants"][invariant]["largest_drift"] <= bound, invariant
@@ -201,10 +198,10 @@ def test_they_are_found_where_they_hold_and_kept(name: str, runs: Path) -> None:
             assert run.dataset[invariant].attrs["invariant"] == 1
 
 
-def test_their_values_are_those_of_their_formulas(runs: Path) -> None:
+def test_their_values_are_those_of_their_formulas() -> None:
     """Brun's and Bogoyavlensky's constants and momenta along axes, in numpy."""
     body, start, loads, _ = SCENES["two equal sources at right angles"]
-    run = run_text(config(body, start, loads, "end = 3\nsamples = 7"), runs, "output.timeline=false")
+    run = run_text(config(body, start, loads, "end = 3\nsamples = 7"), "output.timeline=false")
     inertia = np.array([[2, 0.3, -0.2], [0.3, 1.5, 0.1], [-0.2, 0.1, 1.25]])
     adjugate, s = np.linalg.det(inertia) * np.linalg.inv(inertia), np.diag([3.0, 3.0, 0.0])
     for row in range(7):
@@ -218,10 +215,10 @@ def test_their_values_are_those_of_their_formulas(runs: Path) -> None:
         assert abs(float(sample["angular_momentum_source"])) == pytest.approx(abs(momentum[2]), rel=1e-13)
 
 
-def test_bruns_constant_holds_to_quadruple_precision(runs: Path) -> None:
+def test_bruns_constant_holds_to_quadruple_precision() -> None:
     """The sign of the second term, and det(I) I^-1, to 30 digits; in the issue's form for one source."""
     text = config(GENERAL, TURNING, gradient(SOURCE), "end = 2\nsamples = 3", 'precision = "quadruple"')
-    run = run_text(text, runs, "output.timeline=false")
+    run = run_text(text, "output.timeline=false")
     steps = run.summary["cost"]["steps"]
     for name in ("brun_constant", "angular_momentum_source"):
         assert run.summary["invariants"][name]["largest_drift"] <= 50 * 2.0**-112 * math.sqrt(steps)

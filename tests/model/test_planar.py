@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from equations import prepared
@@ -13,8 +11,6 @@ from support import config, law, loaded, run_text, tried
 
 import rigidsim
 from rigidsim.accuracy.comparison import angles_between
-
-pytestmark = pytest.mark.compact
 
 BODY = "principal_moments = [1, 1.02, 1.04]"
 SPIN = 'angular_velocity = [0, 0, 1.1]\neuler_angles = [0.3, "20 deg", 0.4]'
@@ -141,19 +137,19 @@ def test_a_motion_that_leaves_the_plane_is_refused_with_the_reason(start: str, w
     assert 'choose "auto"' in str(error.value)
 
 
-def test_a_pendulum_that_goes_round_and_round(runs: Path) -> None:
+def test_a_pendulum_that_goes_round_and_round() -> None:
     """Fifty turns; with each the quaternion changes its sign, and so it should in the plane."""
     text = config(PENDULUM, "angular_velocity = [0, 0, 8]", PULL, "end = 40\nsamples = 401")
-    full = loaded(run_text(text, runs, "integrator.formulation=quaternion", "integrator.precision=extended"))
-    run = run_text(text, runs, "integrator.formulation=planar", "output.estimate=true")
+    full = loaded(run_text(text, "integrator.formulation=quaternion", "integrator.precision=extended"))
+    run = run_text(text, "integrator.formulation=planar", "output.estimate=true")
     plane = loaded(run)
     apart = 2 * np.linalg.norm(plane["quaternion"].values - full["quaternion"].values, axis=1).max()
     assert apart <= 3 * run.summary["accuracy"]["estimated_attitude_error"] < 1e-10
     assert "out of the plane" in run.summary["accuracy"]["estimated_how"]
 
 
-def test_turns_never_loosen_the_steps(runs: Path) -> None:
+def test_turns_never_loosen_the_steps() -> None:
     """A spin of 30 rad/s in a gradient: 30,000 rad on, and steps as short as at the beginning."""
     text = config(BODY, SPIN.replace("1.1", "30"), orbit(), "end = 1000\nsamples = 3")
-    cost = run_text(text, runs).summary["cost"]
+    cost = run_text(text).summary["cost"]
     assert cost["largest_step"] < 1.5 * cost["smallest_step"]

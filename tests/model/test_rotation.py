@@ -25,9 +25,7 @@ TILTED = 'angular_momentum = ["0.3", "0.4", 2]\neuler_angles = [0.3, 0.35, 0.2]'
 
 
 def symmetric(time: str, integrator: str, runs: Path) -> xr.Dataset:
-    return loaded(
-        run_text(config(f"principal_moments = {[*MOMENTS]}", TILTED, (), time, integrator, RECORD), runs)
-    )
+    return loaded(run_text(config(f"principal_moments = {[*MOMENTS]}", TILTED, (), time, integrator, RECORD)))
 
 
 @pytest.mark.parametrize(
@@ -69,7 +67,7 @@ def test_a_free_symmetric_top_has_constant_momenta_and_uniform_angles(
     assert found["rotation_period"].values == pytest.approx(2 * math.pi / rate, rel=1e-12)
 
 
-def test_the_rotation_of_an_earth_is_told_without_following_it(runs: Path) -> None:
+def test_the_rotation_of_an_earth_is_told_without_following_it() -> None:
     """The Sun's torque, a wobble of an arcsecond, 20 days between samples: the turns of dense samples."""
     body, start = 'preset = "earth"', 'euler_angles = [0, "-23.44 deg", 0.3]\n'
     start += 'angular_velocity = ["3.5e-10 rad/s", 0, "7.292115e-5 rad/s"]'
@@ -78,7 +76,7 @@ def test_the_rotation_of_an_earth_is_told_without_following_it(runs: Path) -> No
         'orbit = {semi_major_axis = "1.496e11 m", eccentricity = 0.0167}'
     )
     few, many = (
-        run_text(config(body, start, load, f'end = "400 day"\nevery = "{every} day"'), runs, f'name="e{n}"')
+        run_text(config(body, start, load, f'end = "400 day"\nevery = "{every} day"'), f'name="e{n}"')
         for n, every in enumerate((20, 0.05))
     )
     for name in ("rotation_angle", "node_longitude", "obliquity"):
@@ -91,17 +89,17 @@ def test_the_rotation_of_an_earth_is_told_without_following_it(runs: Path) -> No
     assert not evaluator.dense
 
 
-def test_retrograde_and_upside_down_bodies_turn_in_the_direct_sense_about_their_momentum(runs: Path) -> None:
+def test_retrograde_and_upside_down_bodies_turn_in_the_direct_sense_about_their_momentum() -> None:
     for n, (start, away) in enumerate(
         (("[0, 0, -1]", 0.1), ("[0, 0, 1]", 3.1), ("[0, 0, -1]", 3.1), ("[0, 0, 1]", 0.1))
     ):
         initial = f"angular_velocity = {start}\neuler_angles = [0.4, {away}, 0.5]"
         text = config("principal_moments = [1, 1.1, 1.5]", initial, (), "end = 100\nsamples = 3", "", RECORD)
-        angle = run_text(text, runs, f'name="r{n}"').dataset["rotation_angle"].values
+        angle = run_text(text, f'name="r{n}"').dataset["rotation_angle"].values
         np.testing.assert_allclose(angle - angle[0], [0, 50, 100], atol=1e-10)
 
 
-def test_polar_motion_is_absent_where_the_spin_has_left_the_figure_axis(runs: Path) -> None:
+def test_polar_motion_is_absent_where_the_spin_has_left_the_figure_axis() -> None:
     with pytest.raises(ConfigError, match=r"87.*deg from the figure axis"):
         prepare(
             rigidsim.parse(
@@ -112,7 +110,7 @@ def test_polar_motion_is_absent_where_the_spin_has_left_the_figure_axis(runs: Pa
     unstable = "angular_velocity = [0, 1, 0.01]"
     output = 'record = ["polar_motion", "angular_velocity"]\n[frame]\nfigure_axis = "y"'
     body = "principal_moments = [1, 2, 3]"
-    found = loaded(run_text(config(body, unstable, (), "end = 40\nsamples = 401", "", output), runs))
+    found = loaded(run_text(config(body, unstable, (), "end = 40\nsamples = 401", "", output)))
     w = found["angular_velocity"].values
     off = np.hypot(w[:, 2], w[:, 0]) > np.abs(w[:, 1])
     assert 0 < off.sum() < 401
@@ -145,8 +143,8 @@ def test_turns_go_on_where_a_run_is_resumed(runs: Path) -> None:
     load = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 100}'
     output = 'record = ["node_longitude", "rotation_angle", "andoyer_angles"]'
     text = config(body, start, load, "end = 3000\nsamples = 31", "", output)
-    whole = loaded(run_text(text, runs, 'name="whole"'))
-    part = run_text(text, runs, 'name="part"', "limits.max_steps=1000")
+    whole = loaded(run_text(text, 'name="whole"', out=runs))
+    part = run_text(text, 'name="part"', "limits.max_steps=1000", out=runs)
     assert part.status == "stopped: max_steps"
     resumed = loaded(rigidsim.resume(part.folder.path, overrides=["limits.max_steps=100000"]))
     for name in ("node_longitude", "rotation_angle", "andoyer_angles"):
@@ -155,5 +153,5 @@ def test_turns_go_on_where_a_run_is_resumed(runs: Path) -> None:
     prepared = prepare(rigidsim.parse(text))
     evaluator = assemble(prepared).evaluator
     assert evaluator.sparse  # g and l are followed
-    dense = loaded(run_text(text, runs, 'name="dense"', "time.samples=6001"))
+    dense = loaded(run_text(text, 'name="dense"', "time.samples=6001", out=runs))
     np.testing.assert_array_equal(dense["rotation_angle"].values[::200], whole["rotation_angle"].values)

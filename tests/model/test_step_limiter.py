@@ -18,8 +18,6 @@ from rigidsim.model.loads import LoadModel, seconds
 from rigidsim.scene.expression_parser import parse_expression
 from rigidsim.scene.transitions import narrow_parts
 
-pytestmark = pytest.mark.compact
-
 SPUN = """name = "spun"
 [parameters]
 w = "{width}"

@@ -15,8 +15,6 @@ from test_orbit_observables import cross, exactly, rotation, unit
 import rigidsim
 from rigidsim.errors import ConfigError
 
-pytestmark = pytest.mark.compact
-
 READY = {path.stem: path for path in CONFIGS}
 NAMES = ("tilt", "precession_angle", "spin_angle", "tip")
 RECORD = 'record = ["quaternion", "euler_angles", "tilt", "precession_angle", "spin_angle", "tip"]'
@@ -34,13 +32,13 @@ def apart(angle: Any, other: Any) -> float:
 
 
 @pytest.mark.parametrize("up", [(0, 0, 1), (2, -1, 2)], ids=["Z", "oblique"])
-def test_they_are_their_definitions_to_80_bits(runs: Path, up: tuple[int, int, int]) -> None:
+def test_they_are_their_definitions_to_80_bits(up: tuple[int, int, int]) -> None:
     """From the recorded quaternion in 40 digits: z-x-z angles where Z is up, else by Rodrigues' rotation."""
     gravity = f"acceleration = [{', '.join(str(-3 * x) for x in up)}]"
     start = 'angular_velocity = ["0.1", "0.3", 9]\neuler_angles = ["0.4", "1.1", "0.7"]'
     load = f'kind = "uniform_gravity"\n{gravity}'
     text = config(TOP, start, load, "end = 3\nsamples = 61", 'precision = "extended"', RECORD)
-    dataset = loaded(run_text(text, runs))
+    dataset = loaded(run_text(text))
     with mp.workdps(40):
         normal = unit(mp.matrix(up))
         z, x = mp.matrix([0, 0, 1]), mp.matrix([1, 0, 0])
@@ -103,12 +101,12 @@ def test_a_fast_top_precesses_slowly(runs: Path) -> None:
     assert 0.9 * depth < tilts.max() < 1.001 * depth
 
 
-def test_the_tip_is_the_point_that_is_given(runs: Path, tmp_path: Path) -> None:
+def test_the_tip_is_the_point_that_is_given(tmp_path: Path) -> None:
     """In free flight it goes with the centre of mass; where nothing says which point it is, that is said."""
     start = "angular_velocity = [1, 2, 3]\nposition = [7, 8, 9]\nvelocity = [1, 0, -2]"
     body = "principal_moments = [1, 2, 2.5]\nmass = 2"
     output = 'tip = [0, "10 cm", 2]\nrecord = ["tip", "quaternion", "position"]'
-    dataset = loaded(run_text(config(body, start, output=output), runs))
+    dataset = loaded(run_text(config(body, start, output=output)))
     with mp.workdps(30):
         for row in (0, 24, 48):
             matrix = rotation(exactly(dataset["quaternion"].values[row]))
@@ -117,7 +115,7 @@ def test_the_tip_is_the_point_that_is_given(runs: Path, tmp_path: Path) -> None:
             )
             got = exactly(dataset["tip"].values[row])
             assert max(abs(a - b) for a, b in zip(got, expected, strict=True)) < 30 * EPSILON["double"]
-    plain = loaded(run_text(config(output="tip = [0, 0, 1]", time="end = 1\nsamples = 2"), runs))
+    plain = loaded(run_text(config(output="tip = [0, 0, 1]", time="end = 1\nsamples = 2")))
     assert "tip" in plain  # named by its point
     for output, words in (
         ('record = ["tip"]', ["[output] record", "tip = [x, y, z]"]),
@@ -129,11 +127,11 @@ def test_the_tip_is_the_point_that_is_given(runs: Path, tmp_path: Path) -> None:
             assert word in str(raised.value)
 
 
-def test_a_top_without_an_attitude_still_has_its_tilt(runs: Path) -> None:
+def test_a_top_without_an_attitude_still_has_its_tilt() -> None:
     """Rates and the vertical are enough for it; precession needs more, and no state is added for it."""
     text = config(TOP, loads='kind = "uniform_gravity"', integrator='formulation = "rates"')
-    dataset = loaded(run_text(text, runs))
+    dataset = loaded(run_text(text))
     assert "tilt" in dataset
     assert not {"precession_angle", "spin_angle", "tip", "quaternion"} & set(dataset)
-    whole = loaded(run_text(config(TOP, loads='kind = "uniform_gravity"'), runs))
+    whole = loaded(run_text(config(TOP, loads='kind = "uniform_gravity"')))
     assert np.abs(dataset["tilt"].values - whole["tilt"].values).max() < 1e-13

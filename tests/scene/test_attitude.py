@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import context_for, multiply, transpose
 from rigidsim.scene.config import parse
-from rigidsim.scene.schema import EULER_SEQUENCES
+from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.solve.problem import prepare
 
 CONTEXT = context_for(50)

@@ -13,9 +13,9 @@ import pytest
 from experiments.closed_forms import free_top
 from experiments.toutatis import MOMENTS, PUBLISHED, RATES
 from rigidsim.scene.body import RigidBody, build_body
+from rigidsim.scene.body_table import Body
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.presets import PRESETS
-from rigidsim.scene.schema import Body
 
 CONTEXT = mpmath.MPContext()
 CONTEXT.prec = 200

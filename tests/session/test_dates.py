@@ -129,13 +129,12 @@ def test_events_and_lists_have_the_dates_of_their_times() -> None:
     )
 
 
-@pytest.mark.compact
 def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> None:
     text = config(
         time='end = 60\nsamples = 61\nepoch = "2029-04-13T21:46:00 TDB"\nunit = "min"',
         more=FLIP.replace("t - 1", "t - 7.5"),
     )
-    run = run_text(text, tmp_path / "whole")
+    run = run_text(text, out=tmp_path / "whole")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         plain = xarray.open_dataset(run.folder.dataset).load()
@@ -156,7 +155,7 @@ def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> Non
     assert coordinates <= set(in_memory.coords)
     xarray.testing.assert_equal(in_memory.coords.to_dataset(), plain.coords.to_dataset())
     # what a run that was stopped has saved so far reads the same
-    cut = run_text(text, tmp_path / "cut", "limits.max_steps=40", tuning=EAGER)
+    cut = run_text(text, "limits.max_steps=40", tuning=EAGER, out=tmp_path / "cut")
     assert cut.status == "stopped: max_steps"
     with cut.dataset as part:
         rows = part.sizes["time"]
@@ -188,11 +187,10 @@ def as_of_schema_3(folder: Path) -> None:
     (folder / "summary.json").unlink()
 
 
-@pytest.mark.compact
 def test_earlier_runs_with_an_epoch_lack_dates_and_nothing_else(tmp_path: Path) -> None:
     """They verify; they can't be resumed, since half of the result would have dates."""
     text = config(time='end = 2\nsamples = 9\nepoch = "J2000"', more=FLIP)
-    run = run_text(text, tmp_path)
+    run = run_text(text, out=tmp_path)
     as_of_schema_3(run.folder.path)
     verdict = rigidsim.verify(run.folder.dataset)
     assert (verdict.differing, verdict.samples) == ([], 9)
@@ -221,8 +219,7 @@ def test_events_whose_names_are_taken_are_refused(events: list[str], double: str
         refuse_taken_names(prepared)
 
 
-@pytest.mark.compact
-def test_runs_without_an_epoch_have_no_dates(tmp_path: Path) -> None:
-    with run_text(config(), tmp_path).dataset as dataset:
+def test_runs_without_an_epoch_have_no_dates() -> None:
+    with run_text(config()).dataset as dataset:
         assert not {"year", "julian_date", "date"} & set(dataset.variables)
         assert "coordinates" not in dataset.quaternion.encoding

@@ -22,8 +22,6 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.status import Status
 
-pytestmark = pytest.mark.compact
-
 PLAIN = "estimate = false"  # which is the larger part of such short runs
 DRIVES = {
     "as measured": Pacing(),
@@ -175,7 +173,7 @@ def test_ctrl_c_within_a_chunk_takes_it_back(scene: str, monkeypatch: pytest.Mon
 def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     """Whichever way the run takes, with the same samples and steps; under another guard it goes on."""
     text = config(time="end = 300\nsamples = 601", integrator='precision = "single"', output=PLAIN)
-    complete = run_text(text, tmp_path / "whole")
+    complete = run_text(text, out=tmp_path / "whole")
     data = loaded(complete)
     drifts = np.max([np.abs(data[f"{name}_drift"]) for name in complete.summary["invariants"]], axis=0)
     guard = float(drifts[:400].max())
@@ -184,7 +182,7 @@ def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     steps = set()
     for number, drive in enumerate(["as measured", "one step at a time", "blocks"]):
         pacing = DRIVES[drive]
-        run = run_text(text, tmp_path / str(number), f"limits.max_drift={guard!r}", tuning=Tuning(pacing))
+        run = run_text(text, f"limits.max_drift={guard!r}", tuning=Tuning(pacing), out=tmp_path / str(number))
         assert (run.status, run.summary["exit_code"]) == ("stopped: max_drift", 3)
         assert run.summary["samples"] == first + 1
         assert run.summary["time_reached"] == data.time[first]
@@ -201,13 +199,13 @@ def test_max_drift_looks_at_the_last_sample_too(method: str, tmp_path: Path) -> 
     """Below a rounding no run keeps it; one that is short is over before guards are looked at again."""
     closed = f'method = "{method}"'
     text = config(time="end = 3\nsamples = 49", integrator=closed, output=PLAIN)
-    data = loaded(run_text(text, tmp_path / "whole"))
+    data = loaded(run_text(text, out=tmp_path / "whole"))
     drift = np.abs(data["energy_drift"].values)
     largest = int(np.argmax(drift))
     just_below = float(np.nextafter(drift[largest], 0))
     last = config(time=f"end = {largest / 16}\nevery = 0.0625", integrator=closed, output=PLAIN)
     for out, given, guard in (("a", text, 1e-17), ("b", last, just_below)):
-        run = run_text(given, tmp_path / out, f"limits.max_drift={guard!r}")
+        run = run_text(given, f"limits.max_drift={guard!r}", out=tmp_path / out)
         assert (run.status, run.summary["exit_code"]) == ("stopped: max_drift", 3)
     again = rigidsim.resume(run.folder.path)
     assert again.status == "stopped: max_drift"
@@ -234,7 +232,7 @@ def test_an_event_ends_a_run_at_the_same_step_however_it_is_driven() -> None:
 def test_an_event_past_the_last_sample_ends_nothing(tmp_path: Path) -> None:
     """Steps go past the last sample, which is where the run ends; prolonged, it ends at the event."""
     late = '[[events]]\nname = "late"\nexpression = "t - 10.01"\naction = "stop"'
-    run = run_text(config(time="end = 10\nsamples = 11", more=late, output=PLAIN), tmp_path)
+    run = run_text(config(time="end = 10\nsamples = 11", more=late, output=PLAIN), out=tmp_path)
     assert run.summary["engine_time"] > 10.01
     assert (run.status, run.summary["events"]) == ("finished", {"late": 0})
     again = rigidsim.resume(run.folder.path, until="20")
@@ -275,6 +273,7 @@ def test_a_plunge_ends_at_the_same_step_however_it_is_driven() -> None:
     assert (progress.status, progress.steps) == (Status.COLLAPSED, steps)
 
 
+@pytest.mark.optimised  # how far steps shrink before the fall is a matter of rounding
 def test_the_move_to_a_whole_time_is_given_up_where_steps_are_smaller() -> None:
     """Where natural steps are 1e-25 of the time, half its last bit would take a billion of them."""
     prepared = prepare(rigidsim.parse(PLUNGE))

@@ -21,6 +21,8 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
 
+pytestmark = pytest.mark.optimised
+
 RUNS = [
     ('"single"', "quaternion"),
     ('"double"', "rates"),

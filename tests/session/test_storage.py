@@ -14,7 +14,6 @@ from rigidsim.session.storage import storage
 from rigidsim.solve.problem import prepare
 
 VAST = "end = 999999999999\nevery = 1"  # hundreds of terabytes
-pytestmark = pytest.mark.compact
 
 
 def test_a_run_that_does_not_fit_is_refused(tmp_path: Path) -> None:
@@ -27,8 +26,8 @@ def test_a_run_that_does_not_fit_is_refused(tmp_path: Path) -> None:
     "ending",
     ["[limits]\nmax_steps = 5", '[[events]]\nname = "soon"\nexpression = "t - 2"\naction = "stop"'],
 )
-def test_one_that_may_end_before_is_not(ending: str, tmp_path: Path) -> None:
-    run = run_text(config(time=VAST, more=ending), tmp_path)
+def test_one_that_may_end_before_is_not(ending: str) -> None:
+    run = run_text(config(time=VAST, more=ending))
     assert run.status in ("stopped: max_steps", "finished: event")
     assert 0 < run.summary["samples"] < 100
 
@@ -50,9 +49,9 @@ def test_what_is_predicted_is_what_it_takes(tmp_path: Path) -> None:
         time="end = 20000\nsamples = 20001", output="estimate = false", more="[limits]\nmax_steps = 1000000"
     )
     predicted = storage(prepare(rigidsim.parse(text)), tmp_path)
-    whole = run_text(text, tmp_path)
+    whole = run_text(text, out=tmp_path)
     size = whole.folder.dataset.stat().st_size
     assert size < 1.05 * predicted.dataset
-    cut = run_text(text, tmp_path / "cut", "limits.max_steps=10000")
+    cut = run_text(text, "limits.max_steps=10000", out=tmp_path / "cut")
     segments = sum(file.stat().st_size for file in cut.folder.segments.iterdir())
     assert segments == pytest.approx(cut.summary["samples"] * predicted.row, rel=0.1)

@@ -53,7 +53,7 @@ def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pyt
     a run in one go.
     """
     text = config(time="end = 60\nsamples = 241", integrator='formulation = "euler_angles"', output=PLAIN)
-    whole = run_text(text, tmp_path / "whole")
+    whole = run_text(text, out=tmp_path / "whole")
     assert whole.summary["chart_changes"]["count"] > 0
     compiled: Callable[[Stepper, System], Any] = Stepper._compiled
     never = threading.Event()
@@ -66,7 +66,7 @@ def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pyt
 
     with monkeypatch.context() as patch:
         patch.setattr(Stepper, "_compiled", interrupted)
-        run = run_text(text, tmp_path / "cut")
+        run = run_text(text, out=tmp_path / "cut")
     never.set()
     assert run.status == "interrupted"
     assert run.summary["samples"] < 241

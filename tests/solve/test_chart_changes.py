@@ -18,15 +18,13 @@ import rigidsim
 from rigidsim.model.euler_charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.attitude import AXES, quaternion_from_euler, rotation_matrix
-from rigidsim.scene.schema import EULER_SEQUENCES
+from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.charts import NEAR
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import precision_of
 from rigidsim.workflows.plan import plan
 from rigidsim.workflows.resume import resume
-
-pytestmark = pytest.mark.compact
 
 RECORD = 'output.record=["angular_velocity", "quaternion", "euler_angles"]'
 EULER = 'integrator.formulation="euler_angles"'
@@ -104,10 +102,10 @@ def test_one_of_two_charts_is_always_regular(sequence: str, angles: tuple[float,
 
 
 @pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyz", "yxy")))
-def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str, runs: Path) -> None:
+def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str) -> None:
     text = tumbling(sequence)
-    exact = run_text(text, runs, 'name="x"', RECORD, 'integrator.precision="extended"')
-    run = run_text(text, runs, 'name="e"', EULER, RECORD, estimate=True)
+    exact = run_text(text, 'name="x"', RECORD, 'integrator.precision="extended"')
+    run = run_text(text, 'name="e"', EULER, RECORD, estimate=True)
     reference = wide(exact.dataset, "quaternion")
     found = run.dataset["quaternion"].values
     # twice the steps of a quaternion: three times the law at most, with the growth that this motion about
@@ -135,12 +133,12 @@ def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str, runs
 
 
 @pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyz", "yxy")))
-def test_a_run_may_start_in_the_singularity(sequence: str, runs: Path) -> None:
+def test_a_run_may_start_in_the_singularity(sequence: str) -> None:
     start = f'euler_angles = [0.4, "{pole(sequence)}", 0.3]'
-    run = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), runs, EULER, RECORD, estimate=True)
+    run = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), EULER, RECORD, estimate=True)
     assert run.status == "finished"
     assert run.summary["warnings"] == []
-    exact = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), runs, 'name="q"', RECORD)
+    exact = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), 'name="q"', RECORD)
     angles, found = run.dataset["euler_angles"].values, run.dataset["quaternion"].values
     assert np.isfinite(angles).all()
     given_angles = [0.4, float(pole(sequence)), 0.3]
@@ -155,7 +153,7 @@ def test_a_run_may_start_in_the_singularity(sequence: str, runs: Path) -> None:
 
 @pytest.mark.parametrize("offset", cases(["0", "1e-16", "1e-12", "1e-9"], ["0", "1e-12"]))
 @pytest.mark.parametrize("sequence", ["zxz", "zyx"])
-def test_a_pass_that_no_sampling_shows_goes_straight_through(sequence: str, offset: str, runs: Path) -> None:
+def test_a_pass_that_no_sampling_shows_goes_straight_through(sequence: str, offset: str) -> None:
     """A body that spins about the line of nodes: the middle angle grows like t through 16 singularities."""
     rates = [float(axis == sequence[1]) for axis in AXES]
     text = f"""
@@ -171,7 +169,7 @@ samples = 5001
 [integrator]
 euler_sequence = "{sequence}"
 """
-    run = run_text(text, runs, EULER, RECORD)
+    run = run_text(text, EULER, RECORD)
     angles = run.dataset["euler_angles"].values
     times = run.dataset["time"].values
     # off the node line by the offset, and by rounding, which adds up as in any attitude, the outer angles
@@ -186,11 +184,11 @@ euler_sequence = "{sequence}"
     assert np.abs(quaternion - attitude_from(sequence, angles)).max() < 1e-12  # in its sign, too
 
 
-def test_a_pass_at_a_distance_swings_the_outer_angles(runs: Path) -> None:
+def test_a_pass_at_a_distance_swings_the_outer_angles() -> None:
     """1e-4 rad from the singularity they turn by half a turn within 1e-4 s: samples 1e-5 s apart show it."""
     text = tumbling("zxz", 'euler_angles = [0.4, 0.05, "1e-4"]', "end = 0.1\nsamples = 10001")
     text = text.replace("[0.3, 1.0, 0.5]", "[-1, 0, 0]").replace("[1, 2, 3]", "[1, 1, 1]")
-    angles = run_text(text, runs, EULER, RECORD).dataset["euler_angles"].values
+    angles = run_text(text, EULER, RECORD).dataset["euler_angles"].values
     # the node turns by at most 1e-5 s / (0.05 rad * 1e-4) = 2 rad from one sample to the next
     assert np.abs(np.diff(angles[:, 0])).max() < 2.1
     nearest = angles[:, 1].min()
@@ -214,12 +212,12 @@ DRIVES = {
     ids=["dense", "sparse"],
 )
 @pytest.mark.parametrize("sequence", ["zxz"])
-def test_the_bits_do_not_depend_on_how_it_is_driven(sequence: str, time: str, runs: Path) -> None:
+def test_the_bits_do_not_depend_on_how_it_is_driven(sequence: str, time: str) -> None:
     text = tumbling(sequence, time=time)
-    plain = run_text(text, runs, 'name="plain"', EULER)
+    plain = run_text(text, 'name="plain"', EULER)
     assert plain.summary["chart_changes"]["count"] > 10
     for pacing in DRIVES.values():
-        driven = run_text(text, runs, EULER, tuning=Tuning(pacing))
+        driven = run_text(text, EULER, tuning=Tuning(pacing))
         same_bits(plain, driven)
         assert driven.summary["chart_changes"] == plain.summary["chart_changes"]
 
@@ -231,9 +229,9 @@ def test_a_resumed_run_has_the_same_bits(precision: str, runs: Path) -> None:
     steps = 13 if precision == "double" else 4
     text = tumbling("zxz", time=end)
     settings = [EULER, f'integrator.precision="{precision}"']
-    whole = run_text(text, runs, 'name="whole"', *settings)
+    whole = run_text(text, 'name="whole"', *settings, out=runs)
     every_step = Tuning(Pacing(chunk_seconds=0.0))  # a look at the guards after each
-    run = run_text(text, runs, 'name="parts"', *settings, "limits.max_steps=7", tuning=every_step)
+    run = run_text(text, 'name="parts"', *settings, "limits.max_steps=7", tuning=every_step, out=runs)
     sessions = 1
     while run.status != "finished":
         taken = run.summary["cost"]["steps"]
@@ -274,7 +272,7 @@ SCENES = {
     ],
 )
 def test_it_is_as_accurate_as_the_quaternion(
-    scene: str, sequence: str, precision: str, better: str, end: int, runs: Path
+    scene: str, sequence: str, precision: str, better: str, end: int
 ) -> None:
     body, initial, loads = SCENES[scene]
     text = f"""
@@ -293,11 +291,11 @@ euler_sequence = "{sequence}"
 """
     better = better if better.isdigit() else f'"{better}"'
     only = 'output.record=["quaternion"]'
-    reference = run_text(text, runs, 'name="x"', only, f"integrator.precision={better}").dataset
+    reference = run_text(text, 'name="x"', only, f"integrator.precision={better}").dataset
     errors = {}
     for formulation in ("quaternion", "euler_angles"):
         settings = [only, f'integrator.formulation="{formulation}"', f'integrator.precision="{precision}"']
-        run = run_text(text, runs, *settings)
+        run = run_text(text, *settings)
         assert run.status == "finished"
         if formulation == "euler_angles":
             assert run.summary["chart_changes"]["count"] > 0
@@ -319,9 +317,9 @@ def error(dataset: xarray.Dataset, reference: xarray.Dataset) -> float:
 
 
 @pytest.mark.parametrize("precision", ["single", "extended", "quadruple"])
-def test_other_precisions_pass_the_singularity(precision: str, runs: Path) -> None:
+def test_other_precisions_pass_the_singularity(precision: str) -> None:
     text = tumbling("zxz", time="end = 10\nsamples = 101")
-    run = run_text(text, runs, EULER, RECORD, f'integrator.precision="{precision}"')
+    run = run_text(text, EULER, RECORD, f'integrator.precision="{precision}"')
     assert run.summary["chart_changes"]["count"] > 0
     angles, quaternion = wide(run.dataset, "euler_angles"), wide(run.dataset, "quaternion")
     found = attitude_from("zxz", angles.astype(float))
@@ -329,14 +327,14 @@ def test_other_precisions_pass_the_singularity(precision: str, runs: Path) -> No
     assert angle_between(found, quaternion.astype(float)).max() < 64 * limit
 
 
-def test_events_are_found_in_both_charts(runs: Path) -> None:
+def test_events_are_found_in_both_charts() -> None:
     """An event on the asked sequence's own angle, and one that tells nothing of charts."""
     text = tumbling("zxz", time="end = 100\nsamples = 11") + (
         '[[events]]\nname = "flip"\nexpression = "wy"\n'
         '[[events]]\nname = "level"\nexpression = "theta - 0.3"\n'
     )
-    run = run_text(text, runs, EULER, RECORD)
-    plain = run_text(text, runs, 'name="q"', RECORD)
+    run = run_text(text, EULER, RECORD)
+    plain = run_text(text, 'name="q"', RECORD)
     assert run.summary["events"] == plain.summary["events"]
     assert run.summary["events"]["level"] > 3
     # at rest neither; both within the drift of the attitude over the rate of crossing
@@ -346,13 +344,13 @@ def test_events_are_found_in_both_charts(runs: Path) -> None:
     np.testing.assert_allclose(run.dataset["level_euler_angles"].values[:, 1], 0.3, rtol=0, atol=1e-12)
 
 
-def test_plan_and_dataset_name_the_partner(runs: Path) -> None:
+def test_plan_and_dataset_name_the_partner() -> None:
     experiment = rigidsim.parse(tumbling("zxz"), overrides=[EULER])
     planned = plan(experiment)
     assert planned["euler_partner_sequence"] == "zxy"
     assert any("zxy" in reason["why"] for reason in planned["reasons"])
-    run = run_text(tumbling("zxz"), runs, EULER)
+    run = run_text(tumbling("zxz"), EULER)
     assert run.dataset.attrs["euler_partner_sequence"] == "zxy"
-    plain = run_text(tumbling("zxz"), runs)
+    plain = run_text(tumbling("zxz"))
     assert plain.dataset.attrs["euler_partner_sequence"] == ""
     assert plain.summary["chart_changes"] is None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import mpmath
 import numpy as np
 import pytest
@@ -50,8 +48,8 @@ method = "closed_form"
 """
 
 
-def test_a_run_in_closed_form_takes_no_steps_and_keeps_every_invariant(runs: Path) -> None:
-    run = run_text(FREE, runs)
+def test_a_run_in_closed_form_takes_no_steps_and_keeps_every_invariant() -> None:
+    run = run_text(FREE)
     assert run.status == "finished"
     assert run.summary["cost"]["steps"] == 0
     assert run.summary["method"] == "closed_form"
@@ -63,11 +61,11 @@ def test_a_run_in_closed_form_takes_no_steps_and_keeps_every_invariant(runs: Pat
 
 
 @pytest.mark.parametrize("precision", ["single", "double", "extended", "quadruple", "40"])
-def test_it_agrees_with_the_integration_in_each_precision(precision: str, runs: Path) -> None:
+def test_it_agrees_with_the_integration_in_each_precision(precision: str) -> None:
     given = precision if precision.isdigit() else f'"{precision}"'
     wide = f"integrator.precision={given}"
-    one = run_text(FREE, runs, wide, "time.end=10", 'name="c"')
-    two = run_text(FREE, runs, wide, "time.end=10", 'name="t"', 'integrator.method="taylor"')
+    one = run_text(FREE, wide, "time.end=10", 'name="c"')
+    two = run_text(FREE, wide, "time.end=10", 'name="t"', 'integrator.method="taylor"')
     bits = {"single": 24, "double": 53, "extended": 64, "quadruple": 113}.get(precision, 134)
     for name in ("quaternion", "angular_velocity"):
         parts = [name, f"{name}_lo", f"{name}_lo2"]
@@ -77,7 +75,7 @@ def test_it_agrees_with_the_integration_in_each_precision(precision: str, runs: 
         assert np.abs(difference).max() < 2.0 ** (9 - bits)
 
 
-def test_a_top_and_a_throw_in_closed_form(runs: Path) -> None:
+def test_a_top_and_a_throw_in_closed_form() -> None:
     heavy = FREE.replace("principal_moments = [1, 2, 3]", top(1, 0.5)).replace(
         "[time]", '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1]\n[time]'
     )
@@ -86,8 +84,8 @@ def test_a_top_and_a_throw_in_closed_form(runs: Path) -> None:
     )
     throw = throw.replace("[1, 2, 3]\n[initial]", "[1, 2, 3]\nmass = 2\n[initial]")
     for text in (heavy, throw):
-        one = run_text(text, runs, "time.end=5", 'name="c"')
-        two = run_text(text, runs, "time.end=5", 'name="t"', 'integrator.method="taylor"')
+        one = run_text(text, "time.end=5", 'name="c"')
+        two = run_text(text, "time.end=5", 'name="t"', 'integrator.method="taylor"')
         with one.dataset as a, two.dataset as b:
             assert set(a.data_vars) == set(b.data_vars)
             for name in ("quaternion", "angular_velocity", "position"):

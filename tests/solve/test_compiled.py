@@ -14,6 +14,8 @@ import rigidsim
 from rigidsim.solve.compiled import Kept, compiled_engine, compiled_function
 from rigidsim.solve.problem import prepare
 
+pytestmark = pytest.mark.optimised
+
 x, v = hy.make_vars("x", "v")
 PENDULUM = [(x, v), (v, -hy.sin(x))]
 

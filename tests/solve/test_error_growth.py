@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 from support import run_estimated as run_text
-
-pytestmark = pytest.mark.compact
 
 SPIN = """
 name = "spin"
@@ -23,29 +20,29 @@ samples = 101
 
 
 @pytest.mark.parametrize("rates", ["[1, 1e-3, 1e-3]", "[1e-3, 1e-3, 1]", "[0.5, 0.25, 1]"])
-def test_spin_about_an_outer_axis_is_stable(rates: str, runs: Path) -> None:
-    run = run_text(SPIN.format(rates=rates, end=500), runs)
+def test_spin_about_an_outer_axis_is_stable(rates: str) -> None:
+    run = run_text(SPIN.format(rates=rates, end=500))
     assert run.summary["accuracy"]["amplification"] == 1
 
 
 @pytest.mark.parametrize("offset", ["1e-4", "1e-6"])
 def test_spin_about_the_middle_axis_amplifies_by_no_more_than_the_inverse_square_of_its_offset(
-    offset: str, runs: Path
+    offset: str,
 ) -> None:
     """A passage takes (2 / rate) log(1/offset), so errors grow by up to 1/offset^2 in it; the rate is
     1 / sqrt 3, and the first passage begins half-way.
     """
     end = 2 * math.sqrt(3) * math.log(1 / float(offset))
-    run = run_text(SPIN.format(rates=f"[{offset}, 1, {offset}]", end=end), runs)
+    run = run_text(SPIN.format(rates=f"[{offset}, 1, {offset}]", end=end))
     accuracy = run.summary["accuracy"]
     assert 1 < accuracy["amplification"] < 10 / float(offset) ** 2
     assert 0 < accuracy["amplification_seconds"] <= end * 1.1
 
 
-def test_lost_digits_are_said(runs: Path) -> None:
-    lost = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), runs, 'integrator.precision="single"')
+def test_lost_digits_are_said() -> None:
+    lost = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), 'integrator.precision="single"')
     assert any("digits are gone" in warning for warning in lost.summary["warnings"])
-    kept = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), runs, 'integrator.precision="quadruple"')
+    kept = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), 'integrator.precision="quadruple"')
     assert not kept.summary["warnings"]
 
 
@@ -66,9 +63,9 @@ samples = 601
 """
 
 
-def test_hyperion_tumbles_beyond_prediction(runs: Path) -> None:
+def test_hyperion_tumbles_beyond_prediction() -> None:
     """Wisdom, Peale & Mignard 1984: errors grow e-fold in about 8 / n; double has 15 digits to lose."""
-    chaotic = run_text(SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1), runs)
+    chaotic = run_text(SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1))
     accuracy = chaotic.summary["accuracy"]
     # the pilot sees some 40 orbits, over which the rate itself is uncertain by a factor of two
     assert 0.06 < accuracy["error_growth_rate"] < 0.24
@@ -76,15 +73,15 @@ def test_hyperion_tumbles_beyond_prediction(runs: Path) -> None:
     assert digits / 0.24 / 2 < accuracy["predictable_seconds"] < digits / 0.06
     assert any("digits are gone from about" in warning for warning in chaotic.summary["warnings"])
     extended = run_text(
-        SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1), runs, 'integrator.precision="extended"'
+        SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1), 'integrator.precision="extended"'
     )
     longer = extended.summary["accuracy"]["predictable_seconds"] - accuracy["predictable_seconds"]
     # eleven bits more are lost, at rates between which the local one varies
     assert math.log(2.0**11) / 0.24 < longer < math.log(2.0**11) / 0.06
 
 
-def test_fast_spin_on_a_circular_orbit_is_predictable(runs: Path) -> None:
-    regular = run_text(SATELLITE.format(rates="[0, 0, 20]", eccentricity=0), runs)
+def test_fast_spin_on_a_circular_orbit_is_predictable() -> None:
+    regular = run_text(SATELLITE.format(rates="[0, 0, 20]", eccentricity=0))
     assert regular.summary["accuracy"]["error_growth_rate"] == 0
     assert regular.summary["accuracy"]["predictable_seconds"] is None
     assert not regular.summary["warnings"]

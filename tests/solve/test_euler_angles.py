@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import angle_between, cases, law, run_text
 
-from rigidsim.scene.schema import EULER_SEQUENCES
-
-pytestmark = pytest.mark.compact
+from rigidsim.scene.fields import EULER_SEQUENCES
 
 FREE = """
 name = "free"
@@ -26,11 +22,11 @@ samples = 1201
 
 
 @pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyx", "zyx", "yzx")))
-def test_each_sequence_gives_the_attitude_of_the_quaternion(sequence: str, runs: Path) -> None:
+def test_each_sequence_gives_the_attitude_of_the_quaternion(sequence: str) -> None:
     record = 'output.record=["angular_velocity", "quaternion", "euler_angles"]'
     common = [record, f'integrator.euler_sequence="{sequence}"']
-    plain = run_text(FREE, runs, 'name="q"', *common)
-    angles = run_text(FREE, runs, 'name="e"', 'integrator.formulation="euler_angles"', *common)
+    plain = run_text(FREE, 'name="q"', *common)
+    angles = run_text(FREE, 'name="e"', 'integrator.formulation="euler_angles"', *common)
     error = angle_between(plain.dataset["quaternion"].values, angles.dataset["quaternion"].values)
     # both formulations within three times the law, the angles' own with the amplification of their chart:
     # an error of the outer angles grows like 1/|singular factor|, whose smallest value the sample shows
@@ -44,8 +40,8 @@ def test_each_sequence_gives_the_attitude_of_the_quaternion(sequence: str, runs:
     assert np.abs(difference).max() <= 6 * law(2.0**-52, steps, 2.01, 60) * (1 + 1 / factor**2)
 
 
-def test_angles_grow_through_full_turns_without_a_jump(runs: Path) -> None:
-    run = run_text(FREE, runs, 'integrator.formulation="euler_angles"', "time.end=600", "time.samples=12001")
+def test_angles_grow_through_full_turns_without_a_jump() -> None:
+    run = run_text(FREE, 'integrator.formulation="euler_angles"', "time.end=600", "time.samples=12001")
     angles = run.dataset["euler_angles"].values
     assert np.abs(angles[-1]).max() > 100  # many turns
     # the largest rate of an angle is |w| / |sin theta|; samples are 0.05 s apart
@@ -56,19 +52,17 @@ def test_angles_grow_through_full_turns_without_a_jump(runs: Path) -> None:
 
 
 @pytest.mark.slow
-def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(
-    runs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(monkeypatch: pytest.MonkeyPatch) -> None:
     """heyoka's step control is relative to the largest component: unwrapped angles loosen it."""
     from rigidsim.solve.angle_wrapping import AngleWrapping
 
     setting = ['integrator.formulation="euler_angles"', "time.end=20000", "time.samples=101"]
-    wrapped = run_text(FREE, runs, 'name="w"', *setting)
+    wrapped = run_text(FREE, 'name="w"', *setting)
     with monkeypatch.context() as patch:
         patch.setattr(AngleWrapping, "wrap", lambda self, state: None)
-        growing = run_text(FREE, runs, 'name="g"', *setting)
+        growing = run_text(FREE, 'name="g"', *setting)
     assert growing.summary["cost"]["steps"] < 0.8 * wrapped.summary["cost"]["steps"]
-    exact = run_text(FREE, runs, 'name="x"', "time.end=20000", "time.samples=101")
+    exact = run_text(FREE, 'name="x"', "time.end=20000", "time.samples=101")
     reference = exact.dataset["quaternion"].values
 
     def error(run) -> float:
@@ -78,11 +72,11 @@ def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(
 
 
 @pytest.mark.parametrize("distance", ["1e-4", "1e-12", "0"])
-def test_starting_close_to_the_singularity_costs_no_digits(distance: str, runs: Path) -> None:
+def test_starting_close_to_the_singularity_costs_no_digits(distance: str) -> None:
     """Theta of a wobbling top nearly reaches zero: another chart carries it, without a warning."""
     text = FREE.replace("quaternion = [0.7, 0.4, 0.5, 0.3]", f"euler_angles = [0.0, {distance}, 0.0]")
-    plain = run_text(text, runs, 'name="q"')
-    run = run_text(text, runs, 'integrator.formulation="euler_angles"')
+    plain = run_text(text, 'name="q"')
+    run = run_text(text, 'integrator.formulation="euler_angles"')
     assert not run.summary["warnings"]
     error = angle_between(plain.dataset["quaternion"].values, run.dataset["quaternion"].values)
     # both formulations within three times the law

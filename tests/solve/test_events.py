@@ -19,8 +19,6 @@ from rigidsim.errors import ConfigError
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.pacing import Pacing
 
-pytestmark = pytest.mark.compact
-
 FLIPS = """
 name = "flips"
 [body]
@@ -57,8 +55,8 @@ def flip_interval() -> mpmath.mpf:
     ("precision", "epsilon"),
     [("double", 2.0**-52), pytest.param("quadruple", 2.0**-112, marks=pytest.mark.slow)],
 )
-def test_flips_come_at_the_interval_of_the_closed_form(precision: str, epsilon: float, runs: Path) -> None:
-    run = run_text(FLIPS.format(samples=11) + FLIP, runs, f'integrator.precision="{precision}"')
+def test_flips_come_at_the_interval_of_the_closed_form(precision: str, epsilon: float) -> None:
+    run = run_text(FLIPS.format(samples=11) + FLIP, f'integrator.precision="{precision}"')
     names = [n for n in ("flip_time", "flip_time_lo", "flip_time_lo2") if n in run.dataset]
     with mpmath.workdps(50):
         times = [
@@ -76,40 +74,38 @@ def test_flips_come_at_the_interval_of_the_closed_form(precision: str, epsilon: 
     assert run.summary["events"] == {"flip": len(times)}
 
 
-def test_directions_alternate(runs: Path) -> None:
+def test_directions_alternate() -> None:
     both = FLIP + FLIP.replace('"flip"', '"down"') + 'direction = "down"\n'
-    run = run_text(FLIPS.format(samples=11) + both, runs)
+    run = run_text(FLIPS.format(samples=11) + both)
     assert np.array_equal(run.dataset["down_time"], run.dataset["flip_time"][::2])
 
 
-def test_events_change_the_motion_by_rounding_alone(runs: Path) -> None:
+def test_events_change_the_motion_by_rounding_alone() -> None:
     """Their expressions take part in heyoka's choice of steps."""
-    plain = run_text(FLIPS.format(samples=2001), runs, 'name="plain"').dataset
-    watched = run_text(FLIPS.format(samples=2001) + FLIP, runs, 'name="watched"').dataset
+    plain = run_text(FLIPS.format(samples=2001), 'name="plain"').dataset
+    watched = run_text(FLIPS.format(samples=2001) + FLIP, 'name="watched"').dataset
     difference = np.abs(plain["quaternion"].values - watched["quaternion"].values).max()
     # rounding of some hundred steps, amplified by the inverse square of the offset 1/16
     assert difference < 100 * 2.0**-52 * 16**2
 
 
 @pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rotation_matrix"])
-def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven(
-    formulation: str, runs: Path
-) -> None:
+def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven(formulation: str) -> None:
     setting = f'integrator.formulation="{formulation}"'
-    expected = run_text(FLIPS.format(samples=2001) + FLIP, runs, setting).dataset.load()
-    sparse = run_text(FLIPS.format(samples=3) + FLIP, runs, setting, 'name="sparse"').dataset
+    expected = run_text(FLIPS.format(samples=2001) + FLIP, setting).dataset.load()
+    sparse = run_text(FLIPS.format(samples=3) + FLIP, setting, 'name="sparse"').dataset
     assert np.array_equal(expected["flip_time"], sparse["flip_time"])
     # skips that go too far are taken back, and their events with them
     tuning = Tuning(Pacing(chunk_seconds=10.0, skip_margin=1.7, skip_from=2.0))  # however slow the machine
-    driven = run_text(FLIPS.format(samples=3) + FLIP, runs, setting, 'name="driven"', tuning=tuning)
+    driven = run_text(FLIPS.format(samples=3) + FLIP, setting, 'name="driven"', tuning=tuning)
     assert driven.summary["cost"]["steps_redone"] > 0
     assert np.array_equal(expected["flip_time"], driven.dataset["flip_time"])
     assert np.array_equal(sparse["flip_quaternion"], driven.dataset["flip_quaternion"])
 
 
-def test_a_run_can_end_at_an_event(runs: Path) -> None:
-    whole = run_text(FLIPS.format(samples=2001) + FLIP, runs, 'name="whole"').dataset
-    run = run_text(FLIPS.format(samples=2001) + FLIP + 'action = "stop"\n', runs)
+def test_a_run_can_end_at_an_event() -> None:
+    whole = run_text(FLIPS.format(samples=2001) + FLIP, 'name="whole"').dataset
+    run = run_text(FLIPS.format(samples=2001) + FLIP + 'action = "stop"\n')
     assert run.status == "finished: event"
     assert run.summary["exit_code"] == 0
     first = float(whole["flip_time"][0])
@@ -132,7 +128,7 @@ def test_a_coin_stops_when_it_lands(runs: Path) -> None:
         more='[[events]]\nname = "landed"\nexpression = "z"\naction = "stop"\n'
         '[[events]]\nname = "summit"\nexpression = "vz"\n[[events]]\nname = "never"\nexpression = "z - 5"',
     )
-    run = run_text(coin, runs)
+    run = run_text(coin, out=runs)
     landing = (up + math.sqrt(up**2 + 2 * gravity * height)) / gravity
     found, last = run.summary["time_reached"], run.dataset.time.values[-1]
     assert found == pytest.approx(landing, abs=4 * 2.0**-52)  # seconds, of some roundings of order 1
@@ -150,15 +146,15 @@ def test_a_coin_stops_when_it_lands(runs: Path) -> None:
     assert all(line in text for line in said)
 
 
-def test_the_time_reached_is_that_of_the_last_sample(runs: Path) -> None:
-    run = run_text(FLIPS.format(samples=11) + FLIP, runs, "time.end=10")
+def test_the_time_reached_is_that_of_the_last_sample() -> None:
+    run = run_text(FLIPS.format(samples=11) + FLIP, "time.end=10")
     assert run.summary["time_reached"] == 10 < run.summary["engine_time"]
     assert run.summary["event_times"]["flip"]["last"] <= 10
-    stopped = run_text(FLIPS.format(samples=2001) + "[limits]\nmax_steps = 20", runs)
+    stopped = run_text(FLIPS.format(samples=2001) + "[limits]\nmax_steps = 20")
     assert stopped.summary["time_reached"] == stopped.dataset.time.values[-1]
 
 
-def test_events_read_attitude_position_and_time(runs: Path) -> None:
+def test_events_read_attitude_position_and_time() -> None:
     text = """
     name = "throw"
     [parameters]
@@ -187,7 +183,7 @@ def test_events_read_attitude_position_and_time(runs: Path) -> None:
     name = "turned"
     expression = "qz - sin(3*t/2) + t - 1"
     """
-    data = run_text(text, runs).dataset
+    data = run_text(text).dataset
     # z = 10 t - 5 t^2
     assert data["top_time"].values == pytest.approx([1.0], abs=1e-14)
     assert data["rising_time"].values == pytest.approx([1 - np.sqrt(0.8)], abs=1e-14)
@@ -195,8 +191,8 @@ def test_events_read_attitude_position_and_time(runs: Path) -> None:
     assert data["top_position"].values[0, 2] == pytest.approx(5.0, abs=1e-13)
 
 
-def test_an_event_that_never_happens_is_an_empty_variable(runs: Path) -> None:
-    run = run_text(FLIPS.format(samples=11) + FLIP.replace('"wy"', '"wy - 5"'), runs)
+def test_an_event_that_never_happens_is_an_empty_variable() -> None:
+    run = run_text(FLIPS.format(samples=11) + FLIP.replace('"wy"', '"wy - 5"'))
     assert run.dataset.sizes["flip"] == 0
     assert run.summary["events"] == {"flip": 0}
 
@@ -215,15 +211,15 @@ def test_an_event_that_never_happens_is_an_empty_variable(runs: Path) -> None:
         ),
     ],
 )
-def test_bad_events_are_refused(event: str, message: str, runs: Path) -> None:
+def test_bad_events_are_refused(event: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
-        run_text(FLIPS.format(samples=11) + f"[[events]]\n{event}\n", runs)
+        run_text(FLIPS.format(samples=11) + f"[[events]]\n{event}\n")
 
 
 @pytest.mark.parametrize("precision", ["double", "extended"])
 @pytest.mark.parametrize(("direction", "count"), [("down", 1), ("any", 1), ("up", 0)])
 def test_a_throw_from_the_ground_comes_down_within_the_first_step(
-    precision: str, direction: str, count: int, runs: Path
+    precision: str, direction: str, count: int
 ) -> None:
     """z = 3 t - g t^2 / 2 is zero at the start and at 6 / g; a body that hardly turns takes long steps."""
     text = config(
@@ -234,17 +230,17 @@ def test_a_throw_from_the_ground_comes_down_within_the_first_step(
         integrator=f'precision = "{precision}"',
         more=f'[[events]]\nname = "ground"\nexpression = "z"\ndirection = "{direction}"\n',
     )
-    times = run_text(text, runs).dataset["ground_time"].values
+    times = run_text(text).dataset["ground_time"].values
     assert len(times) == count
     assert all(abs(times - 6 / 9.75) <= 4 * 2.0**-52)
 
 
 @pytest.mark.parametrize("precision", cases(["double", "extended"], ["double"]))
-def test_events_of_large_values_cost_the_motion_no_digits(precision: str, runs: Path) -> None:
+def test_events_of_large_values_cost_the_motion_no_digits(precision: str) -> None:
     """The engine's steps are relative to the largest of states and events: here a billion times looser."""
     text = config(time="end = 200\nsamples = 41", integrator=f'precision = "{precision}"')
     event = '[[events]]\nname = "late"\nexpression = "1e9*(t - 150)"\n'
-    plain, watched = run_text(text, runs), run_text(text + event, runs, 'name="watched"')
+    plain, watched = run_text(text), run_text(text + event, 'name="watched"')
     assert watched.summary["cost"]["steps"] == pytest.approx(plain.summary["cost"]["steps"], abs=3)
     assert watched.dataset["late_time"].values == pytest.approx([150], rel=4 * EPSILON["double"])
     bound = 6 * law(EPSILON[precision], plain.summary["cost"]["steps"], 1.2, 200)  # three times for each run
@@ -252,10 +248,10 @@ def test_events_of_large_values_cost_the_motion_no_digits(precision: str, runs: 
     assert apart.max() <= bound * amplification(rigidsim.parse(text)) / 200
 
 
-def test_surfaces_of_large_values_cost_the_motion_no_digits(runs: Path) -> None:
+def test_surfaces_of_large_values_cost_the_motion_no_digits() -> None:
     ends = []
     for size in ("1", "1e9"):
         load = f'kind = "torque"\ncomponents = ["0", "0.1*sign({size}*(t - 5.3))", "0"]'
-        run = run_text(config(loads=load, time="end = 60\nsamples = 2"), runs, f'name="s{size}"')
+        run = run_text(config(loads=load, time="end = 60\nsamples = 2"), f'name="s{size}"')
         ends.append(run.dataset["quaternion"].values[-1])
     np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=200 * EPSILON["double"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import config, loaded, run_text
@@ -11,8 +9,6 @@ from support import config, loaded, run_text
 import rigidsim
 from rigidsim.solve.indicators import indicators
 from rigidsim.solve.problem import prepare
-
-pytestmark = pytest.mark.compact
 
 SPIN = "angular_velocity = [0, 0, 1.1]\neuler_angles = [0, 0, 0.4]"
 GRADIENT = (
@@ -28,7 +24,7 @@ def hyperion(time: str, integrator: str = "", growth: bool = True) -> str:
 
 
 @pytest.mark.parametrize("axis", [1, 2], ids=["intermediate", "extreme"])
-def test_a_displacement_from_a_permanent_rotation(runs: Path, axis: int) -> None:
+def test_a_displacement_from_a_permanent_rotation(axis: int) -> None:
     """About the intermediate axis it grows like e^(k w t), k^2 = (B - A) (C - B) / (A C), else like t."""
     rates = [0, 0, 0]
     rates[axis] = 1
@@ -38,7 +34,7 @@ def test_a_displacement_from_a_permanent_rotation(runs: Path, axis: int) -> None
         time="end = 60\nsamples = 301",
         output='record = ["tangent_growth"]',
     )
-    data = loaded(run_text(text, runs))
+    data = loaded(run_text(text))
     t, growth = data.time.values, data.tangent_growth.values
     if axis == 1:
         exponent = np.sqrt(1 / 3)
@@ -50,20 +46,18 @@ def test_a_displacement_from_a_permanent_rotation(runs: Path, axis: int) -> None
         assert np.exp(growth[-1]) < 3 * 60
 
 
-def test_the_motion_is_the_same_with_and_without(runs: Path) -> None:
+def test_the_motion_is_the_same_with_and_without() -> None:
     """To the last bit where code is compact."""
     time = "end = 60\nsamples = 61"
     for integrator in ('formulation = "planar"', 'formulation = "quaternion"'):
-        without, along = (
-            loaded(run_text(hyperion(time, integrator, growth), runs)) for growth in (False, True)
-        )
+        without, along = (loaded(run_text(hyperion(time, integrator, growth))) for growth in (False, True))
         assert (without.quaternion.values == along.quaternion.values).all()
 
 
-def test_growth_agrees_with_the_spectrum_and_with_128_bits(runs: Path) -> None:
+def test_growth_agrees_with_the_spectrum_and_with_128_bits() -> None:
     """The largest exponent of a chaotic spin, within what its convergence leaves open."""
     time = "end = 600\nsamples = 2401"
-    run = run_text(hyperion(time, 'formulation = "quaternion"'), runs, "output.lyapunov=true")
+    run = run_text(hyperion(time, 'formulation = "quaternion"'), "output.lyapunov=true")
     data = loaded(run)
     found = indicators(data.time.values, data.tangent_growth.values[:, None])
     chaos = run.summary["lyapunov"]
@@ -72,8 +66,8 @@ def test_growth_agrees_with_the_spectrum_and_with_128_bits(runs: Path) -> None:
     assert found.largest_exponent[0] == pytest.approx(chaos["largest_exponent"], abs=2 * spread + 0.02)
     assert found.megno[0] > 20
     short = "end = 60\nsamples = 121"
-    plain = loaded(run_text(hyperion(short), runs)).tangent_growth.values
-    wide = loaded(run_text(hyperion(short, 'precision = "quadruple"'), runs)).tangent_growth.values
+    plain = loaded(run_text(hyperion(short))).tangent_growth.values
+    wide = loaded(run_text(hyperion(short, 'precision = "quadruple"'))).tangent_growth.values
     assert np.abs(plain - wide).max() < 1e-9
 
 

@@ -17,8 +17,6 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.solve import lyapunov
 from rigidsim.solve.problem import prepare
 
-pytestmark = pytest.mark.compact
-
 BODY = ["wx", "wy", "wz", "qw", "qx", "qy", "qz"]
 SATELLITE = """
 name = "satellite"
@@ -44,7 +42,7 @@ def chaotic(out: Path, unit: float = 1.0, end: float = 4000.0) -> rigidsim.Run:
     """Wisdom, Peale & Mignard 1984: start at 90 degrees with w = n; a tiny tilt of w lets it tumble."""
     rates = f"[{1e-3 / unit!r}, {1e-3 / unit!r}, {1 / unit!r}]"
     text = SATELLITE.format(rates=rates, angle=math.pi / 2, strength=repr(unit**-2.0), end=repr(end * unit))
-    return run_text(text, out, estimate=True)
+    return run_text(text, estimate=True)
 
 
 @pytest.mark.slow
@@ -86,7 +84,7 @@ def test_exponents_scale_with_the_unit_of_time(runs: Path) -> None:
     assert other * 1024 == pytest.approx(one, rel=0.2)
 
 
-def test_a_free_body_is_regular(runs: Path) -> None:
+def test_a_free_body_is_regular() -> None:
     text = """
     name = "free"
     [body]
@@ -101,14 +99,14 @@ def test_a_free_body_is_regular(runs: Path) -> None:
     record = {record}
     """
     for record in ('["angular_velocity"]', '["quaternion"]'):
-        run = run_text(text.format(record=record), runs)
+        run = run_text(text.format(record=record))
         chaos = run.summary["lyapunov"]
         assert not chaos["chaotic"]
         assert chaos["predictable_seconds"] is None
         # integrable: offsets grow linearly, so that the estimate falls like log(t)/t
         assert 0 <= chaos["largest_exponent"] < 2 * math.log(2000) / 2000
         assert len(chaos["exponents"]) == len(run.summary["states"])
-    plain = run_text(text.format(record='["quaternion"]').replace("lyapunov = true", ""), runs)
+    plain = run_text(text.format(record='["quaternion"]').replace("lyapunov = true", ""))
     assert plain.summary["lyapunov"] is None
     assert "lyapunov_exponents" not in plain.dataset
 
@@ -131,7 +129,7 @@ samples = 11
 lyapunov = true
 timeline = false
 """
-    whole = run_text(text, runs, 'name="whole"')
+    whole = run_text(text, 'name="whole"', out=runs)
     seen = []
 
     def impatient(prepared, folder, run_id, interruption, save_seconds):
@@ -150,7 +148,7 @@ timeline = false
 
     spectrum_of = spectra.spectrum_of
     monkeypatch.setattr("rigidsim.session.session.spectrum_of", impatient)
-    run = run_text(text, runs)
+    run = run_text(text, out=runs)
     assert run.status == "interrupted"
     for _ in range(2):
         run = rigidsim.resume(run.folder.path)
@@ -179,11 +177,11 @@ SWING = '[[loads]]\nkind = "torque"\ncomponents = ["0", "0", "0.02*sin(t){pulse}
 PULSE = " + 1e-9*exp(-((t - 100)/0.001)^2)"
 
 
-def test_what_is_carried_beside_the_motion_adds_no_exponents(runs: Path) -> None:
+def test_what_is_carried_beside_the_motion_adds_no_exponents() -> None:
     """The work of a torque and the pace of a narrow pulse feed on the motion and don't act on it."""
-    plain = run_text(DRIVEN.format(loads=SWING.format(pulse="")), runs)
-    pulsed = run_text(DRIVEN.format(loads=SWING.format(pulse=PULSE)), runs, 'name="pulsed"')
-    free = run_text(DRIVEN.format(loads=""), runs, 'name="free"')
+    plain = run_text(DRIVEN.format(loads=SWING.format(pulse="")))
+    pulsed = run_text(DRIVEN.format(loads=SWING.format(pulse=PULSE)), 'name="pulsed"')
+    free = run_text(DRIVEN.format(loads=""), 'name="free"')
     assert "work" in plain.summary["states"]
     assert "pace" in pulsed.summary["states"]
     found = [run.summary["lyapunov"] for run in (plain, pulsed, free)]

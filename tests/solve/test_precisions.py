@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -12,8 +11,6 @@ import xarray
 from support import run_text
 
 from rigidsim.store.variables import parts_in
-
-pytestmark = pytest.mark.compact
 
 TOP = """
 name = "top"
@@ -57,12 +54,10 @@ def summed(dataset: xarray.Dataset, name: str) -> list[list]:
         (100, 100, 335),
     ],
 )
-def test_rates_have_the_digits_of_the_precision(
-    precision: str | int, digits: int, bits: int, runs: Path
-) -> None:
+def test_rates_have_the_digits_of_the_precision(precision: str | int, digits: int, bits: int) -> None:
     """0.1 and 0.7 are no binary numbers: a double anywhere on the way would cost all digits past 16."""
     setting = precision if isinstance(precision, int) else f'"{precision}"'
-    run = run_text(TOP, runs, f"integrator.precision={setting}")
+    run = run_text(TOP, f"integrator.precision={setting}")
     exact = exact_rates(digits, [0, 5, 10, 15, 20])
     with mpmath.workprec(4000):
         error = max(
@@ -74,8 +69,8 @@ def test_rates_have_the_digits_of_the_precision(
         assert error <= 3 * 0.1 * mpmath.mpf(2) ** (1 - bits) * math.sqrt(steps)
 
 
-def test_a_tenth_at_fifty_digits_is_one_tenth(runs: Path) -> None:
-    run = run_text(TOP, runs, "integrator.precision=50")
+def test_a_tenth_at_fifty_digits_is_one_tenth() -> None:
+    run = run_text(TOP, "integrator.precision=50")
     first = summed(run.dataset, "angular_velocity")[0]
     with mpmath.workprec(4000):
         # half a unit in the last of 169 bits
@@ -83,8 +78,8 @@ def test_a_tenth_at_fifty_digits_is_one_tenth(runs: Path) -> None:
     assert {"angular_velocity_lo", "angular_velocity_lo2", "angular_velocity_lo3"} <= set(run.dataset)
 
 
-def test_tenths_as_sample_times_are_tenths_in_quadruple_precision(runs: Path) -> None:
-    run = run_text(TOP, runs, 'integrator.precision="quadruple"', "time.end=1", "time.samples=11")
+def test_tenths_as_sample_times_are_tenths_in_quadruple_precision() -> None:
+    run = run_text(TOP, 'integrator.precision="quadruple"', "time.end=1", "time.samples=11")
     parts = [run.dataset[name].values for name in ("time", "time_lo", "time_lo2")]
     with mpmath.workprec(300):
         for i in range(11):
@@ -92,11 +87,11 @@ def test_tenths_as_sample_times_are_tenths_in_quadruple_precision(runs: Path) ->
             assert abs(value - mpmath.mpf(i) / 10) <= mpmath.mpf(2) ** -112
 
 
-def test_tolerance_is_what_the_steps_obey(runs: Path) -> None:
+def test_tolerance_is_what_the_steps_obey() -> None:
     """A looser tolerance takes a lower order and gives a larger error, as asked."""
     errors, orders = [], []
     for tolerance in ("1e-6", "1e-9", "1e-12"):
-        run = run_text(TOP, runs, f"integrator.tolerance={tolerance}", "time.end=200")
+        run = run_text(TOP, f"integrator.tolerance={tolerance}", "time.end=200")
         rates = run.dataset["angular_velocity"].values
         exact = np.array(exact_rates(20, list(run.dataset["time"].values)), dtype=float)
         errors.append(np.abs(rates - exact).max())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 
 import heyoka as hy
 import numpy as np
@@ -37,8 +36,6 @@ from rigidsim.solve.projection import (
     steps_between,
 )
 from rigidsim.solve.stepper import Stepper
-
-pytestmark = pytest.mark.compact
 
 ATTITUDE = "quaternion = [0.5, 0.5, -0.5, 0.5]"
 FREE = ("principal_moments = [1, 2, 3]", f"angular_velocity = [0.5, 0.25, 1]\n{ATTITUDE}", "")
@@ -403,7 +400,7 @@ def test_the_least_correction_is_that_of_least_squares() -> None:
     assert found == pytest.approx(expected, rel=0, abs=100 * condition * np.finfo(float).eps)
 
 
-def test_a_held_run_says_so_and_tells_what_its_drift_would_have_been(runs: Path) -> None:
+def test_a_held_run_says_so_and_tells_what_its_drift_would_have_been() -> None:
     text = """
 name = "held"
 [body]
@@ -416,8 +413,8 @@ samples = 11
 [integrator]
 hold_invariants = true
 """
-    held = run_text(text, runs)
-    plain = run_text(text, runs, "integrator.hold_invariants=false", 'name="plain"')
+    held = run_text(text)
+    plain = run_text(text, "integrator.hold_invariants=false", 'name="plain"')
     assert held.summary["hold_invariants"] is True
     put_back = held.summary["invariants"]["energy"]["put_back"]
     drifted = plain.summary["invariants"]["energy"]["largest_drift"]
@@ -449,16 +446,16 @@ def put_back_of(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
     return {str(n): dataset[n].values for n in dataset.data_vars if str(n).endswith("_put_back")}
 
 
-@pytest.mark.compact(False)  # two motions that part by chance: rounding decides by how much
+@pytest.mark.optimised  # two motions that part by chance: rounding decides by how much
 @pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rates"])
-def test_what_was_put_back_along_time_is_what_the_drift_would_have_been(formulation: str, runs: Path) -> None:
+def test_what_was_put_back_along_time_is_what_the_drift_would_have_been(formulation: str) -> None:
     """At a tolerance whose truncation errors stand far above rounding, and bias the invariants."""
     tolerance, end = 1e-6, 3000
     integrator = f'tolerance = {tolerance}\nformulation = "{formulation}"\n'
     text = LOOSE.format(time=f"end = {end}\nsamples = 31", integrator=integrator)
     text = text.replace("[integrator]", '[output]\nrecord = ["angular_velocity"]\n[integrator]')
-    plain = run_text(text, runs)
-    held = run_text(text, runs, "integrator.hold_invariants=true", 'name="held"')
+    plain = run_text(text)
+    held = run_text(text, "integrator.hold_invariants=true", 'name="held"')
     with plain.dataset as free, held.dataset as kept:
         drift, would = free.energy_drift.values, (kept.energy_put_back + kept.energy_drift).values
         # the two motions part by what was put back, so that each later step falls elsewhere in its period: a
@@ -486,14 +483,12 @@ def test_what_was_put_back_along_time_is_what_the_drift_would_have_been(formulat
         ['"single"', '"double"', '"extended"', '"quadruple"', "25"], ['"single"', '"double"', '"extended"']
     ),
 )
-def test_what_was_put_back_does_not_depend_on_when_it_is_looked_at(precision: str, runs: Path) -> None:
+def test_what_was_put_back_does_not_depend_on_when_it_is_looked_at(precision: str) -> None:
     """Dense samples come in grids, single ones after skipped steps: the same bits at the same times."""
     end = 64 if precision in ('"quadruple"', "25") else 1024
     integrator = f"hold_invariants = true\nprecision = {precision}\n"
     often, rarely, seldom = (
-        run_text(
-            LOOSE.format(time=f"end = {end}\nsamples = {n}", integrator=integrator), runs, f'name="n{n}"'
-        )
+        run_text(LOOSE.format(time=f"end = {end}\nsamples = {n}", integrator=integrator), f'name="n{n}"')
         for n in (4 * end + 1, end // 16 + 1, 3)
     )
     with often.dataset as dense, rarely.dataset as sparse, seldom.dataset as ends:

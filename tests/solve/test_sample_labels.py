@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,6 @@ from support import run_text
 import rigidsim
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampling import SampleClock
-
-pytestmark = pytest.mark.compact
 
 SPIN = """
 name = "spin"
@@ -89,16 +86,16 @@ def test_samples_of_an_interval_too(start: object, span: object, count: int, pla
 
 
 @pytest.mark.parametrize("precision", ["single", "double", "extended"])
-def test_a_decimal_finds_its_sample(precision: str, runs: Path) -> None:
+def test_a_decimal_finds_its_sample(precision: str) -> None:
     text = SPIN + f'start = -0.3\nevery = 0.1\nend = 1\n[integrator]\nprecision = "{precision}"'
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     for time in (-0.3, -0.2, -0.1, 0, 0.1, 0.7, 1.0):
         assert dataset["quaternion"].sel(time=time).shape == (4,)
 
 
-def test_a_list_has_exact_labels_in_single_precision_too(runs: Path) -> None:
+def test_a_list_has_exact_labels_in_single_precision_too() -> None:
     text = SPIN + 'times = [0, 0.1, "1/3"]\n[integrator]\nprecision = "single"'
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     assert dataset["time"].values.tolist() == [0, 0.1, 1 / 3]
     narrow = np.array([0, 0.1, 1 / 3], dtype=np.float32).astype(float)
     np.testing.assert_array_equal(dataset["time"].values + dataset["time_lo"].values, narrow)

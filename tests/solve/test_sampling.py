@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import run_text
@@ -11,8 +9,6 @@ from support import run_text
 import rigidsim
 from rigidsim.errors import ConfigError
 from rigidsim.solve.problem import prepare
-
-pytestmark = pytest.mark.compact
 
 SPIN = """
 name = "spin"
@@ -49,10 +45,10 @@ def test_blocks_of_the_grid_are_the_grid() -> None:
 
 
 @pytest.mark.parametrize("start", ["0", "1e6", "-50"])
-def test_the_motion_begins_at_start(start: str, runs: Path) -> None:
+def test_the_motion_begins_at_start(start: str) -> None:
     text = SPIN + f"start = {start}\nend = {float(start) + 10}\nsamples = 11"
-    ours = run_text(text, runs, 'name="a"').dataset
-    plain = run_text(SPIN + "start = 0\nend = 10\nsamples = 11", runs, 'name="b"').dataset
+    ours = run_text(text, 'name="a"').dataset
+    plain = run_text(SPIN + "start = 0\nend = 10\nsamples = 11", 'name="b"').dataset
     # an autonomous scene doesn't care; sample times of 1e6 s are rounded to 1e-10 s
     assert np.abs(ours["quaternion"].values - plain["quaternion"].values).max() < 1e-9
     assert float(ours["time"][0]) == float(start)
@@ -65,17 +61,17 @@ def test_samples_that_a_precision_can_not_tell_apart_are_refused() -> None:
 
 
 @pytest.mark.parametrize("integrator", ["", 'method = "closed_form"', "hold_invariants = true"])
-def test_the_motion_begins_at_start_and_not_at_the_first_sample(integrator: str, runs: Path) -> None:
+def test_the_motion_begins_at_start_and_not_at_the_first_sample(integrator: str) -> None:
     text = SPIN + "{}\n[integrator]\n" + integrator
-    late = run_text(text.format("times = [12.5, 25]"), runs, 'name="a"').dataset
-    grid = run_text(text.format("end = 25\nsamples = 3"), runs, 'name="b"').dataset
+    late = run_text(text.format("times = [12.5, 25]"), 'name="a"').dataset
+    grid = run_text(text.format("end = 25\nsamples = 3"), 'name="b"').dataset
     np.testing.assert_array_equal(late["quaternion"], grid["quaternion"][1:])
-    before = run_text(text.format("start = -12.5\ntimes = [0, 12.5]"), runs, 'name="c"').dataset
+    before = run_text(text.format("start = -12.5\ntimes = [0, 12.5]"), 'name="c"').dataset
     # the same motion on a clock that is 12.5 s behind: times are exact in both
     assert np.abs(before["quaternion"].values - grid["quaternion"].values[1:]).max() < 1e-14
 
 
-def test_one_sample_only(runs: Path) -> None:
-    run = run_text(SPIN + "times = [5]", runs)
+def test_one_sample_only() -> None:
+    run = run_text(SPIN + "times = [5]")
     assert run.dataset.sizes["time"] == 1
     assert run.status == "finished"

@@ -5,7 +5,6 @@ Truth is what each side integrates to by itself, in closed form.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -23,7 +22,6 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
 
-pytestmark = pytest.mark.compact
 SPHERE = "principal_moments = [1, 1, 1]"
 REST = "angular_velocity = [0, 0, 0]"
 FRICTION = 'kind = "torque"\ncomponents = ["0", "0", "-0.3*sign(wz)"]'
@@ -190,7 +188,7 @@ def test_all_formulations_agree(scene: str) -> None:
         assert angles_between(truth.attitudes, found.attitudes).max() < 1e-11
 
 
-def test_an_event_on_a_surface_is_found_once(runs: Path) -> None:
+def test_an_event_on_a_surface_is_found_once() -> None:
     """The torque's own surface as an event, and one whose own kink lies there."""
     text = config(
         SPHERE,
@@ -200,13 +198,13 @@ def test_an_event_on_a_surface_is_found_once(runs: Path) -> None:
         more='[[events]]\nname = "still"\nexpression = "wz"\n'
         '[[events]]\nname = "half"\nexpression = "abs(wz) - 0.5"\n',
     )
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     # 1 - 1.5 t, then -0.5 (t - 2/3)
     assert dataset["still_time"].values == pytest.approx([2 / 3], rel=8 * EPSILON["double"])
     assert dataset["half_time"].values == pytest.approx([1 / 3, 5 / 3], rel=8 * EPSILON["double"])
 
 
-def test_an_event_on_a_surface_is_found_again_within_the_next_step(runs: Path) -> None:
+def test_an_event_on_a_surface_is_found_again_within_the_next_step() -> None:
     """w = 1 - t until t = 1, then w = 2 (t - 1)^2 - (t - 1), back at zero at t = 1.5, where it sticks."""
     text = config(
         SPHERE,
@@ -215,12 +213,12 @@ def test_an_event_on_a_surface_is_found_again_within_the_next_step(runs: Path) -
         "end = 3\nsamples = 3",
         more='[[events]]\nname = "still"\nexpression = "wz"\n',
     )
-    dataset = run_text(text, runs).dataset
+    dataset = run_text(text).dataset
     assert dataset["still_time"].values == pytest.approx([1, 1.5], rel=8 * EPSILON["double"])
 
 
 @pytest.mark.slow
-def test_a_certificate_knows_the_kink(runs: Path) -> None:
+def test_a_certificate_knows_the_kink() -> None:
     """The scene on which the reference and the run once shared an error of 0.086 rad."""
     text = config(
         SPHERE,
@@ -229,7 +227,7 @@ def test_a_certificate_knows_the_kink(runs: Path) -> None:
         "end = 10\nsamples = 11",
         "accuracy = 0.05",
     )
-    run = run_text(text, runs)
+    run = run_text(text)
     angle = 5.3**3 / 3 + 5.3**2 / 2 * 4.7 + 4.7**3 / 6
     w, _, _, z = run.dataset["quaternion"].values[-1]
     error = abs(np.angle(np.exp(1j * (2 * np.arctan2(z, w) - angle))))
@@ -296,7 +294,7 @@ def test_a_norm_that_vanishes_is_not_passed_over() -> None:
     assert smooth.status is Status.FINISHED
 
 
-def test_the_announced_error_knows_the_sides(runs: Path) -> None:
+def test_the_announced_error_knows_the_sides() -> None:
     """Neighbours cross, and slide, on their own: a motion that forgets its torques isn't near this one."""
     torque = '"-0.2*abs(wx)*wx", "0.3*sign(sin(3*t))", "-0.3*sign(wz)"'
     text = config(
@@ -305,7 +303,7 @@ def test_the_announced_error_knows_the_sides(runs: Path) -> None:
         f'kind = "torque"\ncomponents = [{torque}]',
         "end = 20\nsamples = 3",
     )
-    run = run_text(text, runs, estimate=True)
+    run = run_text(text, estimate=True)
     truth = try_setting(rigidsim.parse(text), Setting("extended"), compact=True)
     dataset = run.dataset
     error = angles_between([dataset["quaternion"].values], truth.attitudes)[-1]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,6 @@ from rigidsim.look.figures import timelines
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.turn_count import Place, TurnCounter, angles_to_join
-
-pytestmark = pytest.mark.compact
 
 ANGLES = 'record = ["quaternion", "euler_angles"]'
 SYMMETRIC = "principal_moments = [1, 1, 1.5]"
@@ -41,9 +38,9 @@ TUMBLING = {
         'precision = "extended"',
     ],
 )
-def test_a_body_turns_ten_thousand_radians_between_two_samples(integrator: str, runs: Path) -> None:
+def test_a_body_turns_ten_thousand_radians_between_two_samples(integrator: str) -> None:
     text = config(SYMMETRIC, PRECESSING, (), "end = 10000\nsamples = 3", integrator, ANGLES)
-    run = run_text(text, runs)
+    run = run_text(text)
     momentum, tilt, time = 2.0, 1.1, run.dataset["time"].values
     expected = np.array([0.3, tilt, 0.2]) + np.outer(
         time, [momentum / 1, 0, (1 / 1.5 - 1 / 1) * momentum * math.cos(tilt)]
@@ -55,12 +52,12 @@ def test_a_body_turns_ten_thousand_radians_between_two_samples(integrator: str, 
     assert "angles_wrapped_from" not in run.dataset.attrs
 
 
-def test_an_earth_sampled_every_five_sidereal_days_turns_five_times(runs: Path) -> None:
+def test_an_earth_sampled_every_five_sidereal_days_turns_five_times() -> None:
     day = "86164.0905"
     start = f'angular_velocity = [0, 0, "1/{day} rev/s"]\neuler_angles = [0.4, "23.44 deg", 0.1]'
     time = f"start = 0\nend = {5 * 100 * 86164.0905!r}\nsamples = 101"
     body = "principal_moments = [8.008e37, 8.008e37, 8.034e37]"
-    run = run_text(config(body, start, (), time, "", ANGLES), runs)
+    run = run_text(config(body, start, (), time, "", ANGLES))
     turns = (run.dataset["euler_angles"].values - [0.4, math.radians(23.44), 0.1]) / (2 * math.pi)
     np.testing.assert_allclose(turns[:, 2], 5.0 * np.arange(101), rtol=0, atol=1e-8)
     assert np.abs(turns[:, :2]).max() < 1e-8
@@ -68,31 +65,31 @@ def test_an_earth_sampled_every_five_sidereal_days_turns_five_times(runs: Path) 
 
 
 @pytest.mark.parametrize("spacing", ["samples = 2", "samples = 41", "every = 0.05"])
-def test_a_tumbling_body_that_passes_poles_has_the_angles_that_states_have(spacing: str, runs: Path) -> None:
+def test_a_tumbling_body_that_passes_poles_has_the_angles_that_states_have(spacing: str) -> None:
     """Within 0.02 rad of the pole at 400.4 s the nearest angles of dense samples are a turn off, too."""
     time = f"end = 402\n{spacing}"
-    ours = run_text(config(**TUMBLING, time=time, output=ANGLES), runs, 'name="a"')
+    ours = run_text(config(**TUMBLING, time=time, output=ANGLES), 'name="a"')
     states = run_text(
         config(**TUMBLING, time="end = 402\nsamples = 2", integrator='formulation = "euler_angles"'),
-        runs, 'name="b"',
-    )  # fmt: skip
+        'name="b"',
+    )
     difference = ours.dataset["euler_angles"].values[-1] - states.dataset["euler_angles"].values[-1]
     assert np.abs(difference).max() < 1e-6  # two integrations, far below a turn
     assert not ours.summary["warnings"]
 
 
-def test_a_faster_spin_than_expected_is_counted(runs: Path) -> None:
+def test_a_faster_spin_than_expected_is_counted() -> None:
     """A torque about the axis speeds the body up to sixty times: psi = a t^2 / 2 + w t."""
     body, start = SYMMETRIC, "angular_velocity = [0, 0, 1]\neuler_angles = [0, 1, 0]"
     torque = 'kind = "torque"\ncomponents = [0, 0, "1.5*0.6"]'
-    run = run_text(config(body, start, torque, "end = 100\nsamples = 3", "", ANGLES), runs)
+    run = run_text(config(body, start, torque, "end = 100\nsamples = 3", "", ANGLES))
     assert run.dataset["euler_angles"].values[:, 2] == pytest.approx([0, 800, 3100], abs=1e-6)
 
 
-def test_recording_angles_changes_no_bit_of_the_run(runs: Path) -> None:
-    with_angles = run_text(config(**TUMBLING, time="end = 300\nsamples = 4", output=ANGLES), runs, 'name="a"')
+def test_recording_angles_changes_no_bit_of_the_run() -> None:
+    with_angles = run_text(config(**TUMBLING, time="end = 300\nsamples = 4", output=ANGLES), 'name="a"')
     without = run_text(
-        config(**TUMBLING, time="end = 300\nsamples = 4", output='record = ["quaternion"]'), runs, 'name="b"'
+        config(**TUMBLING, time="end = 300\nsamples = 4", output='record = ["quaternion"]'), 'name="b"'
     )
     np.testing.assert_array_equal(
         bits(with_angles.dataset["quaternion"]), bits(without.dataset["quaternion"])
@@ -108,10 +105,10 @@ def within_one_turn(run: rigidsim.Run, since: float) -> None:
     assert f"from {since:.6g} " in run.summary["warnings"][0]
 
 
-def test_turns_that_nobody_knows_are_not_shown(runs: Path) -> None:
+def test_turns_that_nobody_knows_are_not_shown() -> None:
     """A closed form over millions of turns between samples, and in the figure neither lines nor growth."""
     text = config(SYMMETRIC, PRECESSING, (), "end = 1e9\nsamples = 11", 'method = "closed_form"', ANGLES)
-    run = run_text(text, runs)
+    run = run_text(text)
     within_one_turn(run, 0.0)
     axes = Figure().add_subplot()
     timelines.attitude(axes, run.dataset)
@@ -122,10 +119,10 @@ def test_turns_that_nobody_knows_are_not_shown(runs: Path) -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["φ", "θ", "ψ"]
 
 
-def test_angles_at_events_are_within_one_turn_and_say_so(runs: Path) -> None:
+def test_angles_at_events_are_within_one_turn_and_say_so() -> None:
     """Nobody follows the motion from event to event; phi = 0.3 + 2 t."""
     event = '[[events]]\nname = "level"\nexpression = "wx"'
-    run = run_text(config(SYMMETRIC, PRECESSING, (), "end = 30\nsamples = 301", "", ANGLES, event), runs)
+    run = run_text(config(SYMMETRIC, PRECESSING, (), "end = 30\nsamples = 301", "", ANGLES, event))
     found = run.dataset["level_euler_angles"]
     assert found.sizes["level"] == 3
     assert found.attrs["turns"] == found.attrs["angle"] == "within one turn"
@@ -134,16 +131,16 @@ def test_angles_at_events_are_within_one_turn_and_say_so(runs: Path) -> None:
     assert np.abs(found.values).max() <= np.pi
 
 
-def test_turns_of_a_motion_with_switching_surfaces(runs: Path) -> None:
+def test_turns_of_a_motion_with_switching_surfaces() -> None:
     """Coulomb friction brings the body to rest after 40 turns; a switched torque turns it back and forth."""
     body, start = SYMMETRIC, "angular_velocity = [0, 0, 10]\neuler_angles = [0.2, 1, 0]"
     friction = 'kind = "torque"\ncomponents = [0, 0, "-0.3*sign(wz)"]'
-    run = run_text(config(body, start, friction, "times = [0, 20, 70, 90]", "", ANGLES), runs, 'name="a"')
+    run = run_text(config(body, start, friction, "times = [0, 20, 70, 90]", "", ANGLES), 'name="a"')
     # w = 10 - 0.2 t until 50 s
     assert run.dataset["euler_angles"].values[:, 2] == pytest.approx([0, 160, 250, 250], abs=1e-6)
     switched = 'kind = "torque"\ncomponents = ["0.1*sign(sin(t))", 0, "0.05*abs(wy)"]'
     sparse, dense = (
-        run_text(config(loads=switched, time=f"end = 40\nsamples = {n}", output=ANGLES), runs, f'name="{n}"')
+        run_text(config(loads=switched, time=f"end = 40\nsamples = {n}", output=ANGLES), f'name="{n}"')
         for n in (3, 401)
     )
     np.testing.assert_array_equal(
@@ -152,10 +149,10 @@ def test_turns_of_a_motion_with_switching_surfaces(runs: Path) -> None:
     assert not sparse.summary["warnings"]
 
 
-def test_turns_that_a_load_reads_are_not_counted_from_samples(runs: Path) -> None:
+def test_turns_that_a_load_reads_are_not_counted_from_samples() -> None:
     torque = 'kind = "torque"\ncomponents = ["-0.001*psi", 0, 0]'
-    within_one_turn(run_text(config(loads=torque, time="end = 30\nsamples = 4", output=ANGLES), runs), 0.0)
-    dense = run_text(config(loads=torque, time="end = 30\nsamples = 301", output=ANGLES), runs, 'name="d"')
+    within_one_turn(run_text(config(loads=torque, time="end = 30\nsamples = 4", output=ANGLES)), 0.0)
+    dense = run_text(config(loads=torque, time="end = 30\nsamples = 301", output=ANGLES), 'name="d"')
     assert "angles_wrapped_from" not in dense.dataset.attrs
 
 

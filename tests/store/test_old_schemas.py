@@ -18,6 +18,8 @@ from rigidsim.errors import RunFolderError
 from rigidsim.store.seal import seal
 from rigidsim.store.variables import SCHEMA_VERSION
 
+pytestmark = pytest.mark.optimised
+
 KEPT = Path(__file__).parents[1] / "data"
 VERSIONS = range(1, SCHEMA_VERSION + 1)
 

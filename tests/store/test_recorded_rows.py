@@ -24,7 +24,7 @@ OLD = sorted((Path(__file__).parents[1] / "data").glob("schema_*.h5"))
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return run_text(SCENE, tmp_path_factory.mktemp("runs")).folder.dataset
+    return run_text(SCENE, out=tmp_path_factory.mktemp("runs")).folder.dataset
 
 
 @pytest.mark.parametrize("path", [None, *OLD], ids=["new", *(path.stem for path in OLD)])

@@ -36,7 +36,7 @@ def tumbling(
             integrator=f'precision = "{precision}"\nmethod = "closed_form"',
             output=f"record = [{record}]\nestimate = false",
         )
-        return run_text(text, tmp_path), exact
+        return run_text(text), exact
 
 
 def wrong(analysis: Analysis, exact: Case, share: float) -> list[float]:
@@ -90,9 +90,9 @@ def test_digits_of_quadruple_precision_over_ten_thousand_periods(tmp_path: Path)
         assert abs(sum(map(mpmath.mpf, parts)) / analysis.signals[0].lines[0].frequency - 1) < 1e-31
 
 
-def test_the_free_nutation_of_the_earth(tmp_path: Path) -> None:
+def test_the_free_nutation_of_the_earth() -> None:
     text = (Path(__file__).parents[2] / "configs/earth_free_nutation.toml").read_text()
-    run = run_text(text, tmp_path, 'output.record=["polar_motion"]', "time.end=365 day")
+    run = run_text(text, 'output.record=["polar_motion"]', "time.end=365 day")
     signal = rigidsim.analyse(run)["polar_motion"]
     assert [line.label.text for line in signal.lines] == ["wobble"]
     # 304.456 sidereal days, prograde, from little more than one turn
@@ -104,7 +104,7 @@ def test_the_free_nutation_of_the_earth(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_librations_of_a_satellite(tmp_path: Path) -> None:
+def test_librations_of_a_satellite() -> None:
     # amplitudes of 1e-4 rad: frequencies of the linearised equations to 1e-7
     text = config(
         "principal_moments = [900, 1000, 400]",
@@ -113,7 +113,7 @@ def test_librations_of_a_satellite(tmp_path: Path) -> None:
         "end = 400\nevery = 0.25",
         output='record = ["angular_velocity"]\nestimate = false',
     ).replace("principal_moments = [900, 1000, 400]", "principal_moments = [400, 900, 1000]")
-    run = run_text(text, tmp_path)
+    run = run_text(text)
     analysis = rigidsim.analyse(run)
     known = {k.name: float(k.value) for k in analysis.known}
     pitch = np.sqrt(3 * (900 - 400) / 1000)
@@ -179,7 +179,7 @@ def test_the_command_prints_a_table_and_writes_dataset_and_figure(tmp_path: Path
         integrator='method = "closed_form"',
         output='record = ["angular_velocity"]\nestimate = false',
     )
-    folder = run_text(text, tmp_path).folder.path
+    folder = run_text(text, out=tmp_path).folder.path
     shown = CliRunner().invoke(app, ["analyse", str(folder), "--lines", "3"])
     assert shown.exit_code == 0, shown.output
     assert "wobble" in shown.stdout

@@ -107,7 +107,7 @@ def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> t
     raise AssertionError(f"not finished after {most} sessions")
 
 
-# the others in compact code: whether a run is cut or not, it is the same code
+# the others in code that compiles faster: whether a run is cut or not, it is the same code
 UNROLLED = ("single", "double, dense", "double, sparse", "double, Euler angles", "quadruple")
 USUAL = (
     "double, dense",
@@ -124,7 +124,8 @@ USUAL = (
         pytest.param(
             c,
             marks=[
-                m for m, of in ((pytest.mark.compact, UNROLLED), (pytest.mark.slow, USUAL)) if c not in of
+                *([pytest.mark.optimised] if c in UNROLLED else []),
+                *([] if c in USUAL else [pytest.mark.slow]),
             ],
         )
         for c in CASES

@@ -14,8 +14,6 @@ from rigidsim.errors import RunFolderError
 from rigidsim.store import seal
 from rigidsim.workflows.verify import embedded
 
-pytestmark = pytest.mark.compact
-
 TEXT = config(time="end = 10 # long\nevery = 0.5", more="# the end", name="cut")
 SETTINGS = ["time.end=60", " integrator.tolerance=1.0000000000000000000000001e-15 "]
 

@@ -35,7 +35,7 @@ def tradeoff(
 
     Example: rigidsim tradeoff configs/asymmetric_top.toml
     """
-    from rigidsim.cli import tables
+    from rigidsim.cli.tradeoff_tables import print_tradeoff
     from rigidsim.workflows.read import load
     from rigidsim.workflows.tradeoff import tradeoff as measure
 
@@ -50,4 +50,4 @@ def tradeoff(
     if as_json:
         print(json.dumps(result))
     else:
-        tables.print_tradeoff(result)
+        print_tradeoff(result)

@@ -138,7 +138,7 @@ KINDS: dict[str, Kind] = {
     "herpolhode": Kind("an attitude and a momentum that stays put", (), (HERPOLHODE,)),
     "path": Kind("position recorded", (), (FLIGHT,)),
     "rates": Kind(_TURNS, (RATES,)),
-    "attitude": Kind(_ATTITUDE, (ATTITUDE,)),
+    "attitude": Kind(_ATTITUDE, (ATTITUDE, WOBBLE)),
     "drift": Kind("invariants", (DRIFT,)),
 }
 
