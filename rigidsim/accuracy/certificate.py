@@ -21,7 +21,7 @@ from rigidsim.accuracy.comparison import (
     rows_to_compare,
 )
 from rigidsim.accuracy.motion import Motion, motion_of
-from rigidsim.accuracy.reference import LOST, STANDARD, Kind, Policy, Reference, own_error, references
+from rigidsim.accuracy.reference import INCOMPARABLE, STANDARD, Kind, Policy, Reference, own_error, references
 from rigidsim.accuracy.setting import Setting, setting_of
 from rigidsim.accuracy.trial import Told, Trials, try_setting
 from rigidsim.model.load import Load
@@ -127,7 +127,7 @@ def certify(
             continue
         if best is None or found.error < best.error:
             best = found
-        settled = compared.largest - compared.own > accuracy and compared.largest < LOST
+        settled = compared.largest - compared.own > accuracy and compared.largest < INCOMPARABLE
         if best.keeps(accuracy, accuracy_position) or settled:
             break
     return best
@@ -188,7 +188,7 @@ class _Compared:
         # a quaternion's own last bit: what is recorded can't be compared more closely
         floor = 2.0 ** (2 - self.setting.bits)
         error = safety * self.largest + self.own + floor
-        if not self.largest < LOST:
+        if not self.largest < INCOMPARABLE:
             error = math.pi
         place = None
         if self._places is not None:

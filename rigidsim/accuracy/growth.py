@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-LOST = 1e-2
+UNCERTAIN = 1e-2
 """rad (or relative to the rates); what is so uncertain is no result any more."""
 
 
@@ -32,7 +32,7 @@ def exponential_growth(
         least: past which growth is none.
     """
     largest = np.maximum.accumulate(errors)
-    gone = int(np.searchsorted(largest, LOST))
+    gone = int(np.searchsorted(largest, UNCERTAIN))
     last = min(gone, len(times) - 1)
     if last < 2 or power_of_time(times[: last + 1], largest[: last + 1]) < least:
         return 0.0, None
@@ -44,5 +44,5 @@ def exponential_growth(
     rate = (math.log(ratio) - stable * math.log(times[last] / times[early])) / span
     seconds = math.ldexp(float(times[last]), exponent)
     if rate > 0 and gone >= len(times):
-        seconds += math.log(LOST / largest[last]) / rate
+        seconds += math.log(UNCERTAIN / largest[last]) / rate
     return max(rate, 0.0), seconds

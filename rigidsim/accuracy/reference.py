@@ -10,7 +10,7 @@ difference from another as their errors per step are, but for scatter.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from enum import Enum
 
@@ -21,7 +21,7 @@ from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.records import dataclass
 
-LOST = 0.5
+INCOMPARABLE = 0.5
 """rad, past which a difference says nothing but that digits are gone."""
 LEAST_DIGITS = 50
 """Of a reference with digits: 16 beyond quadruple precision."""
@@ -29,6 +29,8 @@ _SPARE_DIGITS = 20  # of a reference for digits, beyond theirs
 _SECOND: dict[str | int, float] = {"quadruple": 1e-30, LEAST_DIGITS: 1e-44}
 """Tolerances of the second best of a precision: a thousand epsilons or more, so that it is another solution;
 in extended and double precision "auto" without projected invariants is."""
+_SAME_VARIABLES = 10.0
+"""What solutions in the same variables may both be wrong by, over their distance."""
 
 
 @dataclass(frozen=True)
@@ -186,18 +188,40 @@ def best_and_second(precision: str | int) -> tuple[Setting, Setting]:
     return Setting(precision, hold_invariants=True), Setting(precision, _SECOND.get(precision))
 
 
+def equals_of(best: Setting, there: Iterable[Setting]) -> list[Setting]:
+    """Solutions that are as good as a precision's best, or nearly so: of extended and double precision those
+    in the rotation matrix's elements too, which round other initial values and coefficients.
+    """
+    second = _SECOND.get(best.precision)
+    return [
+        other
+        for other in there
+        if other != best
+        and (other.precision, other.method, other.tolerance) == (best.precision, best.method, second)
+        and other.formulation in (best.formulation, *(("rotation_matrix",) if second is None else ()))
+    ]
+
+
 # --- how wrong they are ----------------------------------------------------------------------------------
 
 
-def errors_of_best(distances: np.ndarray, best: Setting) -> np.ndarray:
-    """Errors (samples,) in rad of the best solution of a precision: its largest distance so far from the
-    second best.
+def errors_of_best(best: Setting, distances: Mapping[Setting, np.ndarray]) -> np.ndarray:
+    """Errors (samples,) in rad of the best solution of a precision: its largest distance so far from others
+    that are as good.
+
+    Those in the same variables have begun with the same rounded values, and take the same steps until
+    invariants are first projected: such a distance alone was up to six times (13 once) too small.
+
+    Args:
+        distances: (samples,) rad, from each of ``equals_of``, at least one.
 
     They aren't scaled by the errors per step, as in ``own_error``: a series keeps its tolerance by orders of
     magnitude, so that rounding can dominate in both (near a separatrix, in quadruple precision and at 1e-30,
     scaled errors were 70 times too small, held against 70 digits).
     """
-    return np.maximum(np.maximum.accumulate(distances), epsilon(best.precision))
+    independent = best.precision in _SECOND or any(s.formulation != best.formulation for s in distances)
+    largest = np.max(list(distances.values()), axis=0) * (1.0 if independent else _SAME_VARIABLES)
+    return np.maximum(np.maximum.accumulate(largest), epsilon(best.precision))
 
 
 def closed_form_error(digits: int) -> float:
@@ -238,6 +262,6 @@ def own_error(
         if own.level > policy.much_better * probe.level:
             break
         found = distance(probe)
-        if found < LOST:
+        if found < INCOMPARABLE:
             return min(estimate, max(found, probe.level) * level / probe.level)
     return min(estimate, motion.error(level))

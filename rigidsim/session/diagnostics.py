@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from rigidsim.accuracy.error_law import DRIFT_FACTOR
 from rigidsim.accuracy.estimate import Estimate, estimate_errors
-from rigidsim.accuracy.growth import LOST
+from rigidsim.accuracy.growth import UNCERTAIN
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.scene.records import dataclass
 from rigidsim.session.statistics import SampleStatistics
@@ -113,7 +113,7 @@ class Diagnostics:
 
     def _digits(self) -> Iterator[Caution]:
         found = self.estimate
-        if found is None or found.leading <= LOST:
+        if found is None or found.leading <= UNCERTAIN:
             return
         if found.attitude is None:
             code = WarningCode.RATES_UNCERTAIN

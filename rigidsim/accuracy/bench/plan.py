@@ -107,7 +107,19 @@ def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
     ]
     few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in FORMULATIONS[1:]])
     rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in FORMULATIONS[1:]]
-    listed = [*plain[:2], *exact, *plain[2:], *loose, *tight[:12], *few, *tight[12:], *(rest if full else [])]
+    # by which the error of a reference is known, where nothing better can be had
+    others = [] if closed else [Setting(p, formulation="rotation_matrix") for p in ("double", "extended")]
+    listed = [
+        *plain[:2],
+        *exact,
+        *plain[2:],
+        *others,
+        *loose,
+        *tight[:12],
+        *few,
+        *tight[12:],
+        *(rest if full else []),
+    ]
     return list(dict.fromkeys(listed))
 
 

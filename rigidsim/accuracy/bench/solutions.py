@@ -16,6 +16,7 @@ from rigidsim.accuracy.reference import (
     best_and_second,
     closed_form_error,
     closed_form_to,
+    equals_of,
     errors_of_best,
 )
 from rigidsim.accuracy.setting import Setting
@@ -116,10 +117,11 @@ class ReferenceThread(threading.Thread):
 
 
 def _best_of(precision: str | int, solutions: Solutions) -> ReferenceSolution | None:
-    """The best solution of a precision, where there is a second best that its error is known by."""
-    best, second = best_and_second(precision)
-    if best not in solutions or second not in solutions:
+    """The best solution of a precision, where there are others that its error is known by."""
+    best, _ = best_and_second(precision)
+    equals = equals_of(best, solutions)
+    if best not in solutions or not equals:
         return None
-    error = errors_of_best(angles_between(solutions[best], solutions[second]), best)
-    how = f"{best.title}; its error is its distance from {second.title}"
+    error = errors_of_best(best, {s: angles_between(solutions[best], solutions[s]) for s in equals})
+    how = f"{best.title}; its error is its distance from {' and '.join(s.title for s in equals[:3])}"
     return ReferenceSolution(best, solutions[best], error, how)

@@ -1,0 +1,66 @@
+"""What carries a motion's neighbours forward, and what a tolerance lets a step be wrong by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from support import config
+
+import rigidsim
+from rigidsim.model.system import System
+from rigidsim.solve.lanes import NEIGHBOURS, BatchLanes, OwnLanes, SeriesErrors
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.steppers import stepper_of
+
+COMET = config(
+    body="principal_moments = [1e-4, 2e-4, 2.5e-4]\nmass = 1",
+    initial="angular_velocity = [3e-4, 1e-3, 5e-4]\nposition = [200, 0, 0]\nvelocity = [0, 0.01, 0]",
+    loads='kind = "central_gravity"\ngravitational_parameter = 1',
+    time="end = 8000\nsamples = 2",
+)
+"""An ellipse with its pericentre at a 100th of its apocentre."""
+COMPACT = replace(precision_of("double"), compact=True)
+
+
+def system_of(text: str) -> System:
+    return prepare(rigidsim.parse(text)).system
+
+
+def test_a_stretch_ends_where_steps_change_in_length() -> None:
+    """Stretches of equal times jump over a close passage, whose errors count for most."""
+    prepared = prepare(rigidsim.parse(COMET))
+    system, end = prepared.system, float(prepared.clock.at(1))
+    stepper = stepper_of(system, COMPACT, None, prepared.clock.start)
+    initial = np.array([float(x) for x in system.initial])
+    place = [system.states.index(name) for name in "xyz"]
+    for lanes in (OwnLanes(system, stepper.integrator), BatchLanes(system, 100.0, 1e-14)):
+        states = np.repeat(initial[:, None], NEIGHBOURS + 1, axis=1)
+        states[place, 1:] *= 1 + 1e-12
+        time, nearest, taken = 0.0, [], 0
+        while time < end:
+            found = lanes.advance(states, np.full(4, time), np.full(4, end), 50)
+            assert found is not None
+            states, steps, time = found
+            assert np.allclose(
+                states[place, :1], states[place, 1:], rtol=0, atol=1e-6
+            )  # all at the same time
+            nearest.append(float(np.linalg.norm(states[place, 0])))
+            taken += steps
+        near = 0.1 * max(nearest)
+        assert sum(r < near for r in nearest) >= 2  # of the one passage, which takes a 50th of the time
+        assert taken <= 50 * len(nearest)
+
+
+def test_errors_of_series_are_those_of_their_order() -> None:
+    """An order belongs to all tolerances down to the next; one more may gain more than the tolerance says, or
+    nothing.
+    """
+    system = system_of(COMET)
+    initial = np.array([float(x) for x in system.initial])
+    one, other = (SeriesErrors(system, tolerance).of_step(initial, 0.0) for tolerance in (1.3e-12, 3e-12))
+    assert (one == other).all()
+    looser, tighter = (SeriesErrors(system, tolerance).of_step(initial, 0.0) for tolerance in (1e-9, 1e-13))
+    sizes = [float(np.abs(found).max()) for found in (looser, one, tighter)]
+    assert sizes[0] > 3 * sizes[1] > 9 * sizes[2] > 0
