@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.records import dataclass
+from rigidsim.solve.indicators import indicators
 from rigidsim.store.variables import Variable, part_name
 
 ALWAYS = "always"
@@ -61,7 +63,11 @@ class Series:
 
 
 def kept_of_series(
-    series: Sequence[Series], times: np.ndarray, lengths: np.ndarray, keep: Collection[str]
+    series: Sequence[Series],
+    times: np.ndarray,
+    lengths: np.ndarray,
+    keep: Collection[str],
+    hidden: Collection[str] = (),
 ) -> Kept:
     """What is asked for, of recorded variables; drifts always.
 
@@ -69,8 +75,13 @@ def kept_of_series(
         series: of all recorded variables, time apart.
         times: (samples,), or (members, samples) where each has its own, s.
         lengths: samples that each member has, (members,).
+        hidden: variables that are recorded for indicators alone.
     """
     found: Kept = {}
+    for one in series:
+        if one.variable.name == GROWTH:
+            found |= _indicators(one, times, keep)
+    series = [one for one in series if one.variable.name not in hidden]
     for one in series:
         if one.drift_of is not None:
             found |= _drifts(one, lengths)
@@ -85,6 +96,24 @@ def kept_of_series(
             found |= _means(one)
     if "series" in keep:
         found |= _series(series, times)
+    return found
+
+
+def _indicators(one: Series, times: np.ndarray, keep: Collection[str]) -> Kept:
+    """Of chaos, from the growth of a tangent vector."""
+    since = times if times.ndim == 1 else times.T
+    told = indicators(since, one.parts[0][:, :, 0].T)
+    labels = {
+        "megno": ("1", "mean exponential growth of nearby orbits: 2 for regular motion", told.megno),
+        "fli": ("1", "fast Lyapunov indicator: largest logarithm of the growth", told.fli),
+        "lyapunov": ("s-1", "largest Lyapunov exponent, as far as the samples reach", told.largest_exponent),
+    }
+    found: Kept = {}
+    for name, (units, long_name, values) in labels.items():
+        if name in keep:
+            found[name] = KeptVariable((), values, {"units": units, "long_name": long_name}, name)
+            labelled = {"units": "s", "long_name": "time up to which the growth of a tangent vector is known"}
+            found["growth_time"] = KeptVariable((), told.until, labelled, name)
     return found
 
 
@@ -151,7 +180,8 @@ def _drifts(one: Series, lengths: np.ndarray) -> Kept:
     values = one.parts[0]
     size = np.abs(values[:, :, 0])
     largest = np.where(lengths > 0, np.max(np.where(np.isnan(size), 0, size), axis=1, initial=0), np.nan)
-    attributes = {k: v for k, v in one.variable.attributes.items() if k != "coordinates"}
+    of_a_member = ("coordinates", "scale", "scale_units")
+    attributes = {k: v for k, v in one.variable.attributes.items() if k not in of_a_member}
     named = one.variable.attributes.get("long_name", one.variable.name)
     return {
         f"{one.variable.name}_largest": KeptVariable(

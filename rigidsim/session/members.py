@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import field
 from enum import Enum
 
@@ -116,6 +116,7 @@ def run_alone(
     most_events: int,
     events: Sequence[str],
     more: Callable[[MemoryRun], Kept] | None = None,
+    hidden: Collection[str] = (),
 ) -> MemberResults:
     """One member by itself; what goes wrong with it is recorded.
 
@@ -124,6 +125,7 @@ def run_alone(
         keep, most_events: as of ``[sweep]``.
         events: names of the scene's events.
         more: what else is to be kept of the run.
+        hidden: variables that are recorded for indicators alone.
 
     Raises:
         KeyboardInterrupt: the run was interrupted.
@@ -140,7 +142,7 @@ def run_alone(
     assert isinstance(summary, Summary)
     if summary.status == Status.INTERRUPTED.value:
         raise KeyboardInterrupt
-    kept = _kept_of_run(result, keep) | _events_of_run(result, keep, most_events, events)
+    kept = _kept_of_run(result, keep, hidden) | _events_of_run(result, keep, most_events, events)
     bounds = [row.bound for row in summary.invariants.values()]
     error_at_end = summary.accuracy.estimated_attitude_error
     if summary.accuracy.certified is not None:
@@ -152,11 +154,6 @@ def run_alone(
         bound=np.array([max(bounds, default=np.nan)]),
         attitude_error=np.array([np.nan if error_at_end is None else error_at_end]),
     )
-    if "lyapunov" in keep:
-        spectrum = summary.lyapunov
-        largest = np.nan if spectrum is None else spectrum.largest_exponent
-        labels = {"units": "s-1", "long_name": "largest Lyapunov exponent"}
-        kept["lyapunov"] = KeptVariable((), np.array([largest]), labels, "lyapunov")
     if more is not None and result.blocks:
         kept |= more(result)
     reasons = {} if summary.status in ENDED_WELL else {0: summary.message}
@@ -171,7 +168,7 @@ def failed(outcome: Outcome, reason: str) -> MemberResults:
     return MemberResults(kept, {0: reason}, {"alone": 1})
 
 
-def _kept_of_run(result: MemoryRun, keep: Sequence[str]) -> Kept:
+def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: Collection[str]) -> Kept:
     if not result.blocks:
         return {}
     joined_blocks = JoinedBlocks(result.blocks, result.variables)
@@ -185,7 +182,7 @@ def _kept_of_run(result: MemoryRun, keep: Sequence[str]) -> Kept:
         ]
         series.append(Series(variable, parts))
     times = np.asarray(joined_blocks["time"][0], dtype=np.float64).reshape(-1)
-    return kept_of_series(series, times, np.array([len(times)]), keep)
+    return kept_of_series(series, times, np.array([len(times)]), keep, hidden)
 
 
 def _is_date(variable: Variable) -> bool:

@@ -9,13 +9,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from rigidsim.errors import FORCE, RESUME, RunFolderError
+from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.scene.records import dataclass
 from rigidsim.store import provenance, segments, viewing
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.joined_segments import join_segments
 from rigidsim.store.seal import check_whole, read_seal
 from rigidsim.store.summary import Brief, Summary
+from rigidsim.store.sweep_folder import is_sweep
 from rigidsim.store.validated_open import open_dataset
 from rigidsim.store.variables import SCHEMA_VERSION
 
@@ -187,6 +188,9 @@ def open_run(path: str | Path) -> SavedRun:
     Raises:
         RunFolderError: no run there, or a damaged summary.
     """
+    if is_sweep(path):
+        what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
+        raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")
     folder = find_run(path)
     return SavedRun(folder, folder.read_summary())
 

@@ -16,6 +16,7 @@ from rigidsim.store.summary import Caution
 from rigidsim.store.understood import Body, Span, Start
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweep_check import check_sweep
+from rigidsim.workflows.sweep_members import recording
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
             prepared = prepare(experiment)
             refuse_taken_names(prepared)
         else:
-            prepared = check_sweep(Sweep.of(experiment))
+            prepared = check_sweep(recording(Sweep.of(experiment)))
     except ConfigError as error:
         return Checked(error.source or str(path), problems=tuple(error.problems))
     scene = prepared.scene

@@ -25,7 +25,7 @@ from rigidsim.store.sweep_sources import ALWAYS, Sources, sources_of
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweep_check import check_sweep
-from rigidsim.workflows.sweep_members import sweep_of
+from rigidsim.workflows.sweep_members import recording, sweep_of
 from rigidsim.workflows.sweep_plan import tile_length
 from rigidsim.workflows.sweep_ways import OneProcess, Way
 
@@ -80,7 +80,7 @@ def sweep(
     """
     given = as_experiment(experiment, changes)
     return run_sweep(
-        Sweep.of(given),
+        recording(Sweep.of(given)),
         SweepFolder(Path(out) / given.config.name),
         force=force,
         way=_way(workers, scheduler),
@@ -210,8 +210,8 @@ def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
 
 def identity(sweep: Sweep) -> str:
     """What members share: the config without what is swept, and without what no number depends on."""
-    tables = parse_toml(sweep.base.text, sweep.base.source)
-    for key in ("name", "description"):
+    tables = parse_toml(sweep.experiment.text, sweep.experiment.source)
+    for key in ("name", "description", "sweep"):
         tables.pop(key, None)
     for key in ("timeline", "timeline_rows"):
         tables.get("output", {}).pop(key, None)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.kept import Kept, KeptVariable
 from rigidsim.session.members import MemberResults, run_alone
+from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.sweep_sources import plain
@@ -29,7 +32,34 @@ _LINES = 5  # of each signal's spectrum
 @lru_cache(maxsize=4)
 def sweep_of(config: str) -> Sweep:
     """The sweep of a config's text, worked out once in a process."""
-    return Sweep.of(parse(config, source="the sweep's config"))
+    return recording(Sweep.of(parse(config, source="the sweep's config")))
+
+
+INDICATORS = ("megno", "fli", "lyapunov")
+"""What is kept of how a tangent vector grew, which is recorded for it."""
+
+
+def recording(sweep: Sweep) -> Sweep:
+    """A sweep whose members record what is to be kept of them.
+
+    Raises:
+        ConfigError: the base experiment can't be run, so that nobody knows what it records.
+    """
+    output = sweep.base.config.output
+    if not set(sweep.table.keep) & set(INDICATORS) or GROWTH in (output.record or ()):
+        return sweep
+    try:
+        recorded = output.record or [v.name for v in prepare(sweep.worked_out(0)).system.recorded]
+    except ConfigError as error:
+        raise sweep.blamed(0, error) from None
+    names = ", ".join(f'"{name}"' for name in [*recorded, GROWTH])
+    return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]))
+
+
+def hidden_of(sweep: Sweep) -> tuple[str, ...]:
+    """What is recorded for indicators alone."""
+    asked = sweep.experiment.config.output.record
+    return () if asked is not None and GROWTH in asked else (GROWTH,)
 
 
 def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> bytes:
@@ -69,18 +99,16 @@ def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> Me
     events = [event.name for event in sweep.base.config.events]
     most = sweep.table.most_events
     more = frequencies_of if "frequencies" in keep else None
+    hidden = hidden_of(sweep)
     parts = []
     for member in members:
-        parts.append(run_alone(partial(_run_alone, sweep, member), keep, most, events, more))
+        parts.append(run_alone(partial(_run_alone, sweep, member), keep, most, events, more, hidden))
     return MemberResults.together(parts)
 
 
 def alone(sweep: Sweep, member: int) -> Experiment:
     """A member as it is run by itself."""
-    experiment = sweep.experiment_of(member)
-    if "lyapunov" in sweep.table.keep and not experiment.config.output.lyapunov:
-        experiment = experiment.having(["output.lyapunov=true"])
-    return experiment
+    return sweep.experiment_of(member)
 
 
 def _run_alone(sweep: Sweep, member: int) -> MemoryRun:

@@ -10,7 +10,7 @@ from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.workflows.plan import plan
 from rigidsim.workflows.sweep_check import check_sweep
-from rigidsim.workflows.sweep_members import alone
+from rigidsim.workflows.sweep_members import alone, recording
 
 _SECONDS_OF_A_TILE = 10.0
 _LARGEST_TILE = 8192
@@ -67,6 +67,7 @@ def plan_sweep(sweep: Sweep) -> dict[str, Any]:
     Raises:
         ConfigError: a member can't be run.
     """
+    sweep = recording(sweep)
     first = check_sweep(sweep)
     made = plan(alone(sweep, 0))
     seconds = _member_seconds(made)

@@ -151,6 +151,28 @@ def test_a_thousand_columns_prolonged_by_a_hundred_are_a_hundred(tmp_path: Path)
     assert (positions(short, long) == np.arange(1001 * 3)).all()
 
 
+@pytest.mark.slow  # variational equations compiled for each member
+def test_indicators_come_from_a_tangent_vector_that_is_not_kept(tmp_path: Path) -> None:
+    text = (CONFIG + SWEEP).replace("end = 5", "end = 200").replace("samples = 6", "samples = 201")
+    text = (
+        text.replace('"rates"', '"auto"')
+        .replace('["final"]', '["final", "megno", "fli", "lyapunov"]')
+        .replace("0.1, 3]", "0.1, 1]")
+    )
+    dataset = swept(tmp_path, text).dataset
+    assert "tangent_growth_final" not in dataset
+    assert "angular_velocity_final" in dataset
+    changes = {"time.end": 200, "time.samples": 201, "integrator.formulation": "auto"}
+    changes |= {"initial.angular_velocity[2]": 0.1}
+    changes |= {"output.record": ["angular_velocity", "energy", "tangent_growth"]}
+    alone = parse(CONFIG).replace(changes)
+    growth = rigidsim.run(alone, out=None).dataset.tangent_growth.values
+    assert dataset.fli[0, 0] == growth.max()
+    assert dataset.lyapunov[0, 0] == growth[-1] / 200
+    assert dataset.growth_time[0, 0] == 200
+    assert abs(dataset.megno[0, 0] - 2) < 0.5  # a free body's motion is regular
+
+
 def test_ranges_of_members_and_their_places() -> None:
     members = np.array([0, 1, 2, 5, 7, 8])
     work = Work((), ranges_of(members))
@@ -219,6 +241,8 @@ def test_shares_make_the_same_dataset(folder: Path, tmp_path: Path) -> None:
 
 def test_info_tells_how_far_a_sweep_is(tmp_path: Path) -> None:
     swept(tmp_path, tiles=(0, 1))
+    with pytest.raises(RunFolderError, match="open_sweep"):
+        rigidsim.open_run(tmp_path / "box")
     told = CliRunner().invoke(app, ["info", str(tmp_path / "box")])
     assert told.exit_code == 0
     assert "2 of 6 members" in told.output

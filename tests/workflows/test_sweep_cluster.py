@@ -1,0 +1,66 @@
+"""Sweeps on a Dask cluster of this machine, whose workers are killed under it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigidsim.errors import RigidsimError
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.sweep import SweepObserver, sweep
+
+distributed = pytest.importorskip("distributed")
+
+CONFIG = """\
+name = "cluster"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1, 0.05]
+[time]
+end = 5
+samples = 6
+[integrator]
+formulation = "rates"
+[output]
+estimate = false
+[sweep]
+keep = ["final"]
+tile = 1
+axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 6], name = "w3"}
+"""
+
+
+@pytest.mark.slow  # five processes that import everything
+def test_a_cluster_makes_the_same_dataset_though_workers_die(tmp_path: Path) -> None:
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
+    )
+
+    class Killer(SweepObserver):
+        killed = 0
+
+        def progressed(self, done: int) -> None:
+            if self.killed < 2:
+                self.killed += 1
+                worker = list(cluster.workers.values())[self.killed % len(cluster.workers)]
+                os.kill(worker.pid, signal.SIGKILL)
+
+    killer = Killer()
+    with cluster:
+        found = sweep(parse(CONFIG), out=tmp_path / "a", scheduler=cluster.scheduler_address, observer=killer)
+    assert found.finished
+    assert killer.killed == 2
+    alone = sweep(parse(CONFIG), out=tmp_path / "b")
+    for name in ("angular_velocity_final", "energy_drift_largest", "steps", "status"):
+        np.testing.assert_array_equal(found.dataset[name].values, alone.dataset[name].values)
+
+
+def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rigidsim.workflows.sweep_cluster._CONNECT_SECONDS", 0.5)
+    with pytest.raises(RigidsimError, match="no Dask scheduler answers"):
+        sweep(parse(CONFIG), out=tmp_path, scheduler="tcp://127.0.0.1:9")
