@@ -6,6 +6,7 @@ out at any time, so that neither the scheduler nor this process ever holds many.
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -18,6 +19,8 @@ from rigidsim.workflows.sweep_ways import task
 _AHEAD = 2  # tiles for each thread
 _MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
 _CONNECT_SECONDS = 20
+_LOOK_SECONDS = 5
+_ALONE_SECONDS = 120  # without any worker, after which nobody waits any more
 
 
 class Cluster:
@@ -53,16 +56,24 @@ class Cluster:
     ) -> Iterator[tuple[int, bytes]]:
         deaths: Counter[int] = Counter()
         running: dict[Any, int] = {}
-        finished = distributed.as_completed(loop=client.loop)
+        alone_since: float | None = None
         while waiting or running:
-            ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+            threads = sum(client.nthreads().values())
+            alone_since = None if threads else (alone_since or time.monotonic())
+            if alone_since is not None and time.monotonic() - alone_since > _ALONE_SECONDS:
+                raise StoppedError(
+                    f"--scheduler {self._address}: no worker is left there; start some with: dask worker "
+                    f"{self._address}, and give the command again; the tiles that are complete are kept"
+                )
+            ahead = _AHEAD * max(1, threads)
             while waiting and len(running) < ahead:
                 tile = waiting.pop()
                 future = client.submit(tile_image, *task(generation, tile), pure=False, retries=2)
                 running[future] = tile
-                finished.add(future)
-            future = next(finished)
-            tile = running.pop(future)
+            done = _first_done(distributed, client, list(running))
+            if done is None:
+                continue
+            future, tile = done, running.pop(done)
             try:
                 image = future.result()
             except distributed.KilledWorker:
@@ -79,6 +90,18 @@ class Cluster:
                 waiting.append(tile)
                 continue
             yield tile, image
+
+
+def _first_done(distributed: Any, client: Any, futures: list[Any]) -> Any:
+    """One that ended; None where none does within some seconds."""
+    try:
+        with client.as_current():
+            found = distributed.wait(futures, timeout=_LOOK_SECONDS, return_when="FIRST_COMPLETED")
+    except TimeoutError:
+        return None
+    except distributed.CancelledError:  # one of them was lost with the worker that had it
+        return next(future for future in futures if future.status == "cancelled")
+    return next(iter(found.done), None)
 
 
 def _distributed() -> Any:
