@@ -22,11 +22,13 @@ def in_a_folder(config: Path, out: Path) -> dict[str, float]:
     text = config.read_text()
     if "timeline = true" in text:  # imports apart
         import h5netcdf.legacyapi  # noqa: F401
-        import xarray  # noqa: F401
+        import xarray
 
         import rigidsim.look.blueprint
         import rigidsim.look.drawing
         import rigidsim.look.timeline
+
+        xarray.Variable((), 0.0)  # imports dask where it is installed
     run, parse = rigidsim.run, rigidsim.parse
     began, cpu = time.perf_counter(), time.process_time()
     done = run(parse(text), out=out)
