@@ -167,6 +167,8 @@ def remembered_lookups() -> Iterator[None]:
         if getattr(self, "_phony", False):
             return None
         file = self._root._h5file
+        if self._root._writable:
+            return file[self._h5path]
         kept = self.__dict__.get("_kept")
         if kept is None or kept[0] is not file or not kept[1]:
             kept = self.__dict__["_kept"] = file, file[self._h5path]
