@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rigidsim.accuracy.asked import leaves_choice, wanted
 from rigidsim.accuracy.cost import MEASURED, cost
 from rigidsim.accuracy.forecast import Forecasts
 from rigidsim.accuracy.motion import Motion
@@ -24,14 +25,11 @@ from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.scene import build_scene
 from rigidsim.scene.schema import LARGEST_DIGITS
 
 _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
 """Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""
 _LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100, 150, 200, LARGEST_DIGITS)
-
-_MOST = 1.0  # rad: for a path that may be anywhere
 
 
 @dataclass(frozen=True)
@@ -73,32 +71,6 @@ class Choice:
     steps: int
     why: str
     known: Motion
-
-
-def leaves_choice(experiment: Experiment) -> bool:
-    """Whether ``accuracy`` is given and precision, tolerance or method are open to be chosen for it."""
-    integrator = experiment.config.integrator
-    fixed = {"precision", "tolerance", "method"} <= integrator.model_fields_set
-    return wanted(experiment) is not None and not fixed
-
-
-def wanted(experiment: Experiment) -> float | None:
-    """The accuracy of the attitude to choose settings for, rad; None where none is asked for.
-
-    Errors of the path are, for its size, about as large as those of the attitude; the certificate says what
-    they are, and a dearer setting is chosen where they are larger than that.
-    """
-    integrator = experiment.config.integrator
-    found = [] if integrator.accuracy is None else [float(integrator.accuracy)]
-    if integrator.accuracy_position is not None:
-        scene = build_scene(experiment)
-        if scene.position is None or scene.velocity is None:
-            what = "given, but the scene has no position; give [initial] position or velocity"
-            raise ConfigError(Problem("[integrator] accuracy_position", what), experiment.source)
-        seconds = float(scene.samples.last - scene.start)
-        size = math.hypot(*map(float, scene.position)) or math.hypot(*map(float, scene.velocity)) * seconds
-        found.append(min(float(integrator.accuracy_position) / (size or 1.0), _MOST))
-    return min(found) if found else None
 
 
 def chosen(

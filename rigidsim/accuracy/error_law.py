@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rigidsim.scene.scene import Scene
-from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.error_growth import Growth, measure_growth
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
+
+if TYPE_CHECKING:
+    from rigidsim.solve.closed_form import ClosedForm
 
 DRIFT_FACTOR = 50.0
 """A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
@@ -41,6 +44,8 @@ def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedFor
     Args:
         driven: whether loads are given from Python, of which the scene knows nothing.
     """
+    from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
+
     try:
         return closed_form_of(scene, driven=driven), ""
     except NoClosedForm as none:

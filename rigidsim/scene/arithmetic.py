@@ -30,9 +30,17 @@ def working_bits(precision: str | int) -> int:
     return math.ceil(precision * math.log2(10)) + 2
 
 
+class _Context(mpmath.MPContext):
+    """A context with the functions that mpmath's own has: each one made would wrap all of them again."""
+
+    @classmethod
+    def _wrap_specfun(cls, *_: Any) -> None:
+        """They are inherited as they were wrapped for ``mpmath.mp``."""
+
+
 def context_for(precision: str | int) -> Any:
     """An mpmath context of its own (never the global one) with guard bits."""
-    context = mpmath.MPContext()
+    context = _Context()
     context.prec = working_bits(precision) + GUARD_BITS
     return context
 

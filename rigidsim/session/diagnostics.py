@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from rigidsim.accuracy.error_law import DRIFT_FACTOR
-from rigidsim.accuracy.estimate import Estimate, estimate_errors
 from rigidsim.accuracy.growth import UNCERTAIN
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.scene.records import dataclass
@@ -19,6 +19,9 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.trail import Trail, Waypoints
 from rigidsim.store.summary import Caution, WarningCode
+
+if TYPE_CHECKING:
+    from rigidsim.accuracy.estimate import Estimate
 
 NEAR_SINGULAR = 1e-3
 """Factor from which Euler angles lose digits to their singularity."""
@@ -58,6 +61,8 @@ class Diagnostics:
             waypoints: some of its step boundaries.
             go_on: asked again and again; False ends it, without a result.
         """
+        from rigidsim.accuracy.estimate import estimate_errors
+
         progress = self.progress
         found = estimate_errors(
             self.prepared,

@@ -7,8 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.session.lyapunov import LYAPUNOV_NAMES
-from rigidsim.session.variables import dataset_variables, dates_of, recorded_variables
+from rigidsim.session.variables import LYAPUNOV_NAMES, dataset_variables, dates_of, recorded_variables
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
 from rigidsim.solve.problem import InitialValueProblem

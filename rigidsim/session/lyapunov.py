@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.session.guards import Interruption
+from rigidsim.session.variables import LYAPUNOV_NAMES
 from rigidsim.solve.lyapunov import Convergence, LyapunovSpectrum, lyapunov_spectrum
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.store import atomic, netcdf
@@ -77,14 +78,8 @@ def _saved(path: Path, run_id: str) -> Convergence | None:
         return None
 
 
-LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
-"""Of variables and dimensions."""
-
-
-def lyapunov_variables(spectrum: LyapunovSpectrum | None) -> list[Extra]:
+def lyapunov_variables(spectrum: LyapunovSpectrum) -> list[Extra]:
     """The convergence of the exponents, as variables of the dataset."""
-    if spectrum is None:
-        return []
     along = {"units": "s", "long_name": "time since the run's start, of the estimates"}
     what = {
         "units": "s-1",

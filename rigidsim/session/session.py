@@ -12,7 +12,6 @@ from rigidsim.session.completion import Completion
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.event_variables import event_counts, event_times, event_variables
 from rigidsim.session.guards import Guards, Interruption, Observer
-from rigidsim.session.lyapunov import lyapunov_variables, spectrum_of
 from rigidsim.session.recorder import Recorder
 from rigidsim.session.restore import restore
 from rigidsim.session.summary import chart_changes, closing_words, cost_so_far, summarise, time_reached
@@ -98,6 +97,8 @@ class Session:
             self.observer.progressed(progress)
             spectrum = None
             if prepared.scene.config.output.lyapunov and progress.status is Status.FINISHED:
+                from rigidsim.session.lyapunov import spectrum_of
+
                 self.observer.phase("lyapunov")
                 with suppress(KeyboardInterrupt):  # while its equations were compiled
                     spectrum = spectrum_of(prepared, folder, run_id, interruption, limits.seconds)
@@ -134,7 +135,11 @@ class Session:
             event_times=event_times(prepared, log, last),
             chart_changes=chart_changes(prepared, corrected),
         )
-        extras = event_variables(prepared, log, evaluator, last) + lyapunov_variables(spectrum)
+        extras = event_variables(prepared, log, evaluator, last)
+        if spectrum is not None:
+            from rigidsim.session.lyapunov import lyapunov_variables
+
+            extras += lyapunov_variables(spectrum)
         if isinstance(writer, MemoryWriter):
             wrapped_from = recorder.statistics.angles_wrapped_from
             ended = of_complete(attributes, summary, self.effort, wrapped_from)

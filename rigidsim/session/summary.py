@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import Progress
-from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.status import Status
 from rigidsim.store.attributes import RootAttributes, Use
@@ -31,6 +31,9 @@ from rigidsim.store.summary import (
     Summary,
     as_fields,
 )
+
+if TYPE_CHECKING:
+    from rigidsim.solve.lyapunov import LyapunovSpectrum
 
 _IN_PLANE = "; in its plane alone: whether a small push out of the plane would grow isn't examined"
 _NOT_CERTIFIED = "not certified against an independent solution"

@@ -11,6 +11,9 @@ from rigidsim.session.dates import Dates
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.variables import Variable, time_variable
 
+LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
+"""Of variables and dimensions."""
+
 
 def drift_name(invariant: str) -> str:
     """Of the variable that holds an invariant's drift; its attribute ``drift_of`` names the invariant."""

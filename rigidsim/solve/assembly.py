@@ -9,7 +9,6 @@ from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
-from rigidsim.solve.closed_form.sampler import ClosedFormSampler
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
@@ -103,6 +102,8 @@ def sampler(
         pacing = _in_small_blocks(pacing, radians_between_samples(prepared))
     if prepared.closed is None:
         return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing, most_steps)
+    from rigidsim.solve.closed_form.sampler import ClosedFormSampler
+
     begin = parts.corrected.boundary()
     return ClosedFormSampler(
         prepared.closed, prepared.system, begin, clock, precision, receiver, check, start, pacing

@@ -1,5 +1,6 @@
 """What heyoka compiles, once in a process: what a trial or an earlier run compiled serves the next one.
 
+What other processes compiled is found on disk (``HEYOKA_CACHE_DIR``), in a cache that is kept small here.
 Even with compiled code in heyoka's own cache an engine or a function takes some 10 ms to put together, which
 is more than many runs take.
 """
@@ -10,6 +11,7 @@ import copy
 import pickle
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from functools import cache
 from threading import Lock
 from typing import Any, Generic, TypeVar
 
@@ -18,6 +20,11 @@ import heyoka as hy
 from rigidsim.solve.engine import CompiledFunction, Integrator
 
 T = TypeVar("T")
+
+_HEYOKAS_LIMIT = 20 << 30
+DISK_LIMIT = 256 << 20
+"""Bytes of compiled code on disk, of some five hundred scenes. heyoka's own limit is 20 GiB; compiling takes
+ten times as long when the cache has grown to a few of them."""
 
 
 class Kept(Generic[T]):
@@ -44,12 +51,23 @@ class Kept(Generic[T]):
             if key in self._made:
                 self._made.move_to_end(key)
                 return self._made[key]
+        limit_disk_cache()
         made = make()  # seconds, during which others aren't kept waiting
         with self._lock:
             self._made[key] = made
             if len(self._made) > self._most:
                 self._made.popitem(last=False)
         return made
+
+
+@cache
+def limit_disk_cache() -> None:
+    """Before anything is compiled: what wasn't used for longest leaves the cache on disk when it is full.
+
+    A limit that somebody has set, with ``heyoka.llvm_state.set_diskcache_limit``, is left as it is.
+    """
+    if hy.llvm_state.get_diskcache_limit() == _HEYOKAS_LIMIT:
+        hy.llvm_state.set_diskcache_limit(DISK_LIMIT)
 
 
 _functions: Kept[CompiledFunction] = Kept(32)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import heyoka as hy
 import mpmath
@@ -18,11 +19,13 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.projection import projected_system
 from rigidsim.solve.sampling import SampleClock
+
+if TYPE_CHECKING:
+    from rigidsim.solve.closed_form import ClosedForm
 
 _SPARE_ORDER = 0.9
 _AUTO_BITS = 3
@@ -202,6 +205,8 @@ def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | 
         why = 'takes no steps in which events could be found; remove [[events]], or choose method = "taylor"'
     if why is not None:
         raise ConfigError(Problem("[integrator] method", f'given "closed_form", which {why}'))
+    from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
+
     try:
         return closed_form_of(scene, driven=driven)
     except NoClosedForm as none:

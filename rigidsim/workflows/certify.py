@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
+from rigidsim.accuracy.asked import wanted
 from rigidsim.accuracy.certificate import certify, verdict
-from rigidsim.accuracy.choice import Choice, wanted
+from rigidsim.accuracy.choice import Choice
 from rigidsim.scene.config import Experiment
 from rigidsim.session.session import Session
 from rigidsim.solve.status import Status

@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from rigidsim.accuracy.choice import chosen, leaves_choice
-from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.asked import leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.guards import Observer
@@ -20,10 +19,11 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.run import Run, SavedRun
-from rigidsim.workflows.certify import certified
 from rigidsim.workflows.read import Experiment, Given, as_experiment
 
 if TYPE_CHECKING:
+    from rigidsim.accuracy.choice import Choice
+    from rigidsim.accuracy.setting import Setting
     from rigidsim.model.load import Load
 
 
@@ -100,24 +100,32 @@ def _run(
     tuning: Tuning,
 ) -> Run:
     session = Session(observer, tuning=tuning)
+    choice: Choice | None
     beyond: Setting | None = None
     result: Run | None = None
     while True:
-        try:
-            if leaves_choice(experiment):
-                observer.choosing(experiment.config.name)
-            setting, choice = chosen(experiment, loads=loads, beyond=beyond, told=observer.trying)
-        except ConfigError:
-            if result is None:
-                raise
-            return result  # no dearer setting is left to try
+        setting, choice = experiment, None
+        if leaves_choice(experiment):
+            from rigidsim.accuracy.choice import chosen
+
+            observer.choosing(experiment.config.name)
+            try:
+                setting, choice = chosen(experiment, loads=loads, beyond=beyond, told=observer.trying)
+            except ConfigError:
+                if result is None:
+                    raise
+                return result  # no dearer setting is left to try
         if choice is not None:
             session.phases.next("choose")
         prepared = prepare(setting, loads=loads)
         refuse_taken_names(prepared)
         with _place(prepared, out, setting.text, force=force or beyond is not None) as folder:
             result = session.execute(prepared, folder)
-            result, kept = certified(result, setting, choice, session, loads)
+            kept = True
+            if wanted(setting) is not None:
+                from rigidsim.workflows.certify import certified
+
+                result, kept = certified(result, setting, choice, session, loads)
         if kept or choice is None:
             return result
         beyond = choice.setting

@@ -11,7 +11,7 @@ import pytest
 from support import same_bits
 
 import rigidsim
-from rigidsim.solve.compiled import Kept, compiled_engine, compiled_function
+from rigidsim.solve.compiled import DISK_LIMIT, Kept, compiled_engine, compiled_function, limit_disk_cache
 from rigidsim.solve.problem import prepare
 
 pytestmark = pytest.mark.optimised
@@ -98,3 +98,16 @@ def test_a_second_run_compiles_nothing_and_is_the_same(
     monkeypatch.setattr(hy, "taylor_adaptive", compiled)
     monkeypatch.setattr(hy, "cfunc", compiled)
     same_bits(first, rigidsim.run(experiment, out=None))
+
+
+def test_the_cache_on_disk_stays_small_unless_somebody_set_its_limit() -> None:
+    compiled_function([x * v], [x, v])
+    assert hy.llvm_state.get_diskcache_limit() == DISK_LIMIT
+    try:
+        for limit in (DISK_LIMIT * 3, 0):
+            hy.llvm_state.set_diskcache_limit(limit)
+            limit_disk_cache.cache_clear()
+            compiled_function([x * v + limit], [x, v])
+            assert hy.llvm_state.get_diskcache_limit() == limit
+    finally:
+        hy.llvm_state.set_diskcache_limit(DISK_LIMIT)

@@ -147,7 +147,7 @@ timeline = false
         return spectrum_of(prepared, folder, run_id, interruption, save_seconds)
 
     spectrum_of = spectra.spectrum_of
-    monkeypatch.setattr("rigidsim.session.session.spectrum_of", impatient)
+    monkeypatch.setattr("rigidsim.session.lyapunov.spectrum_of", impatient)
     run = run_text(text, out=runs)
     assert run.status == "interrupted"
     for _ in range(2):
