@@ -34,7 +34,7 @@ class Recorder(SampleReceiver):
     Attributes:
         statistics: what the summary says of all samples.
         progress: of the run; set when it begins.
-        trail: some of this session's samples.
+        trail: some of this session's samples, where errors are estimated by them.
         kept: rows for the timeline; None where none is asked for.
     """
 
@@ -79,7 +79,8 @@ class Recorder(SampleReceiver):
             self._evaluator.continuity = before
             block = block.rows(0, wanted)
             recorded = self._evaluator.evaluate(block)
-        self.trail.take(block)
+        if self._prepared.scene.config.output.estimate:
+            self.trail.take(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)
         if self._dates is not None:
             recorded |= self._dates.of_samples(block.first, len(block))
