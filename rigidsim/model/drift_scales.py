@@ -7,6 +7,7 @@ from typing import Any
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.scaling import loads_amplitude, potential_amplitude, source_rate
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm
+from rigidsim.scene.traced import largest_of
 
 
 def _driven(m: Mechanics) -> Any:
@@ -19,8 +20,8 @@ def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     scene, context = m.scene, m.scene.context
     initial = norm(context, apply(scene.body.inertia, scene.angular_velocity))
     fed = potential_amplitude(scene) + loads_amplitude(scene) + _driven(m)
-    swing = context.sqrt(2 * max(scene.body.principal_moments) * fed)
-    swing = max(swing, max(scene.body.principal_moments) * source_rate(scene))
+    swing = context.sqrt(2 * largest_of(scene.body.principal_moments) * fed)
+    swing = largest_of([swing, largest_of(scene.body.principal_moments) * source_rate(scene)])
     if initial == 0 and swing == 0:
         return context.one, "1 kg m^2/s (the body is at rest)"
     if initial >= swing:
@@ -33,7 +34,7 @@ def rotational_scale(m: Mechanics) -> tuple[Any, str]:
     scene, context = m.scene, m.scene.context
     momentum = apply(scene.body.inertia, scene.angular_velocity)
     kinetic = dot(scene.angular_velocity, momentum) / 2
-    carried = max(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
+    carried = largest_of(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
     amplitude = potential_amplitude(scene) + loads_amplitude(scene) + carried + _driven(m)
     if kinetic + amplitude == 0:
         return context.one, "1 J (the body is at rest)"

@@ -15,6 +15,7 @@ from rigidsim.model.load import Term
 from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.scene.arithmetic import dot, negligible
+from rigidsim.scene.traced import largest_of
 
 LEVI_CIVITA = {
     (0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1,
@@ -34,9 +35,9 @@ def rate_equations(m: Kinematics, torque: list[Term]) -> list[Symbolic]:
     context, numbers, states = m.scene.context, m.numbers, m.rate_states
     zero = context.zero
     inverse, inertia, units = numbers.inverse_inertia, numbers.inertia, numbers.rate_units
-    largest_inverse = max(abs(x) for row in inverse for x in row)
+    largest_inverse = largest_of([abs(x) for row in inverse for x in row])
     tiny = negligible(context)
-    scale = largest_inverse * max(abs(x) for row in inertia for x in row)
+    scale = largest_inverse * largest_of([abs(x) for row in inertia for x in row])
     result = []
     for i in range(3):
         quadratic: dict[tuple[int, int], Any] = {}
@@ -52,7 +53,7 @@ def rate_equations(m: Kinematics, torque: list[Term]) -> list[Symbolic]:
         ]
         for vector, expression in torque:
             coefficient = dot(inverse[i], vector) / units[i]
-            size = largest_inverse * max(abs(x) for x in vector) / units[i]
+            size = largest_inverse * largest_of([abs(x) for x in vector]) / units[i]
             if abs(coefficient) > tiny * size:
                 terms.append(m.number(coefficient) * expression)
         result.append(hy.sum(terms) if terms else hy.expression(0.0))

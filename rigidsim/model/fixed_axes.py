@@ -33,6 +33,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, eigen, negligible, norm
+from rigidsim.scene.traced import largest_of
 
 
 def _outer(a: Vector, b: Vector) -> Matrix:
@@ -46,7 +47,7 @@ def _added(matrices: list[Matrix]) -> Matrix:
 
 
 def _size(matrix: Matrix) -> Any:
-    return max(abs(x) for row in matrix for x in row)
+    return largest_of([abs(x) for row in matrix for x in row])
 
 
 def _linear(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Vector, Vector]]:

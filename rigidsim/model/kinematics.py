@@ -24,6 +24,7 @@ from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
+from rigidsim.scene.traced import largest_of
 
 T = TypeVar("T")
 
@@ -69,7 +70,7 @@ class Kinematics:
     @cached_property
     def momentum_body(self) -> list[Symbolic]:
         """Angular momentum I w, body axes."""
-        largest = max(abs(x) for row in self.numbers.inertia for x in row)
+        largest = largest_of([abs(x) for row in self.numbers.inertia for x in row])
         least = largest * negligible(self.scene.context)
         rows = []
         for row in self.numbers.inertia:
@@ -112,7 +113,7 @@ class Kinematics:
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
-        tiny = max(moments) * negligible(context)
+        tiny = largest_of(moments) * negligible(context)
         if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere
             if self.marked is None:
                 return None

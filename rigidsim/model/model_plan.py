@@ -52,12 +52,19 @@ class ModelPlan:
         return any(load.wide for load in self.loads)
 
 
-def plan_model(scene: Scene, extra_loads: Sequence[Load] = (), scaling: Scaling | None = None) -> ModelPlan:
+def plan_model(
+    scene: Scene,
+    extra_loads: Sequence[Load] = (),
+    scaling: Scaling | None = None,
+    *,
+    like: ModelPlan | None = None,
+) -> ModelPlan:
     """Decide on the least system that a scene needs.
 
     Args:
         extra_loads: given from Python, beside those of the config.
         scaling: where it is known, from another formulation of the same motion; its loads are in order then.
+        like: of the same scene in plain numbers: what was estimated and checked there holds here.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a load that depends on the
@@ -68,7 +75,9 @@ def plan_model(scene: Scene, extra_loads: Sequence[Load] = (), scaling: Scaling 
     loads: list[Load] = [*UniformGravity.of(scene), *scene.loads]  # type: ignore[list-item]
     requirements = choose_requirements(scene, loads)
     requirements, plane = _planar(scene, loads, requirements)
-    if scaling is None:
+    if scaling is None and like is not None:
+        scaling = choose_scaling(scene, like.scaling.drive)
+    elif scaling is None:
         unknown = [load for load in loads if load.amplitude(scene) is None]
         refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))

@@ -13,6 +13,7 @@ from typing import Any, Protocol, cast
 from rigidsim.scene.arithmetic import dot, norm
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.traced import Traced, binary_exponent, largest_of, smallest_of
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ def exponent(context: Any, value: Any) -> int:
     """The smallest e with abs(value) <= 2**e; zero for zero."""
     if value == 0:
         return 0
+    if isinstance(value, Traced):
+        return binary_exponent(value)  # type: ignore[return-value]
     mantissa, power = context.frexp(abs(value))
     return int(power) - 1 if mantissa == 0.5 else int(power)
 
@@ -87,7 +90,7 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
     swing = 4 * potential_amplitude(scene)
     if scene.loads or drive is not None:  # an orbit feeds it: a bound for the body carried along with it
         carried = source_rate(scene)
-        fed = context.sqrt(max(twice_energy, zero) + swing + 4 * loads_amplitude(scene))
+        fed = context.sqrt(largest_of([twice_energy, zero]) + swing + 4 * loads_amplitude(scene))
         if drive is not None:
             fed += context.sqrt(2 * drive.energy)
         return [fed * context.sqrt(inverse[i][i]) + carried for i in range(3)]
@@ -106,7 +109,7 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
         for i, moment in enumerate(moments):
             if moment != extreme and moment != 0:
                 bound = context.sqrt(invariant / (moment * abs(extreme - moment)))
-                bounds[i] = min(bounds[i], bound)
+                bounds[i] = smallest_of([bounds[i], bound])
     return bounds
 
 
@@ -154,7 +157,7 @@ def loads_amplitude(scene: Scene) -> Any:
 
 def source_rate(scene: Scene) -> Any:
     """Fastest angular rate of any source seen from the body, rad/s; zero without one."""
-    return max((load.fastest_rate(scene) for load in _loads(scene)), default=scene.context.zero)
+    return largest_of([load.fastest_rate(scene) for load in _loads(scene)] or [scene.context.zero])
 
 
 def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
@@ -176,16 +179,16 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
     """The units of a scene; a pure function of it, so that the same config gives the same bits."""
     context, body = scene.context, scene.body
     bounds = largest_rates(scene, drive)
-    fastest = max(bounds)
+    fastest = largest_of(bounds)
     potential = potential_amplitude(scene)
     if potential != 0:
-        smallest = min(m for m in body.principal_moments if m != 0)
+        smallest = smallest_of([m for m in body.principal_moments if m != 0])
         axial = symmetry_axis(scene)
         swing_moment = smallest
         if axial is not None and all(body.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j):
             swing_moment = body.inertia[(axial + 1) % 3][(axial + 1) % 3]
-        fastest = max(fastest, context.sqrt(potential / swing_moment))
-    fastest = max(fastest, source_rate(scene))
+        fastest = largest_of([fastest, context.sqrt(potential / swing_moment)])
+    fastest = largest_of([fastest, source_rate(scene)])
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
         time = exponent(context, scene.end - scene.start)
@@ -199,7 +202,7 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         length, speed = exponent(context, farthest), exponent(context, swiftest)
     return Scaling(
         time=time,
-        inertia=exponent(context, max(body.principal_moments)),
+        inertia=exponent(context, largest_of(body.principal_moments)),
         rates=(rates[0], rates[1], rates[2]),
         length=length,
         speed=speed,

@@ -28,6 +28,7 @@ from rigidsim.model.state_selection import Requirements
 from rigidsim.scene.expressions import ATTITUDE_NAMES, names_used
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.traced import largest_of
 
 _LARGEST_EXPONENT = 1000
 """Of a recorded variable in SI: float64 ends at 2^1024, and the size of a variable is known roughly."""
@@ -125,7 +126,7 @@ class System:
     @cached_property
     def rate_bound(self) -> Any:
         """Upper bound of the absolute angular velocity, rad/s (mpf)."""
-        return max(largest_rates(self.scene, self.scaling.drive))
+        return largest_of(largest_rates(self.scene, self.scaling.drive))
 
     # --- states ---------------------------------------------------------------------------------------------
 
@@ -353,6 +354,6 @@ def _refuse_out_of_range(
     for value in initial:
         number(value)
     for variable in variables:
-        largest = max(variable.exponents, key=abs)
-        if abs(largest) > _LARGEST_EXPONENT:
-            raise OverflowError(f"{variable.name} would be about 2^{largest} {variable.units}")
+        for exponent in variable.exponents:
+            if abs(exponent) > _LARGEST_EXPONENT:
+                raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")

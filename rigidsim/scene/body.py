@@ -31,6 +31,7 @@ from rigidsim.scene.body_pieces import (
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.presets import PRESETS
 from rigidsim.scene.records import dataclass
+from rigidsim.scene.traced import plain
 from rigidsim.scene.validation_messages import nearest, shown
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
@@ -146,9 +147,9 @@ def _from_pieces(table: body_table.Body, source: str, context: Any, sequence: st
         arm = [x - r for x, r in zip(piece.position, reference, strict=True)]
         shifted = parallel_axis(piece.inertia, piece.mass, arm)
         inertia = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(inertia, shifted, strict=True)]
-        drawing.append({**piece.drawing, "position": [float(x) for x in arm]})
+        drawing.append({**piece.drawing, "position": [float(plain(x)) for x in arm]})
         if piece.drawing["solid"] == "point":
-            drawing[-1]["dimensions"] = {"mass_fraction": float(piece.mass / total)}
+            drawing[-1]["dimensions"] = {"mass_fraction": float(plain(piece.mass / total))}
     center = [c - r for c, r in zip(center, reference, strict=True)]
     return _finish(context, source, source, total, center, inertia, drawing)
 
@@ -191,6 +192,8 @@ def _equivalent_cuboid(
     context: Any, mass: Any, center: Vector, moments: Vector, axes: Matrix
 ) -> dict[str, Any]:
     """The homogeneous cuboid that has these moments (of unit mass where none is known)."""
+    mass, center, moments = plain(mass), [plain(x) for x in center], [plain(m) for m in moments]
+    axes = [[plain(x) for x in row] for row in axes]
     heavy = mass if mass else context.one
     total = sum(moments) / 2
     edges = [context.sqrt(max(12 * (total - m), context.zero) / heavy) for m in moments]

@@ -13,6 +13,7 @@ from rigidsim.scene.arithmetic import Matrix, Vector, diagonal, dot, multiply, t
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.shapes import DIMENSIONS, SHAPES
+from rigidsim.scene.traced import plain
 from rigidsim.scene.validation_messages import shown
 
 
@@ -122,13 +123,13 @@ def _solid(
             raise refusal(f"{place}{small}", f"given {given} m; at most {large} ({limit} m) is allowed")
     heavy = positive(mass, f"{place}mass", "mass", context)
     inertia = diagonal([heavy * m for m in shape.moments(context, dimensions)])
-    plain = {k: [float(x) for x in v] for k, v in dimensions.items()}
-    sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in plain.items()}
+    drawn = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
+    sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in drawn.items()}
     drawing = drawn(name, sizes, position)
     if quaternion is not None:
         turn = attitude.rotation_matrix(quaternion)
         inertia = multiply(multiply(turn, inertia), transpose(turn))
-        drawing["quaternion"] = [float(x) for x in quaternion]
+        drawing["quaternion"] = [float(plain(x)) for x in quaternion]
     return Piece(heavy, position, inertia, drawing)
 
 
@@ -155,7 +156,7 @@ def drawn(solid: str, dimensions: dict[str, Any], position: Vector) -> dict[str,
     return {
         "solid": solid,
         "dimensions": dimensions,
-        "position": [float(x) for x in position],
+        "position": [float(plain(x)) for x in position],
         "quaternion": [1.0, 0.0, 0.0, 0.0],
     }
 

@@ -9,6 +9,7 @@ from rigidsim.scene import schema
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.body import RigidBody
 from rigidsim.scene.records import dataclass
+from rigidsim.scene.traced import largest_of
 
 ORBIT = "orbit"
 SPACE = "space"
@@ -111,7 +112,7 @@ def _fault(key: str, text: str) -> ConfigError:
 def _symmetry(body: RigidBody, context: Any) -> Vector | None:
     """Unit axis of a body with two equal moments and another third; None of others."""
     moments = body.principal_moments
-    tiny = max(moments) * negligible(context)
+    tiny = largest_of(moments) * negligible(context)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         if abs(moments[j] - moments[k]) <= tiny < abs(moments[i] - moments[j]):

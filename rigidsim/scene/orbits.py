@@ -8,6 +8,7 @@ from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.traced import called
 
 
 class Orbit(ConfigTable):
@@ -51,16 +52,7 @@ class KeplerOrbit:
 
     def eccentric_anomaly(self, context: Any, time: Any) -> Any:
         """Solution of Kepler's equation M = E - e sin E at a time, to the context's precision."""
-        mean = self.mean_anomaly + self.mean_motion * time
-        e = self.eccentricity
-        anomaly = mean + e * context.sin(mean)
-        # Newton converges quadratically; the count covers any precision from a start that is good to e^2
-        for _ in range(12 + int(context.prec).bit_length()):
-            step = (anomaly - e * context.sin(anomaly) - mean) / (1 - e * context.cos(anomaly))
-            anomaly -= step
-            if abs(step) <= context.ldexp(1, -context.prec // 2 - 2):
-                break
-        return anomaly
+        return called(_kepler, context, self.mean_anomaly + self.mean_motion * time, self.eccentricity)
 
     @property
     def circular(self) -> bool:
@@ -87,6 +79,17 @@ class KeplerOrbit:
         """Angular rate of the direction at pericentre, rad/s."""
         e = self.eccentricity
         return abs(self.mean_motion) * context.sqrt(1 - e * e) / (1 - e) ** 2
+
+
+def _kepler(context: Any, mean: Any, e: Any) -> Any:
+    anomaly = mean + e * context.sin(mean)
+    # Newton converges quadratically; the count covers any precision from a start that is good to e^2
+    for _ in range(12 + int(context.prec).bit_length()):
+        step = (anomaly - e * context.sin(anomaly) - mean) / (1 - e * context.cos(anomaly))
+        anomaly -= step
+        if abs(step) <= context.ldexp(1, -context.prec // 2 - 2):
+            break
+    return anomaly
 
 
 def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> KeplerOrbit:

@@ -76,14 +76,17 @@ class Scene:
         return [self.body.mass * x for x in self.body.center_of_mass]
 
 
-def build_scene(experiment: Experiment) -> Scene:
+def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     """Work out the scene of a config.
+
+    Args:
+        context: in which its numbers are worked out; by default the one of the config's precision.
 
     Raises:
         ConfigError: something in it contradicts mechanics or another key; names the file.
     """
     config = experiment.config
-    context = context_for(config.integrator.precision)
+    context = context or context_for(config.integrator.precision)
     problems: list[Problem] = []
 
     def attempt(part: Callable[..., T], *arguments: Any) -> T | None:

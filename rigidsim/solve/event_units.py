@@ -17,8 +17,8 @@ import numpy as np
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function
 
-_STATES = 64
-_TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the run
+STATES = 64
+TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the run
 _WORTH_A_UNIT = 1  # bits above one; what is smaller loosens nothing
 
 
@@ -44,18 +44,23 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     scene, scaling = system.scene, system.scaling
     start, end = (math.ldexp(float(t), -scaling.time) for t in (scene.start, scene.samples.last))
     random = np.random.default_rng(0)
-    states = random.uniform(-1.0, 1.0, (_STATES, len(system.states)))
+    states = random.uniform(-1.0, 1.0, (STATES, len(system.states)))
     states[0] = [float(x) for x in system.initial]
     compiled: Any = compiled_function(expressions, system.variables, compact_mode=True)
-    parameters = random.uniform(-1.0, 1.0, (_STATES, compiled.nparams))
+    parameters = random.uniform(-1.0, 1.0, (STATES, compiled.nparams))
     sides = len(system.surfaces)
     parameters[:, sides : sides + len(system.turning)] *= end - start  # full turns, of rates of order one
     largest = np.zeros(len(expressions))
-    for part in _TIMES:
+    for part in TIMES:
         values = _evaluated(compiled, states, parameters, start + part * (end - start))
         largest = np.fmax(largest, np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=1))
-    exponents = [math.frexp(value)[1] for value in largest]
-    return [bits if bits > _WORTH_A_UNIT else 0 for bits in exponents]
+    return [int(bits) for bits in exponents_of(largest)]
+
+
+def exponents_of(largest: np.ndarray) -> np.ndarray:
+    """Binary exponents of the units, of largest values."""
+    exponents = np.frexp(largest)[1]
+    return np.where(exponents > _WORTH_A_UNIT, exponents, 0)
 
 
 def _evaluated(compiled: Any, states: np.ndarray, parameters: np.ndarray, time: float) -> np.ndarray:

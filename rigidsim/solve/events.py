@@ -26,7 +26,7 @@ from rigidsim.solve.sample_block import SampleBlock
 MOST_EVENTS = 1_000_000
 BESIDE = 60
 """Bits below a rounding of one, of what takes an expression off a zero that a step begins at."""
-_DIRECTIONS = {
+DIRECTIONS = {
     0: hy.event_direction.any,
     1: hy.event_direction.positive,
     -1: hy.event_direction.negative,
@@ -157,7 +157,7 @@ def engine_events(
         shifted = expression if offsets is None else expression + hy.par[offsets + i]
         expressions.append(shifted + 2.0 ** (-precision.bits - BESIDE) if at_zero[i] else shifted)
     return [
-        hy.nt_event(expression, callback(i), direction=_DIRECTIONS[c.direction], fp_type=precision.scalar)
+        hy.nt_event(expression, callback(i), direction=DIRECTIONS[c.direction], fp_type=precision.scalar)
         for i, (c, expression) in enumerate(
             zip(system.crossings, of_order_one(system, expressions, meant), strict=True)
         )

@@ -25,7 +25,7 @@ from rigidsim.solve.precision import Precision, Scalar
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
-_LONGEST_STEP = 2.0**30
+LONGEST_STEP = 2.0**30
 _MOST_TO_WHOLE_TIME = 1000  # steps
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
 _HOPELESS_STEPS = 1e15  # to the last sample; at the fastest pace they would take years
@@ -101,7 +101,7 @@ class Stepper:
         self._charts = {0: self._integrator}
         far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
-        bounds = (_LONGEST_STEP, _LONGEST_FOLLOWED)
+        bounds = (LONGEST_STEP, _LONGEST_FOLLOWED)
         self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
         self._longest = self._bounds[0]
         self.steps = 0

@@ -22,6 +22,7 @@ from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
+from rigidsim.scene.traced import largest_of, smallest_of
 
 
 class GravityGradientFields(LoadFields):
@@ -204,7 +205,7 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
 def tidal_range(scene: Scene, strength: Any, distance: Any) -> Any:
     """(3/2) (G M / R^3) (I_max - I_min): range of the gradient's potential energy at a distance, J."""
     moments = scene.body.principal_moments
-    return 3 * strength / distance**3 * (max(moments) - min(moments)) / 2
+    return 3 * strength / distance**3 * (largest_of(moments) - smallest_of(moments)) / 2
 
 
 def gradient_terms(

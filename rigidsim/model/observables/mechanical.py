@@ -28,6 +28,7 @@ from rigidsim.model.observables.observable import (
 from rigidsim.model.rotating_frame import jacobi_constant
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.registry import register_observable
+from rigidsim.scene.traced import binary_magnitude
 
 WORK = "work"
 
@@ -121,7 +122,7 @@ def linear_momentum(m: Mechanics) -> list[Symbolic]:
 
 def mass_exponent(m: Mechanics) -> int:
     """Of the mass, binary."""
-    return int(m.scene.context.frexp(m.scene.body.mass)[1])
+    return binary_magnitude(m.scene.context, m.scene.body.mass)
 
 
 def _carried_as(kind: str) -> Callable[[Mechanics], bool]:

@@ -1,0 +1,271 @@
+"""Families: members that share their equations, and the numbers that each of them puts in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.traced import Guard, Traced, TracedWhole, Untraceable
+from rigidsim.solve.batch.replay import Replay, Swept
+from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, steps_of, trace
+
+MOST_FAMILIES = 64
+"""Traced in all. Where members differ so much, the rest of them is run one by one."""
+_HOPELESS = 8
+"""Members that could not be traced, after which no other is tried."""
+_AT_ONCE = 4096  # members whose numbers are worked out together
+
+
+class Alone(Enum):
+    """Why a member can't run in a batch: it is run by itself. The value is for users."""
+
+    PRECISION = "batches compute in double precision only"
+    CLOSED_FORM = "the closed form takes no steps"
+    HELD = "invariants are held between steps, which batches can't do"
+    ACCURACY = "the accuracy asked for is settled run by run"
+    CHART = "Euler angles may have to change their sequence on the way"
+    ANGLES = "full turns of recorded angles are counted along the motion"
+    SWITCHING = "the equations change along the motion"
+    LYAPUNOV = "the Lyapunov spectrum has an integrator of its own"
+    KEY = "what is swept is not a number of the body, the start, a load or a parameter"
+    UNTRACEABLE = "the equations depend on what is swept in a way that can't be told beforehand"
+    FAMILIES = f"the members need more than {MOST_FAMILIES} different systems of equations"
+    RANGE = "a coefficient is outside the range of double precision"
+
+
+@dataclass(frozen=True)
+class Members:
+    """The members of a sweep, as the batch engine sees them.
+
+    Attributes:
+        keys: dotted keys of the numbers that become parameters, such as ``initial.angular_velocity[2]``.
+        numbers: for each key the members' exact numbers, SI; where the same object stands for several
+            members, it is worked out once.
+        experiment: from a member to its own experiment.
+        kinds: what else differs between members, such as a formulation or a time: members of different kinds
+            are of different families; None where nothing does.
+    """
+
+    keys: Sequence[str]
+    numbers: Sequence[Sequence[ExactNumber]]
+    experiment: Callable[[int], Experiment]
+    count: int
+    kinds: Sequence[Any] | None = None
+
+
+def reason_of_experiment(experiment: Experiment) -> Alone | None:
+    """Why no member of such an experiment can run in a batch, as far as the config says."""
+    config = experiment.config
+    integrator = config.integrator
+    if integrator.accuracy is not None or integrator.accuracy_position is not None:
+        return Alone.ACCURACY
+    if integrator.precision != "double":
+        return Alone.PRECISION
+    if integrator.method != "taylor":
+        return Alone.CLOSED_FORM
+    if integrator.hold_invariants:
+        return Alone.HELD
+    if integrator.formulation in ("euler_angles", "canonical"):
+        return Alone.CHART
+    return Alone.LYAPUNOV if config.output.lyapunov else None
+
+
+def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
+    """Why members of an experiment, with numbers that are swept, can't run in a batch; None where they can,
+    as far as it can be told before any member is looked at.
+
+    Args:
+        keys: of the swept numbers.
+    """
+    reason = reason_of_experiment(experiment)
+    if reason is not None:
+        return reason
+    return None if all(steps_of(key)[0] in TRACED_TABLES for key in keys) else Alone.KEY
+
+
+def _reason_of_system(traced: TracedSystem) -> Alone | None:
+    system = traced.system
+    if system.switches:
+        return Alone.SWITCHING
+    if system.partner is not None or system.angle_states:
+        return Alone.CHART
+    joined = {r.continuity for r in system.recorded} - {"", "nearest"}
+    return Alone.ANGLES if joined else None
+
+
+@dataclass
+class Family:
+    """Members that share the equations of one traced system.
+
+    Attributes:
+        kind: what else they share, see ``Members.kinds``.
+    """
+
+    traced: TracedSystem
+    kind: Any = None
+
+    @cached_property
+    def guards(self) -> list[Guard]:
+        """Decisions that its members share, those that separate most first."""
+        return list(self.traced.graph.guards)
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What members of a family put in, float64.
+
+    Attributes:
+        members: which they are.
+        initial: (states, members), internal units.
+        parameters: (parameters of the traced system, members).
+        replay: for what else follows from their numbers.
+    """
+
+    members: np.ndarray
+    initial: np.ndarray
+    parameters: np.ndarray
+    replay: Replay
+
+    def doubles(self, value: Any) -> np.ndarray:
+        """A number of the scene, rounded once, (members,)."""
+        if isinstance(value, Traced):
+            return self.replay.doubles(value.node)
+        return np.full(len(self.members), float(value))
+
+    def whole_numbers(self, value: Any) -> np.ndarray:
+        """A whole number of the model, (members,)."""
+        if isinstance(value, TracedWhole):
+            return self.replay.whole_numbers(value.node)
+        return np.full(len(self.members), int(value))
+
+
+@dataclass
+class Sorted:
+    """Members put into families.
+
+    Attributes:
+        groups: each family with its members' numbers.
+        alone: members that run by themselves, with the reason.
+        refused: members that no run accepts, with what a run of each alone says.
+    """
+
+    groups: list[tuple[Family, Numbers]] = field(default_factory=list)
+    alone: dict[int, Alone] = field(default_factory=dict)
+    refused: dict[int, ConfigError] = field(default_factory=dict)
+
+
+class Families:
+    """Puts members into families, which are traced where they are first met.
+
+    Args:
+        members: all of the sweep.
+    """
+
+    def __init__(self, members: Members) -> None:
+        self._members = members
+        self._swept = [Swept(numbers) for numbers in members.numbers]
+        self.known: list[Family] = []
+        self._hopeless: Alone | None = None
+        self._failures = 0
+
+    def sort(self, which: Sequence[int] | np.ndarray | None = None) -> Sorted:
+        """Put members into families.
+
+        Args:
+            which: of the sweep's members; all by default.
+        """
+        result = Sorted()
+        chosen = np.arange(self._members.count) if which is None else np.asarray(which, dtype=np.int64)
+        for first in range(0, len(chosen), _AT_ONCE):
+            self._sort_some(chosen[first : first + _AT_ONCE], result)
+        return result
+
+    def _sort_some(self, waiting: np.ndarray, result: Sorted) -> None:
+        for family in list(self.known):
+            if not len(waiting):
+                return
+            waiting = self._taken(family, waiting, result)
+        while len(waiting):
+            first = int(waiting[0])
+            if self._hopeless is None and len(self.known) >= MOST_FAMILIES:
+                self._hopeless = Alone.FAMILIES
+            if self._hopeless is not None:
+                result.alone |= dict.fromkeys(waiting.tolist(), self._hopeless)
+                return
+            made = self._traced(first)
+            if isinstance(made, ConfigError):
+                result.refused[first] = made
+                waiting = waiting[1:]
+            elif isinstance(made, Alone):
+                result.alone[first] = made
+                waiting = waiting[1:]
+                self._failures += 1
+                if self._failures >= _HOPELESS:
+                    self._hopeless = made
+            else:
+                self.known.append(made)
+                waiting = self._taken(made, waiting, result)
+
+    def _traced(self, member: int) -> Family | ConfigError | Alone:
+        experiment = self._members.experiment(member)
+        reason = batchable(experiment, self._members.keys)
+        if reason is not None:
+            return reason
+        try:
+            traced = trace(experiment, self._members.keys, [column.of(member) for column in self._swept])
+        except ConfigError as error:
+            return error
+        except Untraceable:
+            return Alone.UNTRACEABLE
+        return _reason_of_system(traced) or Family(traced, self._kind(member))
+
+    def _kind(self, member: int) -> Any:
+        return None if self._members.kinds is None else self._members.kinds[member]
+
+    def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
+        """Put the members of a family into the result; those that are left."""
+        candidates = waiting
+        if self._members.kinds is not None:
+            same = np.array([self._kind(int(m)) == family.kind for m in waiting], dtype=bool)
+            candidates = waiting[same]
+        if not len(candidates):
+            return waiting
+        replay = self._replay(family, candidates)
+        agree = replay.agreeing(family.guards)
+        taken = candidates[agree]
+        if not len(taken):
+            return waiting
+        if len(taken) < len(candidates):
+            replay = self._replay(family, taken)
+        numbers = _numbers_of(family, taken, replay)
+        within = np.isfinite(numbers.initial).all(axis=0) & np.isfinite(numbers.parameters).all(axis=0)
+        if not within.all():
+            result.alone |= dict.fromkeys(taken[~within].tolist(), Alone.RANGE)
+            kept = taken[within]
+            numbers = _numbers_of(family, kept, self._replay(family, kept))
+        if len(numbers.members):
+            result.groups.append((family, numbers))
+        return waiting[~np.isin(waiting, taken)]
+
+    def _replay(self, family: Family, members: np.ndarray) -> Replay:
+        return Replay(family.traced.graph, self._swept, members)
+
+
+def _numbers_of(family: Family, members: np.ndarray, replay: Replay) -> Numbers:
+    traced = family.traced
+    number = traced.prepared.precision.number
+    initial = np.empty((len(traced.system.initial), len(members)))
+    for row, value in enumerate(traced.system.initial):
+        initial[row] = replay.doubles(value.node) if isinstance(value, Traced) else number(value)
+    parameters = np.empty((len(traced.parameters.nodes), len(members)))
+    for row, node in enumerate(traced.parameters.nodes):
+        parameters[row] = replay.doubles(node)
+    return Numbers(members, initial, parameters, replay)

@@ -1,0 +1,336 @@
+"""What a graph of traced numbers comes to for many members at once.
+
+Everything is worked out in two doubles with a bound of its error (``double_double``). Where that leaves open
+how a number is rounded or which way a decision falls, the same operations are done for that member in the
+scene's own arithmetic, so that the result is that of the member's own build, always.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.traced import Graph, Guard
+from rigidsim.solve.batch import double_double as dd
+from rigidsim.solve.batch.double_double import Doubled
+from rigidsim.solve.precision import precision_of
+
+_SHORT = 100  # bits of a whole number that two doubles hold
+_FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
+"""Of mpmath, where a number is outside the range of an operation: what the member's own build says of it is
+its own matter.
+"""
+_BINARY: dict[str, Callable[[Doubled, Doubled], Doubled]] = {
+    "add": dd.add,
+    "subtract": dd.subtract,
+    "multiply": dd.multiply,
+    "divide": dd.divide,
+}
+
+
+class Swept:
+    """One swept number of all members: the different values, and which of them each member has."""
+
+    def __init__(self, values: Sequence[ExactNumber]) -> None:
+        places: dict[int, int] = {}
+        index = [places.setdefault(id(value), len(places)) for value in values]
+        self.index = np.array(index, dtype=np.int64)
+        first: dict[int, ExactNumber] = {id(value): value for value in values}
+        self.different = [first[key] for key in places]
+
+    @cached_property
+    def doubled(self) -> Doubled:
+        """The different values."""
+        return _of_exact(self.different)
+
+    def of(self, member: int) -> ExactNumber:
+        """The number of one."""
+        return self.different[self.index[member]]
+
+
+class Replay:
+    """A graph's numbers for members.
+
+    Args:
+        swept: for each column of the graph the numbers of all members of the sweep.
+        members: which of them.
+    """
+
+    def __init__(self, graph: Graph, swept: Sequence[Swept], members: np.ndarray) -> None:
+        self._graph, self._swept, self._count = graph, swept, len(members)
+        self._members = members
+        count = self._count
+        self._numbers: dict[int, Doubled] = {}
+        self._wholes: dict[int, np.ndarray] = {}
+        self._exact: list[dict[int, Any]] = [{} for _ in range(count)]
+        self._double = precision_of("double")
+
+    def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
+        """Which members decide everything as the representative does, shape (members,)."""
+        found = np.ones(self._count, dtype=bool)
+        for guard in guards:
+            found &= self._decided(guard) == guard.outcome
+            if not found.any():
+                break
+        return found
+
+    def doubles(self, node: int) -> np.ndarray:
+        """A number rounded once, shape (members,); not a number where it is outside a double's range."""
+        with np.errstate(all="ignore"):
+            high, certain = dd.nearest_double(self._number(node))
+        values = np.array(np.broadcast_to(high, self._count))
+        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)):
+            try:
+                values[member] = self._double.number(self._exactly(node, member))
+            except _FAILURES:
+                values[member] = np.nan
+        return values
+
+    def whole_numbers(self, node: int) -> np.ndarray:
+        """Whole numbers, shape (members,)."""
+        return np.array(np.broadcast_to(self._whole(node), self._count))
+
+    # --- decisions ------------------------------------------------------------------------------------------
+
+    def _decided(self, guard: Guard) -> np.ndarray:
+        if guard.whole:
+            left, right = self._whole(guard.left), self._whole(guard.right)
+            return np.broadcast_to(left < right if guard.kind == "<" else left == right, self._count)
+        with np.errstate(all="ignore"):
+            sign, certain = dd.sign_of(dd.subtract(self._number(guard.left), self._number(guard.right)))
+        wanted = -1 if guard.kind == "<" else 0
+        found = np.array(np.broadcast_to(sign == wanted, self._count))
+        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)):
+            try:
+                left, right = (self._exactly(n, member) for n in (guard.left, guard.right))
+                found[member] = left < right if guard.kind == "<" else left == right
+            except _FAILURES:
+                found[member] = not guard.outcome
+        return found
+
+    # --- numbers --------------------------------------------------------------------------------------------
+
+    def _number(self, node: int) -> Doubled:
+        if node not in self._numbers:
+            operation, arguments = self._graph.nodes[node]
+            self._numbers[node] = self._worked_out(node, operation, arguments)
+        return self._numbers[node]
+
+    def _worked_out(self, node: int, operation: str, arguments: tuple[Any, ...]) -> Doubled:
+        if operation == "constant":
+            return _doubled(arguments[0])
+        if operation == "column":
+            column = self._swept[arguments[0]]
+            index, found = column.index[self._members], column.doubled
+            return Doubled(found.high[index], found.low[index], found.error[index])
+        if operation == "power_of_two":
+            return Doubled(np.ldexp(1.0, self._whole(arguments[0])), 0.0, 0.0)
+        if operation == "power":
+            return self._power(self._number(arguments[0]), arguments[1])
+        if operation == "multiply":
+            for a, b in (arguments, arguments[::-1]):
+                if _is_power_of_two(self._graph, b):
+                    return dd.scale(self._number(a), self._number(b).high)
+        if operation in _BINARY:
+            return _BINARY[operation](self._number(arguments[0]), self._number(arguments[1]))
+        if operation == "negative":
+            return dd.negative(self._number(arguments[0]))
+        if operation == "absolute":
+            return dd.absolute(self._number(arguments[0]))
+        if operation in ("maximum", "minimum"):
+            pair = (self._number(a) for a in arguments)
+            return dd.extreme(*pair, largest=operation == "maximum")
+        if operation == "sqrt":
+            return dd.root(self._number(arguments[0]))
+        return self._one_by_one(node)
+
+    def _power(self, base: Doubled, exponent: int) -> Doubled:
+        found: Doubled | None = None
+        while exponent:
+            if exponent & 1:
+                found = base if found is None else dd.multiply(found, base)
+            exponent >>= 1
+            if exponent:
+                base = dd.multiply(base, base)
+        return Doubled(1.0, 0.0, 0.0) if found is None else found
+
+    def _one_by_one(self, node: int) -> Doubled:
+        """What arrays don't have, such as a sine: once for each combination of the columns that it reads."""
+        columns = sorted(_columns(self._graph, node))
+        codes = np.zeros(self._count, dtype=np.int64)
+        for column in columns:
+            swept = self._swept[column]
+            codes = codes * len(swept.different) + swept.index[self._members]
+            _, codes = np.unique(codes, return_inverse=True)
+        _, first = np.unique(codes, return_index=True)
+        parts = []
+        for member in first:
+            try:
+                parts.append(_parts(self._exactly(node, int(member))))
+            except _FAILURES:
+                parts.append((np.nan, np.nan, np.inf))
+        high, low, error = (np.array(x)[codes] for x in zip(*parts, strict=True))
+        return Doubled(high, low, error)
+
+    def _whole(self, node: int) -> np.ndarray:
+        if node not in self._wholes:
+            operation, arguments = self._graph.wholes[node]
+            self._wholes[node] = self._whole_worked_out(operation, arguments)
+        return self._wholes[node]
+
+    def _whole_worked_out(self, operation: str, arguments: tuple[int, ...]) -> np.ndarray:
+        if operation == "constant":
+            return np.asarray(arguments[0])
+        if operation in ("exponent", "magnitude"):
+            return self._exponents(arguments[0], above=operation == "magnitude")
+        first = self._whole(arguments[0])
+        if operation == "negative":
+            return -first
+        if operation == "absolute":
+            return np.abs(first)
+        return first + self._whole(arguments[1]) if operation == "add" else first * self._whole(arguments[1])
+
+    def _exponents(self, node: int, *, above: bool) -> np.ndarray:
+        """The smallest e with abs(x) <= 2**e, or ``above``: < 2**e."""
+        with np.errstate(all="ignore"):
+            number = dd.absolute(self._number(node))
+            mantissa, exponent = np.frexp(number.high)
+        boundary = mantissa == 0.5  # where the second part tells
+        sure = np.isfinite(number.high) & np.isfinite(number.error) & (number.high > 0)
+        small = (number.error == 0) | (np.abs(number.low) > 2 * number.error)
+        certain = sure & (~boundary | small) & (number.error < number.high * 2.0**-60)
+        below = (number.low < 0) if above else (number.low <= 0)
+        exponent = np.array(np.broadcast_to(exponent - (boundary & below), self._count), dtype=np.int64)
+        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)):
+            try:
+                mantissa, power = self._graph.context.frexp(abs(self._exactly(node, member)))
+                exponent[member] = int(power) - (mantissa == 0.5 and not above)
+            except _FAILURES:
+                exponent[member] = -(2**40)  # agrees with nobody's
+        return exponent
+
+    # --- one member -----------------------------------------------------------------------------------------
+
+    def _exactly(self, node: int, member: int) -> Any:
+        """A member's number as its own build has it (mpf)."""
+        known = self._exact[member]
+        if node not in known:
+            operation, arguments = self._graph.nodes[node]
+            known[node] = self._exact_result(operation, arguments, member)
+        return known[node]
+
+    def _exact_result(self, operation: str, arguments: tuple[Any, ...], member: int) -> Any:
+        context = self._graph.context
+        if operation == "constant":
+            return arguments[0]
+        if operation == "column":
+            return self._swept[arguments[0]].of(int(self._members[member])).at(context)
+        if operation == "power_of_two":
+            return context.ldexp(1, int(np.broadcast_to(self._whole(arguments[0]), self._count)[member]))
+        if operation == "power":
+            return self._exactly(arguments[0], member) ** arguments[1]
+        if operation == "call":
+            return arguments[0](context, *(self._exactly(a, member) for a in arguments[1:]))
+        values = [self._exactly(a, member) for a in arguments]
+        if operation in _EXACT:
+            return _EXACT[operation](*values)
+        found = getattr(context, operation)(*values)
+        if not isinstance(found, context.mpf):
+            raise ValueError(f"{operation} of a number outside its range")
+        return found
+
+
+_EXACT: dict[str, Callable[..., Any]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+    "negative": lambda a: -a,
+    "absolute": abs,
+    "maximum": max,
+    "minimum": min,
+}
+
+
+def _parts(value: Any) -> tuple[float, float, float]:
+    """An mpf in two doubles, and what is left."""
+    high = float(value)
+    rest = value - high
+    low = float(rest)
+    left = abs(float(rest - low))
+    return high, low, left * 1.0001 + (5e-324 if rest != low else 0.0)
+
+
+def _doubled(value: Any) -> Doubled:
+    return Doubled(*_parts(value))
+
+
+def _of_exact(values: Sequence[ExactNumber]) -> Doubled:
+    """Exact numbers in two doubles: quotients of whole numbers, all at once where these are short enough."""
+    rationals = [value.rational for value in values]
+    parts = [(r.numerator, r.denominator) for r in rationals]
+    short = [
+        max(abs(n), d).bit_length() <= _SHORT and not v.pi_power
+        for (n, d), v in zip(parts, values, strict=True)
+    ]
+    numerator, denominator = (
+        _whole([part[k] if s else 1 for part, s in zip(parts, short, strict=True)]) for k in (0, 1)
+    )
+    quotient = dd.divide(numerator, denominator)
+    whole = np.array([d == 1 for _, d in parts]) & (numerator.low == 0)
+    high = np.where(whole, numerator.high, quotient.high)
+    low = np.where(whole, 0.0, quotient.low)
+    error = np.where(whole, 0.0, quotient.error)
+    exact = (denominator.low == 0) & (np.frexp(denominator.high)[0] == 0.5) & (numerator.low == 0)
+    error[exact], low[exact] = 0.0, 0.0
+    context = context_for(34)
+    for i in np.flatnonzero(~np.array(short, dtype=bool)):
+        high[i], low[i], error[i] = _parts(values[i].at(context))
+        error[i] += abs(high[i]) * 2.0**-200
+    return Doubled(high, low, error)
+
+
+def _whole(numbers: Sequence[int]) -> Doubled:
+    high = np.array([float(n) for n in numbers])
+    return Doubled(
+        high, np.array([float(n - int(h)) for n, h in zip(numbers, high.tolist(), strict=True)]), 0.0
+    )
+
+
+def _is_power_of_two(graph: Graph, node: int) -> bool:
+    operation, arguments = graph.nodes[node]
+    if operation == "constant":
+        mantissa, _ = graph.context.frexp(abs(arguments[0]))
+        return bool(mantissa == 0.5 and arguments[0] > 0)
+    return operation == "power_of_two"
+
+
+def _columns(graph: Graph, node: int) -> set[int]:
+    """The columns that a node depends on."""
+    found: set[int] = set()
+    waiting, seen = [("n", node)], set()
+    while waiting:
+        item = waiting.pop()
+        if item in seen:
+            continue
+        seen.add(item)
+        kind, index = item
+        operation, arguments = (graph.nodes if kind == "n" else graph.wholes)[index]
+        if operation == "column":
+            found.add(arguments[0])
+        elif operation == "power_of_two":
+            waiting.append(("w", arguments[0]))
+        elif kind == "w" and operation in ("exponent", "magnitude"):
+            waiting.append(("n", arguments[0]))
+        elif operation == "power":
+            waiting.append(("n", arguments[0]))
+        elif operation == "call":
+            waiting += [("n", a) for a in arguments[1:]]
+        elif operation != "constant":
+            waiting += [(kind, a) for a in arguments]
+    return found

@@ -1,0 +1,362 @@
+"""Members of a family from their start to their last sample, with everything that is recorded of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rigidsim.model.outputs import Recorded
+from rigidsim.solve.batch.events import EventExpressions
+from rigidsim.solve.batch.family import Family, Numbers
+from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem, Lanes, recommended_width
+from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.status import Status
+
+_VALUES_AT_ONCE = 4_000_000
+"""Of samples, evaluated together."""
+_GROUP = 64  # a multiple of every SIMD width: padded to it, a column's bits don't depend on its place
+_MOST_STEPS = 10_000
+_STEPS_PER_UNIT = 200.0
+"""A natural step is of the order of one internal unit of time. A lane that takes so many more is given up here,
+before it holds the others any longer, and run by itself."""
+
+DRIFT_FACTOR = 50.0
+"""As of ``rigidsim.accuracy.error_law``."""
+
+Values = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class BatchEvents:
+    """Crossings of one event in a block, in the order of members and time.
+
+    Attributes:
+        member: (n,), places in the block.
+        time: (n,) seconds.
+        values: of the recorded variables, (n, components), SI.
+    """
+
+    name: str
+    member: np.ndarray
+    time: np.ndarray
+    values: Values
+
+
+@dataclass(frozen=True)
+class BatchBlock:
+    """Some members of a family, run.
+
+    Attributes:
+        members: which of the sweep's they are, (m,).
+        times: seconds, (samples,).
+        values: of the recorded variables, (samples, m, components), SI; not numbers from where a member ended.
+        drifts: by the names of the invariants, (samples, m).
+        status: how each member ended; None where a lane gave up and the member is to be run by itself.
+        reached: samples that each got to, (m,).
+        steps: (m,).
+        drift_bound: relative drift that rounding alone explains, (m,).
+        radians_between: by how much each body turns between neighbouring samples at most, (m,).
+        events: one for each event.
+        width: lanes of the integrator, on which the last bits depend.
+    """
+
+    members: np.ndarray
+    times: np.ndarray
+    values: Values
+    drifts: Values
+    status: list[Status | None]
+    reached: np.ndarray
+    steps: np.ndarray
+    drift_bound: np.ndarray
+    radians_between: np.ndarray
+    events: list[BatchEvents]
+    width: int
+
+
+class BatchRun:
+    """What a family's members are run with, compiled once.
+
+    Args:
+        width: lanes of the integrator; by default what the processor takes at once.
+    """
+
+    def __init__(self, family: Family, width: int | None = None) -> None:
+        self.family = family
+        self.width = width or recommended_width()
+        self._traced = family.traced
+        self._system = family.traced.system
+        self._precision = precision_of("double")
+        self._clocks: dict[int, SampleClock] = {}
+        self._crossings = EventExpressions(family.traced)
+
+    @cached_property
+    def _engine(self) -> BatchEngine:
+        traced = self._traced
+        rights = traced.as_parameters([right for _, right in self._system.equations])
+        tolerance = traced.prepared.tolerance
+        described = BatchSystem(
+            list(zip(self._system.variables, rights, strict=True)),
+            self._crossings.over_parameters(),
+            len(traced.in_equations) + self._crossings.parameters,
+            None if tolerance is None else float(tolerance),
+            self._system.wide,
+        )
+        return BatchEngine(described, self.width)
+
+    def _compiled(self, expressions: list[Any]) -> CompiledFunction:
+        variables = [*self._system.variables, *self._traced.parameters.variables]
+        return compiled_function(expressions, variables, compact_mode=self._system.wide, fp_type=float)
+
+    @cached_property
+    def _outputs(self) -> CompiledFunction:
+        return self._compiled(self._system.outputs)
+
+    @cached_property
+    def _components(self) -> list[Any]:
+        return [x for invariant in self._system.invariants for x in invariant.expressions]
+
+    def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:
+        """Run members, as many at a time as memory takes.
+
+        Args:
+            numbers: of members of this family.
+        """
+        samples = self._traced.prepared.clock.count
+        each = samples * (len(self._system.states) + len(self._system.outputs))
+        most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
+        for first in range(0, len(numbers.members), most):
+            yield self._block(numbers, slice(first, first + most))
+
+    # --- one block ------------------------------------------------------------------------------------------
+
+    def _block(self, numbers: Numbers, part: slice) -> BatchBlock:
+        members, initial = numbers.members[part], numbers.initial[:, part]
+        swept = numbers.parameters[:, part]
+        units = numbers.whole_numbers(self._system.scaling.time)[part]
+        start, times = self._times(units)
+        parameters = np.concatenate(
+            [swept[self._traced.in_equations], self._crossings.values(initial, swept, start, times[-1])]
+        )
+        most = self._most_steps(start, times)
+        # those that take about as many steps side by side: none waits for long
+        order = np.argsort(numbers.doubles(self._system.rate_bound)[part], kind="stable")
+        lanes = self._engine.run(
+            initial[:, order], parameters[:, order], start[order], times[:, order], most
+        ).placed(order)
+        states, steps = lanes.states, lanes.steps
+        begun = self._evaluated(self._components, initial[None], swept, start[None])[:, 0]
+        values_of = self._evaluated(self._system.outputs, states, swept, times, begun)
+        values, drifts = self._named(values_of, numbers, part)
+        self._join(values, numbers, part)
+        finite = np.isfinite(states).all(axis=1)
+        reached = np.where(finite.all(axis=0), len(times), np.argmin(finite, axis=0))
+        block = BatchBlock(
+            members,
+            self._traced.prepared.clock.labels(0, len(times)),
+            values,
+            drifts,
+            self._status(lanes, most),
+            reached,
+            steps,
+            self._drift_bound(steps),
+            self._turned(numbers, part),
+            self._events(lanes, swept, numbers, part, units, begun),
+            self.width,
+        )
+        self._ended_by_events(block)
+        self._ended_by_drift(block)
+        return block
+
+    def _times(self, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Start (m,) and samples (samples, m) in each member's internal unit of time."""
+        start, columns = np.empty(len(units)), np.empty((self._traced.prepared.clock.count, len(units)))
+        for unit in np.unique(units).tolist():
+            if unit not in self._clocks:
+                self._clocks[unit] = SampleClock(self._system.scene.samples, self._precision, unit)
+            clock, same = self._clocks[unit], units == unit
+            start[same] = clock.start
+            columns[:, same] = clock.internal(0, clock.count)[:, None]
+        return start, columns
+
+    def _most_steps(self, start: np.ndarray, times: np.ndarray) -> int:
+        asked = self._traced.prepared.scene.config.limits.max_steps
+        longest = float((times[-1] - start).max())
+        given_up = _MOST_STEPS + int(min(_STEPS_PER_UNIT * longest, 1e12))
+        return given_up if asked is None else min(int(asked), given_up)
+
+    def _status(self, lanes: Lanes, most: int) -> list[Status | None]:
+        asked = self._traced.prepared.scene.config.limits.max_steps
+        short = Status.MAX_STEPS if asked is not None and most == int(asked) else None
+        return [
+            Status.FINISHED if there else (short if finite else Status.NON_FINITE)
+            for there, finite in zip(lanes.arrived.tolist(), lanes.finite.tolist(), strict=True)
+        ]
+
+    def _drift_bound(self, steps: np.ndarray) -> np.ndarray:
+        return DRIFT_FACTOR * self._traced.prepared.law_tolerance * np.sqrt(np.maximum(steps, 1))
+
+    def _turned(self, numbers: Numbers, part: slice) -> np.ndarray:
+        samples = self._traced.prepared.scene.samples
+        spacing = samples.step
+        if samples.times is not None:
+            pairs = zip(samples.times, samples.times[1:], strict=False)
+            spacing = max((b - a for a, b in pairs), default=Fraction(0))
+        return numbers.doubles(self._system.rate_bound)[part] * float(spacing)
+
+    # --- evaluation -----------------------------------------------------------------------------------------
+
+    def _evaluated(
+        self,
+        expressions: list[Any],
+        states: np.ndarray,
+        swept: np.ndarray,
+        times: np.ndarray,
+        begun: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Values (expressions, samples, m).
+
+        Args:
+            states: (samples, states, m); times: (samples, m), internal units.
+            begun: initial values of the invariants' components, (components, m).
+        """
+        samples, _, m = states.shape
+        if not expressions:
+            return np.empty((0, samples, m))
+        function: Any = self._compiled(expressions)
+        columns = samples * m
+        padded = -(-columns // _GROUP) * _GROUP
+
+        def spread(table: np.ndarray) -> np.ndarray:
+            """From (k, m) to (k, padded), the same for all samples."""
+            return _padded(np.broadcast_to(table[:, None], (len(table), samples, m)), padded)
+
+        inputs = np.concatenate([_padded(states.transpose(1, 0, 2), padded), spread(swept)])
+        arguments = {}
+        if function.is_time_dependent:
+            arguments["time"] = _padded(times[None], padded)[0]
+        if function.nparams and begun is not None:
+            arguments["pars"] = spread(begun)
+        found = np.asarray(function(np.ascontiguousarray(inputs), **arguments))
+        return found[:, :columns].reshape(len(expressions), samples, m)
+
+    def _named(self, found: np.ndarray, numbers: Numbers, part: slice) -> tuple[Values, Values]:
+        values: Values = {}
+        for variable in self._system.recorded:
+            columns = [
+                _to_si(found[variable.first + k], numbers, variable.exponents[k], part)
+                for k in range(variable.count)
+            ]
+            values[variable.name] = np.stack(columns, axis=2)
+        first = len(self._system.outputs) - len(self._system.invariants)
+        drifts = {
+            f"{invariant.name}_drift": found[first + n] for n, invariant in enumerate(self._system.invariants)
+        }
+        return values, drifts
+
+    def _join(self, values: Values, numbers: Numbers, part: slice) -> None:
+        """Give each quaternion the sign nearest to the one before, as in a single run."""
+        for variable in self._system.recorded:
+            if variable.continuity != "nearest":
+                continue
+            block = values[variable.name]
+            begin = [numbers.doubles(x)[part] for x in self._traced.system.scene.quaternion]
+            before = np.concatenate([np.stack(begin, axis=1)[None], block[:-1]])
+            products = np.einsum("smc,smc->sm", block, before)
+            signs = np.cumprod(np.where(products < 0, -1.0, 1.0), axis=0)
+            block *= signs[:, :, None]
+
+    # --- events and guards ----------------------------------------------------------------------------------
+
+    def _events(
+        self,
+        lanes: Lanes,
+        swept: np.ndarray,
+        numbers: Numbers,
+        part: slice,
+        units: np.ndarray,
+        begun: np.ndarray,
+    ) -> list[BatchEvents]:
+        events = []
+        for index, crossing in enumerate(self._system.crossings):
+            rows = [(m, f) for m, found in lanes.found.items() for f in found if f.event == index]
+            rows.sort(key=lambda row: (row[0], row[1].time))
+            place = np.array([m for m, _ in rows], dtype=np.int64)
+            times = np.array([f.time for _, f in rows])
+            values: Values = {}
+            if rows:
+                states = np.array([f.state for _, f in rows]).T[None]
+                at = self._evaluated(
+                    self._system.outputs, states, swept[:, place], times[None], begun[:, place]
+                )
+                chosen = part.start + place
+                values = {
+                    variable.name: _at_events(variable, at, numbers, chosen)
+                    for variable in self._system.recorded
+                }
+            seconds = np.ldexp(times, units[place]) if rows else times
+            events.append(BatchEvents(crossing.name, place, seconds, values))
+        return events
+
+    def _ended_by_events(self, block: BatchBlock) -> None:
+        """A crossing that ends the motion: later samples and crossings are no part of it."""
+        stops = [e for e, c in zip(block.events, self._system.crossings, strict=True) if c.stop]
+        first = np.full(len(block.members), math.inf)
+        for event in stops:
+            np.minimum.at(first, event.member, event.time)
+        for m in np.flatnonzero(np.isfinite(first)).tolist():
+            samples = int(np.searchsorted(block.times, first[m], side="right"))
+            if samples <= block.reached[m]:
+                block.status[m] = Status.EVENT
+                _end(block, m, samples)
+        for n, event in enumerate(block.events):
+            kept = event.time <= first[event.member]
+            if not kept.all():
+                values = {name: v[kept] for name, v in event.values.items()}
+                block.events[n] = BatchEvents(event.name, event.member[kept], event.time[kept], values)
+
+    def _ended_by_drift(self, block: BatchBlock) -> None:
+        """The guard max_drift: the first sample beyond it is the last."""
+        limit = self._traced.prepared.scene.config.limits.max_drift
+        if limit is None or not block.drifts:
+            return
+        beyond = np.any([np.abs(d) > float(limit) for d in block.drifts.values()], axis=0)
+        for m in np.flatnonzero(beyond.any(axis=0)).tolist():
+            block.status[m] = Status.MAX_DRIFT
+            _end(block, m, int(np.argmax(beyond[:, m])) + 1)
+
+
+def _end(block: BatchBlock, member: int, samples: int) -> None:
+    block.reached[member] = samples
+    for values in (*block.values.values(), *block.drifts.values()):
+        values[samples:, member] = np.nan
+
+
+def _padded(table: np.ndarray, columns: int) -> np.ndarray:
+    """From (k, samples, m) to (k, columns), the last column repeated."""
+    flat = table.reshape(len(table), -1)
+    if not len(flat) or flat.shape[1] == columns:
+        return flat if len(flat) else np.empty((0, columns))
+    return np.concatenate([flat, np.repeat(flat[:, -1:], columns - flat.shape[1], axis=1)], axis=1)
+
+
+def _to_si(values: np.ndarray, numbers: Numbers, exponent: Any, part: slice) -> np.ndarray:
+    if isinstance(exponent, int):
+        return np.ldexp(values, exponent) if exponent else values
+    return np.ldexp(values, numbers.whole_numbers(exponent)[part])
+
+
+def _at_events(variable: Recorded, at: np.ndarray, numbers: Numbers, chosen: np.ndarray) -> np.ndarray:
+    columns = [
+        np.ldexp(at[variable.first + k, 0], numbers.whole_numbers(variable.exponents[k])[chosen])
+        for k in range(variable.count)
+    ]
+    return np.stack(columns, axis=1)

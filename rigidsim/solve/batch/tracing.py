@@ -1,0 +1,148 @@
+"""A system whose swept numbers are parameters: traced once, for all members that share its equations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.model_plan import plan_model
+from rigidsim.model.system import System
+from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.initial_values import check_start
+from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.traced import Graph, Traced, TracedWhole, TracingContext, Untraceable
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.problem import InitialValueProblem, prepare
+
+TRACED_TABLES = ("body", "initial", "loads", "parameters")
+"""Of the config, whose numbers may become parameters."""
+_STEP = re.compile(r"\.?([A-Za-z_][\w-]*)|\[(\d+)\]")
+_PARAMETER = "swept_"
+
+
+@dataclass
+class Parameters:
+    """The coefficients that depend on swept numbers, each a variable of the expressions that it stands in.
+
+    Attributes:
+        nodes: of the graph.
+    """
+
+    nodes: list[int] = field(default_factory=list)
+    _names: dict[int, Any] = field(default_factory=dict)
+
+    def number(self, value: Any) -> Any:
+        """A coefficient: a double, rounded once, or a parameter."""
+        if isinstance(value, TracedWhole):
+            raise Untraceable("a whole number as a coefficient")
+        if not isinstance(value, Traced):
+            return _DOUBLE.number(value)
+        if value.node not in self._names:
+            self._names[value.node] = hy.make_vars(f"{_PARAMETER}{len(self.nodes)}")
+            self.nodes.append(value.node)
+        return self._names[value.node]
+
+    @property
+    def variables(self) -> list[Any]:
+        """One for each node."""
+        return list(self._names.values())
+
+
+@dataclass(frozen=True)
+class TracedSystem:
+    """What all members of a family share.
+
+    Attributes:
+        prepared: the representative's own problem, in plain numbers.
+        system: the same, whose coefficients are expressions of ``parameters``.
+        graph: how numbers follow from the swept ones; its guards say who belongs here.
+    """
+
+    prepared: InitialValueProblem
+    system: System
+    parameters: Parameters
+    graph: Graph
+
+    @cached_property
+    def in_equations(self) -> list[int]:
+        """Which of the parameters the equations, and events, read."""
+        expressions = [right for _, right in self.system.equations]
+        expressions += [crossing.expression for crossing in self.system.crossings]
+        read = {name for x in expressions for name in hy.get_variables(hy.expression(x))}
+        return [k for k, v in enumerate(self.parameters.variables) if str(v) in read]
+
+    def as_parameters(self, expressions: Sequence[Any]) -> list[Any]:
+        """Expressions of ``hy.par``, numbered as ``in_equations``."""
+        variables = self.parameters.variables
+        table = {variables[k]: hy.par[n] for n, k in enumerate(self.in_equations)}
+        found = [hy.expression(x) for x in expressions]
+        return hy.subs(found, table) if table else found
+
+
+_DOUBLE = precision_of("double")
+
+
+def trace(representative: Experiment, keys: Sequence[str], numbers: Sequence[ExactNumber]) -> TracedSystem:
+    """Work out the system of a member, with its swept numbers as parameters.
+
+    Args:
+        representative: the member.
+        keys: of its numbers that differ between members, such as ``initial.angular_velocity[2]``.
+        numbers: what it has there.
+
+    Raises:
+        ConfigError: it is refused: as a run of it alone would be.
+        Untraceable: something in it can't be traced.
+    """
+    prepared = prepare(representative)
+    graph = Graph(context_for(representative.config.integrator.precision))
+    config = representative.config
+    for column, (key, number) in enumerate(zip(keys, numbers, strict=True)):
+        config = _replaced(config, steps_of(key), graph.column(column, number))
+    context = TracingContext(graph)
+    try:
+        scene: Scene = build_scene(replace(representative, config=config), context)
+        check_start(scene)
+        parameters = Parameters()
+        system = System(plan_model(scene, like=prepared.system.plan), parameters.number)
+        for part in ("equations", "outputs", "invariants", "crossings", "rate_bound", "initial"):
+            getattr(system, part)
+    except (TypeError, AttributeError, ValueError) as error:
+        raise Untraceable(str(error)) from error
+    return TracedSystem(prepared, system, parameters, graph)
+
+
+def steps_of(key: str) -> list[str | int]:
+    """The names and indices of a dotted key."""
+    found: list[str | int] = []
+    place = 0
+    while place < len(key):
+        match = _STEP.match(key, place)
+        if match is None:
+            raise Untraceable(f"the key {key}")
+        found.append(match[1] if match[1] is not None else int(match[2]))
+        place = match.end()
+    return found
+
+
+def _replaced(value: Any, steps: Sequence[str | int], number: ExactNumber) -> Any:
+    """A copy of a table with another number in one place."""
+    if not steps:
+        if not isinstance(value, ExactNumber):
+            raise Untraceable("what is swept is no number")
+        return number
+    first, *rest = steps
+    if isinstance(value, dict) and first in value:
+        return {**value, first: _replaced(value[first], rest, number)}
+    if isinstance(value, list) and isinstance(first, int) and first < len(value):
+        return [*value[:first], _replaced(value[first], rest, number), *value[first + 1 :]]
+    if hasattr(value, "model_copy") and isinstance(first, str) and hasattr(value, first):
+        return value.model_copy(update={first: _replaced(getattr(value, first), rest, number)})
+    raise Untraceable(f"no {first} in what is swept")
