@@ -202,7 +202,7 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         length, speed = exponent(context, farthest), exponent(context, swiftest)
     return Scaling(
         time=time,
-        inertia=exponent(context, largest_of(body.principal_moments)),
+        inertia=exponent(context, max(body.principal_moments)),
         rates=(rates[0], rates[1], rates[2]),
         length=length,
         speed=speed,

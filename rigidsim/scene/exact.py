@@ -71,6 +71,11 @@ class ExactNumber:
         return float(self.at(context))
 
     @property
+    def alone(self) -> ExactNumber:
+        """The number without what is known of its unit."""
+        return ExactNumber(self.rational, self.pi_power)
+
+    @property
     def sign(self) -> int:
         """-1, 0 or 1."""
         return (self.rational > 0) - (self.rational < 0)

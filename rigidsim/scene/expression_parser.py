@@ -277,7 +277,7 @@ class _Parser:
             return _Part(Name(name, span), dimensions.of_name(name))
         if name in self.constants:
             number = self.constants[name]
-            value = ExactNumber(number.rational, number.pi_power)
+            value = number.alone
             return _Part(Constant(value, span), dimensions.of_number(number))
         if name == "e":
             return _Part(Operation("exp", (Constant(ONE, span),), span))
@@ -302,7 +302,7 @@ class _Parser:
             self.fail(str(error), start)
         self.token, self.kind = unit, "unit"
         self.advance()
-        value = ExactNumber(number.rational, number.pi_power)
+        value = number.alone
         return _Part(Constant(value, (start, self.end)), dimensions.of_unit(unit), bare=True)
 
     def call(self, name: str, start: int) -> _Part:

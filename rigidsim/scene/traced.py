@@ -125,6 +125,9 @@ class Traced:
         if not isinstance(other, Traced) and other == 0:
             return self
         there = self._other(other)
+        for this, that in ((self.node, there), (there, self.node)):
+            if self.graph.nodes[this] == ("negative", (that,)):
+                return self.graph.context.zero
         return self._made("add", (self.node, there), self.value + self.graph.values[there])
 
     __radd__ = __add__
@@ -166,6 +169,11 @@ class Traced:
         if not isinstance(other, Traced) and other == 1:
             return self
         there = self._other(other)
+        for this, that, ratio in ((self.node, there, 1), (there, self.node, 1)):
+            if this == that and self != 0:
+                return self.graph.context.mpf(ratio)
+            if self.graph.nodes[this] == ("negative", (that,)) and self != 0:
+                return self.graph.context.mpf(-ratio)
         return self._made("divide", (self.node, there), self.value / self.graph.values[there])
 
     def __rtruediv__(self, other: Any) -> Any:
@@ -261,6 +269,9 @@ class TracedWhole:
         if not isinstance(other, TracedWhole) and other == 0:
             return self
         there = self._other(other)
+        for this, that in ((self.node, there), (there, self.node)):
+            if self.graph.nodes[this] == ("negative", (that,)):
+                return self.graph.context.zero
         return self._made("add", (self.node, there), self.value + self.graph.whole_values[there])
 
     __radd__ = __add__
@@ -341,13 +352,13 @@ class TracedExact(ExactNumber):
         return self._traced() if isinstance(context, TracingContext) else self.exact.at(context)
 
     @property
-    def rational(self) -> Fraction:  # type: ignore[override]
+    def rational(self) -> Fraction:
         """The representative's, and that of members that have the same."""
         self._traced()._decided()
         return self.exact.rational
 
     @property
-    def pi_power(self) -> int:  # type: ignore[override]
+    def pi_power(self) -> int:
         """The same for all members."""
         return self.exact.pi_power
 
@@ -358,6 +369,11 @@ class TracedExact(ExactNumber):
 
     def __float__(self) -> float:
         return float(self.exact)
+
+    @property
+    def alone(self) -> ExactNumber:
+        """Itself."""
+        return self
 
     def _traced(self) -> Traced:
         return Traced(self.graph, self.node)
@@ -418,6 +434,8 @@ class TracingContext:
         found = getattr(self._plain, name)
         if not callable(found) or name in ("zero", "one", "pi", "inf", "nan", "eps"):
             return found
+        if name == "sqrt":
+            return lambda value: _sqrt(value) if isinstance(value, Traced) else found(value)
         if name in FUNCTIONS:
             return lambda *values: self._function(name, found, values)
 
@@ -466,6 +484,13 @@ class TracingContext:
 
 
 def _sqrt(x: Traced) -> Traced:
+    operation, arguments = x.graph.nodes[x.node]
+    square = (
+        arguments[1] == 2 if operation == "power" else operation == "multiply" and len(set(arguments)) == 1
+    )
+    if square:  # whose root is exact
+        base = Traced(x.graph, arguments[0])
+        return base if base >= 0 else -base
     return Traced(x.graph, x.graph.node("sqrt", (x.node,), x.graph.context.sqrt(x.value)))
 
 

@@ -1,8 +1,8 @@
 """Arithmetic on arrays of numbers in two parts (some 31 digits), each with a bound of its error.
 
 Two parts and their error-free sums and products: Dekker 1971, Numer. Math. 18, 224; Hida, Li & Bailey 2001,
-Proc. 15th IEEE Symp. Computer Arithmetic, 155. Their operations are wrong by a few 2^-104 of the result; bounds
-here take 2^-100, and are zero where nothing was rounded.
+Proc. 15th IEEE Symp. Computer Arithmetic, 155. Their operations are wrong by a few 2^-104 of the result;
+bounds here take 2^-100, and are zero where nothing was rounded.
 """
 
 from __future__ import annotations

@@ -11,11 +11,15 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import ConfigError
+from rigidsim.model.scaling import Drive
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.overrides import key_steps
+from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.traced import Guard, Traced, TracedWhole, Untraceable
 from rigidsim.solve.batch.replay import Replay, Swept
-from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, steps_of, trace
+from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
+from rigidsim.solve.problem import prepare
 
 MOST_FAMILIES = 64
 """Traced in all. Where members differ so much, the rest of them is run one by one."""
@@ -46,6 +50,7 @@ class Members:
     """The members of a sweep, as the batch engine sees them.
 
     Attributes:
+        base: the experiment that they are variations of.
         keys: dotted keys of the numbers that become parameters, such as ``initial.angular_velocity[2]``.
         numbers: for each key the members' exact numbers, SI; where the same object stands for several
             members, it is worked out once.
@@ -54,11 +59,36 @@ class Members:
             are of different families; None where nothing does.
     """
 
+    base: Experiment
     keys: Sequence[str]
     numbers: Sequence[Sequence[ExactNumber]]
     experiment: Callable[[int], Experiment]
     count: int
     kinds: Sequence[Any] | None = None
+
+    @classmethod
+    def of(cls, sweep: Sweep, members: Sequence[int] | None = None) -> Members:
+        """Members of a ``[sweep]``, all by default; they are counted from 0 here, in the order given."""
+        chosen = range(sweep.count) if members is None else members
+        rows = [sweep.indices(member) for member in chosen]
+        keys: list[str] = []
+        numbers: list[list[ExactNumber]] = []
+        kinds: list[list[str]] = []
+        for place, axis in enumerate(sweep.axes):
+            which = [row[place] for row in rows]
+            if not axis.numeric or key_steps(axis.key, "axes")[0] not in TRACED_TABLES:
+                texts = {index: axis.values.text(index) for index in set(which)}
+                kinds.append([texts[index] for index in which])
+                continue
+            values = {index: axis.exact(index) for index in set(which)}
+            keys += axis.columns
+            numbers += [[values[index][i] for index in which] for i in range(len(axis.columns))]
+
+        def experiment(member: int) -> Experiment:
+            return sweep.experiment_of(chosen[member])
+
+        found = list(zip(*kinds, strict=True)) if kinds else None
+        return cls(sweep.base, keys, numbers, experiment, len(rows), found)
 
 
 def reason_of_experiment(experiment: Experiment) -> Alone | None:
@@ -88,16 +118,20 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
     reason = reason_of_experiment(experiment)
     if reason is not None:
         return reason
-    return None if all(steps_of(key)[0] in TRACED_TABLES for key in keys) else Alone.KEY
+    return None if all(key_steps(key, "axes")[0] in TRACED_TABLES for key in keys) else Alone.KEY
 
 
 def _reason_of_system(traced: TracedSystem) -> Alone | None:
     system = traced.system
     if system.switches:
         return Alone.SWITCHING
-    if system.partner is not None or system.angle_states:
+    planar = system.requirements.formulation == "planar"
+    if system.partner is not None or (system.angle_states and not planar):
         return Alone.CHART
-    joined = {r.continuity for r in system.recorded} - {"", "nearest"}
+    # a planar run's angle has a unit so large that it is never wrapped here: what follows from it is joined
+    joined = {r.continuity for r in system.recorded} - (
+        {"", "wrapped", "parity"} if planar else {"", "nearest"}
+    )
     return Alone.ANGLES if joined else None
 
 
@@ -214,13 +248,26 @@ class Families:
                 self.known.append(made)
                 waiting = self._taken(made, waiting, result)
 
+    @cached_property
+    def _drive(self) -> Drive | None:
+        """As the base experiment's build estimates it.
+
+        Raises:
+            Untraceable: it can't be built.
+        """
+        try:
+            return prepare(self._members.base).system.scaling.drive
+        except ConfigError as error:
+            raise Untraceable(str(error)) from error
+
     def _traced(self, member: int) -> Family | ConfigError | Alone:
         experiment = self._members.experiment(member)
         reason = batchable(experiment, self._members.keys)
         if reason is not None:
             return reason
         try:
-            traced = trace(experiment, self._members.keys, [column.of(member) for column in self._swept])
+            numbers = [column.of(member) for column in self._swept]
+            traced = trace(experiment, self._members.keys, numbers, lambda: self._drive)
         except ConfigError as error:
             return error
         except Untraceable:

@@ -84,7 +84,7 @@ class Replay:
         with np.errstate(all="ignore"):
             high, certain = dd.nearest_double(self._number(node))
         values = np.array(np.broadcast_to(high, self._count))
-        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)):
+        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)).tolist():
             try:
                 values[member] = self._double.number(self._exactly(node, member))
             except _FAILURES:
@@ -105,7 +105,7 @@ class Replay:
             sign, certain = dd.sign_of(dd.subtract(self._number(guard.left), self._number(guard.right)))
         wanted = -1 if guard.kind == "<" else 0
         found = np.array(np.broadcast_to(sign == wanted, self._count))
-        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)):
+        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)).tolist():
             try:
                 left, right = (self._exactly(n, member) for n in (guard.left, guard.right))
                 found[member] = left < right if guard.kind == "<" else left == right
@@ -206,7 +206,7 @@ class Replay:
         certain = sure & (~boundary | small) & (number.error < number.high * 2.0**-60)
         below = (number.low < 0) if above else (number.low <= 0)
         exponent = np.array(np.broadcast_to(exponent - (boundary & below), self._count), dtype=np.int64)
-        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)):
+        for member in np.flatnonzero(~np.broadcast_to(certain, self._count)).tolist():
             try:
                 mantissa, power = self._graph.context.frexp(abs(self._exactly(node, member)))
                 exponent[member] = int(power) - (mantissa == 0.5 and not above)
@@ -283,13 +283,13 @@ def _of_exact(values: Sequence[ExactNumber]) -> Doubled:
     )
     quotient = dd.divide(numerator, denominator)
     whole = np.array([d == 1 for _, d in parts]) & (numerator.low == 0)
-    high = np.where(whole, numerator.high, quotient.high)
-    low = np.where(whole, 0.0, quotient.low)
-    error = np.where(whole, 0.0, quotient.error)
+    high: np.ndarray = np.where(whole, numerator.high, quotient.high)
+    low: np.ndarray = np.where(whole, 0.0, quotient.low)
+    error: np.ndarray = np.where(whole, 0.0, quotient.error)
     exact = (denominator.low == 0) & (np.frexp(denominator.high)[0] == 0.5) & (numerator.low == 0)
     error[exact], low[exact] = 0.0, 0.0
     context = context_for(34)
-    for i in np.flatnonzero(~np.array(short, dtype=bool)):
+    for i in np.flatnonzero(~np.array(short, dtype=bool)).tolist():
         high[i], low[i], error[i] = _parts(values[i].at(context))
         error[i] += abs(high[i]) * 2.0**-200
     return Doubled(high, low, error)
@@ -325,9 +325,7 @@ def _columns(graph: Graph, node: int) -> set[int]:
             found.add(arguments[0])
         elif operation == "power_of_two":
             waiting.append(("w", arguments[0]))
-        elif kind == "w" and operation in ("exponent", "magnitude"):
-            waiting.append(("n", arguments[0]))
-        elif operation == "power":
+        elif (kind == "w" and operation in ("exponent", "magnitude")) or operation == "power":
             waiting.append(("n", arguments[0]))
         elif operation == "call":
             waiting += [("n", a) for a in arguments[1:]]

@@ -26,8 +26,8 @@ _VALUES_AT_ONCE = 4_000_000
 _GROUP = 64  # a multiple of every SIMD width: padded to it, a column's bits don't depend on its place
 _MOST_STEPS = 10_000
 _STEPS_PER_UNIT = 200.0
-"""A natural step is of the order of one internal unit of time. A lane that takes so many more is given up here,
-before it holds the others any longer, and run by itself."""
+"""A natural step is of the order of one internal unit of time. A lane that takes so many more is given up
+here, before it holds the others any longer, and run by itself."""
 
 DRIFT_FACTOR = 50.0
 """As of ``rigidsim.accuracy.error_law``."""
@@ -58,9 +58,9 @@ class BatchBlock:
     Attributes:
         members: which of the sweep's they are, (m,).
         times: seconds, (samples,).
-        values: of the recorded variables, (samples, m, components), SI; not numbers from where a member ended.
+        values: of the recorded variables, (samples, m, components), SI; NaN from where a member ended.
         drifts: by the names of the invariants, (samples, m).
-        status: how each member ended; None where a lane gave up and the member is to be run by itself.
+        status: how each ended; None where a lane gave up and the member is to be run by itself.
         reached: samples that each got to, (m,).
         steps: (m,).
         drift_bound: relative drift that rounding alone explains, (m,).
@@ -342,9 +342,11 @@ def _end(block: BatchBlock, member: int, samples: int) -> None:
 
 def _padded(table: np.ndarray, columns: int) -> np.ndarray:
     """From (k, samples, m) to (k, columns), the last column repeated."""
+    if not len(table):
+        return np.empty((0, columns))
     flat = table.reshape(len(table), -1)
-    if not len(flat) or flat.shape[1] == columns:
-        return flat if len(flat) else np.empty((0, columns))
+    if flat.shape[1] == columns:
+        return flat
     return np.concatenate([flat, np.repeat(flat[:, -1:], columns - flat.shape[1], axis=1)], axis=1)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -11,11 +10,13 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.model_plan import plan_model
+from rigidsim.model.scaling import Drive
 from rigidsim.model.system import System
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.initial_values import check_start
+from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.traced import Graph, Traced, TracedWhole, TracingContext, Untraceable
 from rigidsim.solve.precision import precision_of
@@ -23,7 +24,6 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 
 TRACED_TABLES = ("body", "initial", "loads", "parameters")
 """Of the config, whose numbers may become parameters."""
-_STEP = re.compile(r"\.?([A-Za-z_][\w-]*)|\[(\d+)\]")
 _PARAMETER = "swept_"
 
 
@@ -89,47 +89,44 @@ class TracedSystem:
 _DOUBLE = precision_of("double")
 
 
-def trace(representative: Experiment, keys: Sequence[str], numbers: Sequence[ExactNumber]) -> TracedSystem:
+def trace(
+    representative: Experiment,
+    keys: Sequence[str],
+    numbers: Sequence[ExactNumber],
+    drive: Callable[[], Drive | None] = lambda: None,
+) -> TracedSystem:
     """Work out the system of a member, with its swept numbers as parameters.
 
     Args:
         representative: the member.
         keys: of its numbers that differ between members, such as ``initial.angular_velocity[2]``.
         numbers: what it has there.
+        drive: what loads of unknown size are estimated to add, where there are any: a power of two in the
+            units, which has to be the same whoever is the representative.
 
     Raises:
         ConfigError: it is refused: as a run of it alone would be.
         Untraceable: something in it can't be traced.
     """
     prepared = prepare(representative)
+    plan = prepared.system.plan
+    if plan.scaling.drive is not None:
+        plan = replace(plan, scaling=replace(plan.scaling, drive=drive()))
     graph = Graph(context_for(representative.config.integrator.precision))
     config = representative.config
     for column, (key, number) in enumerate(zip(keys, numbers, strict=True)):
-        config = _replaced(config, steps_of(key), graph.column(column, number))
+        config = _replaced(config, key_steps(key, "axes"), graph.column(column, number))
     context = TracingContext(graph)
     try:
         scene: Scene = build_scene(replace(representative, config=config), context)
         check_start(scene)
         parameters = Parameters()
-        system = System(plan_model(scene, like=prepared.system.plan), parameters.number)
+        system = System(plan_model(scene, like=plan), parameters.number)
         for part in ("equations", "outputs", "invariants", "crossings", "rate_bound", "initial"):
             getattr(system, part)
     except (TypeError, AttributeError, ValueError) as error:
         raise Untraceable(str(error)) from error
     return TracedSystem(prepared, system, parameters, graph)
-
-
-def steps_of(key: str) -> list[str | int]:
-    """The names and indices of a dotted key."""
-    found: list[str | int] = []
-    place = 0
-    while place < len(key):
-        match = _STEP.match(key, place)
-        if match is None:
-            raise Untraceable(f"the key {key}")
-        found.append(match[1] if match[1] is not None else int(match[2]))
-        place = match.end()
-    return found
 
 
 def _replaced(value: Any, steps: Sequence[str | int], number: ExactNumber) -> Any:

@@ -1,0 +1,286 @@
+"""Families: whoever shares a system has exactly the numbers of its own build; others are told apart."""
+
+import re
+
+import heyoka as hy
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene.config import parse
+from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.traced import Traced, TracedWhole
+from rigidsim.solve.batch.family import Alone, Families, Members, batchable
+from rigidsim.solve.problem import prepare
+
+FREE = """
+name = "free"
+[body]
+principal_moments = [1, 2, 2.5]
+mass = 2
+[initial]
+angular_velocity = [0.1, 1.0, 0.05]
+[time]
+end = 10
+samples = 5
+[output]
+record = ["angular_velocity", "quaternion", "energy"]
+"""
+ORBIT = """
+name = "orbit"
+[body]
+principal_moments = [1, 1.5, 1.8]
+[initial]
+angular_velocity = [0.01, 0.02, 1.1]
+euler_angles = [0.3, 0.1, 0]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 1
+orbit = {semi_major_axis = 1, eccentricity = 0.1, inclination = 0.2, mean_anomaly = 0.4, period = "2*pi"}
+[time]
+end = 20
+samples = 5
+[output]
+record = ["angular_velocity", "quaternion"]
+"""
+PLANAR = (
+    ORBIT.replace("[0.01, 0.02, 1.1]", "[0, 0, 1.1]")
+    .replace("[0.3, 0.1, 0]", "[0.3, 0, 0]")
+    .replace("inclination = 0.2", "inclination = 0")
+)
+TOP = """
+name = "top"
+[body]
+principal_moments = [1, 1, 0.5]
+mass = 1
+center_of_mass = [0, 0, 0.3]
+[initial]
+angular_velocity = [0.1, 0.2, 5]
+euler_angles = [0, 0.5, 0]
+[[loads]]
+kind = "uniform_gravity"
+acceleration = [0, 0, -9.8]
+[time]
+end = 2
+samples = 5
+[output]
+record = ["angular_velocity"]
+"""
+TORQUE = """
+name = "torque"
+[parameters]
+k = 0.1
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 0.2, 1]
+[[loads]]
+kind = "torque"
+components = ["k*sin(t)^2/2", "0", "-k*wz"]
+frame = "body"
+[time]
+end = 10
+samples = 5
+[output]
+record = ["angular_velocity", "quaternion"]
+[[events]]
+name = "flip"
+expression = "wx - k/3"
+"""
+
+
+def swept(text: str, axes: dict[str, str], mode: str = "zip") -> Sweep:
+    """A sweep of a config."""
+    lines = [f'axes."{key}" = {{{spec}, name = "axis_{n}"}}' for n, (key, spec) in enumerate(axes.items())]
+    return Sweep.of(parse(f'{text}\n[sweep]\nmode = "{mode}"\nseed = 7\n' + "\n".join(lines)))
+
+
+def assert_own_numbers(sweep: Sweep, most: int = 64) -> Families:
+    """Each member's equations and start, bit for bit those of its own build."""
+    families = Families(Members.of(sweep))
+    found = families.sort()
+    assert not found.alone
+    assert not found.refused
+    together = sum(len(numbers.members) for _, numbers in found.groups)
+    assert together == sweep.count
+    for family, numbers in found.groups:
+        traced = family.traced
+        for place, member in list(enumerate(numbers.members.tolist()))[:most]:
+            own = prepare(sweep.experiment_of(member))
+            start = [own.precision.number(x) for x in own.system.initial]
+            assert start == numbers.initial[:, place].tolist()
+            table = dict(
+                zip(
+                    traced.parameters.variables,
+                    [hy.expression(float(x)) for x in numbers.parameters[:, place]],
+                    strict=True,
+                )
+            )
+            pairs = [
+                (traced.system.equations, own.system.equations),
+                ([(0, x) for x in traced.system.outputs], [(0, x) for x in own.system.outputs]),
+            ]
+            for shared, alone in pairs:
+                right = [hy.expression(x) for _, x in shared]
+                right = hy.subs(right, table) if table else right
+                assert [_plain(x) for x in right] == [_plain(x) for _, x in alone]
+            scaling = own.system.scaling
+            for ours, theirs in zip(
+                (traced.system.scaling.time, *traced.system.scaling.rates),
+                (scaling.time, *scaling.rates),
+                strict=True,
+            ):
+                assert numbers.whole_numbers(ours)[place] == theirs
+    return families
+
+
+def _plain(expression: hy.expression) -> str:
+    """Its text, without the factors of one that parameters may have."""
+    return re.sub(r"\(1\.0{16} \* (\w+)\)", r"\1", repr(hy.expression(expression)))
+
+
+@pytest.mark.parametrize(
+    ("text", "axes"),
+    [
+        (FREE, {"initial.angular_velocity[0]": (-2, 2), "body.principal_moments[1]": (1.6, 2.4)}),
+        (FREE, {"initial.angular_velocity[1]": (0.2, 0.9), "body.mass": (1, 9)}),
+        (ORBIT, {"loads[0].orbit.eccentricity": (0.01, 0.6), "loads[0].orbit.mean_anomaly": (0, 3)}),
+        (ORBIT, {"loads[0].gravitational_parameter": (0.5, 2), "initial.euler_angles[1]": (0.1, 3)}),
+        (PLANAR, {"initial.angular_velocity[2]": (0.5, 2), "initial.euler_angles[0]": (-3, 3)}),
+        (TOP, {"body.center_of_mass[2]": (0.1, 0.5), "body.principal_moments[2]": (0.3, 0.8)}),
+    ],
+)
+def test_members_have_the_numbers_of_their_own_builds(
+    text: str, axes: dict[str, tuple[float, float]]
+) -> None:
+    sweep = swept(text, {key: f"uniform = {list(span)}, count = 12" for key, span in axes.items()})
+    families = assert_own_numbers(sweep)
+    assert len(families.known) <= 6
+    assert any(family.traced.parameters.nodes for family in families.known)
+
+
+@given(
+    st.lists(
+        st.sampled_from(["0", "1", "2.5", "1/3", "-0.7", "1e-9", "123456789012345678.125", "pi/4", "2^-30"]),
+        min_size=3,
+        max_size=3,
+    ),
+    st.sampled_from(["1", "1.5", "2", "2.5", "1.0000000000000000000001", "3.5", "1/3"]),
+)
+@settings(max_examples=6, deadline=None)
+def test_any_values_at_all(rates: list[str], moment: str) -> None:
+    other = ["0.1", "-1", "0.05"]
+    vectors = "[" + ", ".join(f"[{', '.join(repr(x) for x in v)}]" for v in (rates, other)) + "]"
+    axes = {
+        "initial.angular_velocity": f"values = {vectors}",
+        "body.principal_moments[1]": f'values = ["{moment}", "2"]',
+    }
+    sweep = swept(FREE, axes, mode="product")
+    found = Families(Members.of(sweep)).sort()
+    assert not found.alone
+    for member, error in found.refused.items():
+        with pytest.raises(ConfigError) as own:
+            prepare(sweep.experiment_of(member))
+        assert str(own.value) == str(error)
+    for family, numbers in found.groups:
+        for place, member in enumerate(numbers.members.tolist()):
+            own_problem = prepare(sweep.experiment_of(member))
+            start = [own_problem.precision.number(x) for x in own_problem.system.initial]
+            assert start == numbers.initial[:, place].tolist()
+            assert len(own_problem.system.states) == len(family.traced.system.states)
+
+
+def test_members_of_another_structure_are_another_family() -> None:
+    axes = {
+        "body.principal_moments": "values = [[1, 2, 2.5], [1, 2, 2.4], [1, 1, 2], [2, 2, 2], [1, 2, 2.6]]"
+    }
+    found = Families(Members.of(swept(FREE, axes))).sort()
+    groups = sorted(numbers.members.tolist() for _, numbers in found.groups)
+    assert groups == [[0, 1, 4], [2], [3]]
+    axes = {"parameters.k": "values = [0.1, 0, 0.3]"}
+    found = Families(Members.of(swept(TORQUE, axes))).sort()
+    assert sorted(numbers.members.tolist() for _, numbers in found.groups) == [[0, 2], [1]]
+
+
+def test_a_bad_member_is_refused_as_its_own_run_would_be() -> None:
+    axes = {"body.principal_moments[2]": "values = [2.5, 2.6, 7, -1, 2.7]"}
+    sweep = swept(FREE, axes)
+    found = Families(Members.of(sweep)).sort()
+    assert sorted(found.refused) == [2, 3]
+    for member, error in found.refused.items():
+        with pytest.raises(ConfigError) as own:
+            prepare(sweep.experiment_of(member))
+        assert str(own.value) == str(error)
+    assert sorted(numbers.members.tolist() for _, numbers in found.groups) == [[0, 1, 4]]
+
+
+def test_what_is_no_parameter_separates_families() -> None:
+    axes = {"time.end": "values = [5, 10]", "initial.angular_velocity[0]": "values = [0.2, 0.3]"}
+    found = Families(Members.of(swept(FREE, axes, mode="product"))).sort()
+    assert sorted(numbers.members.tolist() for _, numbers in found.groups) == [[0, 1], [2, 3]]
+    ends = {float(family.traced.prepared.scene.end) for family, _ in found.groups}
+    assert ends == {5.0, 10.0}
+
+
+@pytest.mark.parametrize(
+    ("override", "reason"),
+    [
+        ('integrator.precision="quadruple"', Alone.PRECISION),
+        ('integrator.method="closed_form"', Alone.CLOSED_FORM),
+        ("integrator.hold_invariants=true", Alone.HELD),
+        ("integrator.accuracy=1e-9", Alone.ACCURACY),
+        ('integrator.formulation="euler_angles"', Alone.CHART),
+        ("output.lyapunov=true", Alone.LYAPUNOV),
+    ],
+)
+def test_what_a_batch_cannot_do_is_said(override: str, reason: Alone) -> None:
+    key = "initial.angular_velocity[0]"
+    assert batchable(parse(FREE), [key]) is None
+    assert batchable(parse(FREE, overrides=[override]), [key]) is reason
+    assert batchable(parse(FREE), ["time.end"]) is Alone.KEY
+
+
+def test_switching_equations_and_full_tensors() -> None:
+    text = TORQUE.replace("k*sin(t)^2/2", "k*abs(wx)")
+    found = Families(Members.of(swept(text, {"parameters.k": "values = [0.1, 0.2]"}))).sort()
+    assert set(found.alone.values()) == {Alone.SWITCHING}
+    tensor = FREE.replace(
+        "principal_moments = [1, 2, 2.5]", "inertia_tensor = [[2, 0.1, 0], [0.1, 2.5, 0.2], [0, 0.2, 3]]"
+    )
+    sweep = swept(tensor, {"body.inertia_tensor[2][2]": "values = [3, 3.1]"})
+    assert set(Families(Members.of(sweep)).sort().alone.values()) == {Alone.UNTRACEABLE}
+    assert_own_numbers(swept(tensor, {"initial.angular_velocity[0]": "uniform = [0.1, 1], count = 6"}))
+
+
+def test_a_member_belongs_to_its_family_whoever_represents_it() -> None:
+    axes = {
+        "parameters.k": "values = [0.05, 0.1, 0.2]",
+        "initial.angular_velocity[1]": "values = [0.1, 0.9, 0.4]",
+    }
+    sweep = swept(TORQUE, axes)
+    numbers = []
+    for order in ([0, 1, 2], [2, 1, 0]):
+        found = Families(Members.of(sweep, order)).sort()
+        rows = {}
+        for family, group in found.groups:
+            for place, member in enumerate(group.members.tolist()):
+                states = [repr(x) for _, x in family.traced.system.equations]
+                rows[order[member]] = (
+                    states,
+                    group.initial[:, place].tolist(),
+                    group.parameters[:, place].tolist(),
+                )
+        numbers.append(rows)
+    assert numbers[0] == numbers[1]
+    assert sorted(numbers[0]) == [0, 1, 2]
+
+
+def test_traced_numbers_are_hashed_for_comparison_alone() -> None:
+    family = Families(Members.of(swept(FREE, {"body.mass": "values = [1, 2]"}))).sort().groups[0][0]
+    mass = family.traced.system.scene.body.mass
+    assert isinstance(mass, Traced)
+    assert hash(mass) == hash(mass + 1)
+    assert isinstance(family.traced.system.scaling.time, int | TracedWhole)
+    assert np.isfinite(float(mass.value))
