@@ -283,9 +283,9 @@ def _of_exact(values: Sequence[ExactNumber]) -> Doubled:
     )
     quotient = dd.divide(numerator, denominator)
     whole = np.array([d == 1 for _, d in parts]) & (numerator.low == 0)
-    high: np.ndarray = np.where(whole, numerator.high, quotient.high)
-    low: np.ndarray = np.where(whole, 0.0, quotient.low)
-    error: np.ndarray = np.where(whole, 0.0, quotient.error)
+    high = np.asarray(np.where(whole, numerator.high, quotient.high))
+    low = np.asarray(np.where(whole, 0.0, quotient.low))
+    error = np.asarray(np.where(whole, 0.0, quotient.error))
     exact = (denominator.low == 0) & (np.frexp(denominator.high)[0] == 0.5) & (numerator.low == 0)
     error[exact], low[exact] = 0.0, 0.0
     context = context_for(34)
