@@ -123,8 +123,8 @@ def _solid(
             raise refusal(f"{place}{small}", f"given {given} m; at most {large} ({limit} m) is allowed")
     heavy = positive(mass, f"{place}mass", "mass", context)
     inertia = diagonal([heavy * m for m in shape.moments(context, dimensions)])
-    drawn = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
-    sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in drawn.items()}
+    plainly = {k: [float(plain(x)) for x in v] for k, v in dimensions.items()}
+    sizes = {k: (v if shape.dimensions[k] > 1 else v[0]) for k, v in plainly.items()}
     drawing = drawn(name, sizes, position)
     if quaternion is not None:
         turn = attitude.rotation_matrix(quaternion)
