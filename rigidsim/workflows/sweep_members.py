@@ -25,6 +25,7 @@ from rigidsim.store.sweep_tile import Tile, TileVariable
 from rigidsim.workflows.analyse import analyse
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.run import run
+from rigidsim.workflows.sweep_batch import Batched, BatchTiles, in_order, why_alone
 
 _LINES = 5  # of each signal's spectrum
 
@@ -100,10 +101,20 @@ def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> Me
     most = sweep.table.most_events
     more = frequencies_of if "frequencies" in keep else None
     hidden = hidden_of(sweep)
-    parts = []
-    for member in members:
-        parts.append(run_alone(partial(_run_alone, sweep, member), keep, most, events, more, hidden))
-    return MemberResults.together(parts)
+    done = Batched([], [], list(range(len(members))), why_alone(sweep, keep))
+    if not done.why:
+        done = _batches(sweep.experiment.text).run(members, keep)
+    for place in done.left:
+        member = partial(_run_alone, sweep, members[place])
+        done.results.append(run_alone(member, keep, most, events, more, hidden))
+        done.members.append(np.array([place]))
+    return replace(in_order(done.results, done.members), why_alone=done.why)
+
+
+@lru_cache(maxsize=4)
+def _batches(config: str) -> BatchTiles:
+    sweep = sweep_of(config)
+    return BatchTiles(sweep, hidden_of(sweep))
 
 
 def alone(sweep: Sweep, member: int) -> Experiment:

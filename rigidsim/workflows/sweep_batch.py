@@ -1,0 +1,196 @@
+"""Members of a tile in batches: families that share their equations, and what is left to run one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.sweep import Sweep
+from rigidsim.session.kept import Kept, KeptVariable, Points, Series, kept_events, kept_of_series
+from rigidsim.session.members import (
+    ENDED_WELL,
+    MemberResults,
+    Outcome,
+    failed,
+    plain_variables,
+    status_codes,
+    warning_bits,
+)
+from rigidsim.session.variables import dataset_variables
+from rigidsim.solve.batch.family import Families, Family, Members, batchable
+from rigidsim.solve.batch.run import BatchBlock, BatchRun
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.status import Status
+from rigidsim.store.summary import WarningCode
+from rigidsim.store.variables import Variable
+
+_ONE_BY_ONE = ("frequencies",)
+"""What is kept of single runs alone."""
+
+
+@dataclass
+class Batched:
+    """What a batch made of a tile's members.
+
+    Attributes:
+        results: of those that it ran, or that no run accepts.
+        members: their places in the tile.
+        left: places of those that are to be run one by one.
+        why: these are, of the first of them; empty where none is.
+    """
+
+    results: list[MemberResults]
+    members: list[np.ndarray]
+    left: list[int]
+    why: str
+
+
+def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
+    """Code of the reason that no member of a sweep runs in a batch; empty where some may."""
+    for item in _ONE_BY_ONE:
+        if item in keep:
+            return item
+    if sweep.base.config.limits.wall_time is not None:
+        return "wall_time"
+    reason = batchable(sweep.base, [])
+    return "" if reason is None else reason.name.lower()
+
+
+class BatchTiles:
+    """The families of a sweep, traced and compiled once in a process.
+
+    Args:
+        hidden: what is recorded for indicators alone.
+    """
+
+    def __init__(self, sweep: Sweep, hidden: Sequence[str]) -> None:
+        self._sweep = sweep
+        self._hidden = hidden
+        self._known: list[Family] = []
+        self._runs: dict[int, tuple[BatchRun, list[Variable]]] = {}
+
+    def run(self, members: Sequence[int], keep: Sequence[str]) -> Batched:
+        """Run as many members as can be run together."""
+        families = Families(Members.of(self._sweep, members))
+        families.known = self._known
+        found = families.sort()
+        done = Batched([], [], sorted(found.alone), "")
+        if found.alone:
+            done.why = found.alone[done.left[0]].name.lower()
+        for place, error in found.refused.items():
+            reason = "; ".join(str(problem) for problem in error.problems)
+            done.results.append(failed(Outcome.REFUSED, reason))
+            done.members.append(np.array([place]))
+        for family, numbers in found.groups:
+            run, variables = self._run_of(family, int(members[int(numbers.members[0])]))
+            for block in run.blocks(numbers):
+                self._take(block, variables, keep, done)
+        done.left.sort()
+        return done
+
+    def refused(self, members: Sequence[int]) -> dict[int, ConfigError]:
+        """Of some members those that no run accepts; nothing is integrated."""
+        families = Families(Members.of(self._sweep, members))
+        families.known = self._known
+        return {int(members[place]): error for place, error in families.sort().refused.items()}
+
+    def _run_of(self, family: Family, member: int) -> tuple[BatchRun, list[Variable]]:
+        if id(family) not in self._runs:
+            experiment: Experiment = self._sweep.worked_out(member)
+            variables = [v for v in dataset_variables(prepare(experiment)) if "units" in v.attributes]
+            self._runs[id(family)] = BatchRun(family), variables
+        return self._runs[id(family)]
+
+    def _take(
+        self, block: BatchBlock, variables: Sequence[Variable], keep: Sequence[str], done: Batched
+    ) -> None:
+        gave_up = [place for place, status in enumerate(block.status) if status is None]
+        kept = _kept(block, variables, keep, self._sweep.table.most_events, self._hidden)
+        statuses = [(status or Status.NON_FINITE) for status in block.status]
+        kept["status"] = status_codes([status.value for status in statuses])
+        drifts = [np.abs(values) for values in block.drifts.values()]
+        worst = np.max([np.nanmax(d, axis=0, initial=0) for d in drifts], axis=0) if drifts else 0
+        over = worst > block.drift_bound
+        kept["warnings"] = warning_bits([[WarningCode.DRIFT.value] if bad else [] for bad in over])
+        rows = np.maximum(block.reached - 1, 0)
+        reached = np.where(block.reached > 0, block.times[rows], np.nan)
+        kept |= plain_variables(
+            steps=block.steps,
+            reached=reached,
+            bound=block.drift_bound,
+            attitude_error=np.full(len(statuses), np.nan),
+        )
+        reasons = {
+            place: status.message for place, status in enumerate(statuses) if status.value not in ENDED_WELL
+        }
+        chosen = np.array([p for p in range(len(statuses)) if p not in set(gave_up)], dtype=np.int64)
+        done.left += [int(block.members[place]) for place in gave_up]
+        if gave_up:
+            done.why = done.why or "gave_up"
+            order = {int(place): number for number, place in enumerate(chosen)}
+            reasons = {order[place]: why for place, why in reasons.items() if place in order}
+            kept = rows_of(kept, chosen)
+        if len(chosen):
+            engines = {f"batch of {block.width}": len(chosen)}
+            done.results.append(MemberResults(kept, reasons, engines))
+            done.members.append(block.members[chosen])
+
+
+def rows_of(kept: Kept, rows: np.ndarray) -> Kept:
+    """What was kept of some of the members, in the order given."""
+    return {name: KeptVariable(v.dims, v.values[rows], v.attributes, v.item) for name, v in kept.items()}
+
+
+def in_order(parts: Sequence[MemberResults], members: Sequence[np.ndarray]) -> MemberResults:
+    """Groups of a tile's members as one, each at its place.
+
+    Args:
+        members: places of each group's members.
+    """
+    places = np.concatenate(members)
+    whole = MemberResults.together(parts)
+    order = np.argsort(places, kind="stable")
+    reasons = {int(places[row]): why for row, why in whole.reasons.items()}
+    return MemberResults(rows_of(whole.kept, order), reasons, whole.engines, whole.why_alone)
+
+
+def _kept(
+    block: BatchBlock,
+    variables: Sequence[Variable],
+    keep: Sequence[str],
+    most_events: int,
+    hidden: Sequence[str],
+) -> Kept:
+    series, recorded = [], {}
+    for variable in variables:
+        if variable.name in block.values:
+            values = np.moveaxis(block.values[variable.name], 0, 1)
+            recorded[variable.name] = variable
+        elif variable.name in block.drifts:
+            values = block.drifts[variable.name].T[:, :, None]
+        else:
+            continue
+        series.append(Series(variable, [values]))
+    kept = kept_of_series(series, block.times, block.reached, keep, hidden)
+    recorded = {name: variable for name, variable in recorded.items() if name not in hidden}
+    for event in block.events:
+        edges = np.searchsorted(event.member, np.arange(len(block.members) + 1))
+        times = [event.time[a:b] for a, b in pairwise(edges)]
+        points: Points = {
+            name: (recorded[name], [values[a:b] for a, b in pairwise(edges)])
+            for name, values in event.values.items()
+            if name in recorded
+        }
+        if not event.values:
+            empty = [np.zeros((0, max(1, int(np.prod(v.shape))))) for v in recorded.values()]
+            points = {
+                name: (variable, [nothing] * len(block.members))
+                for (name, variable), nothing in zip(recorded.items(), empty, strict=True)
+            }
+        kept |= kept_events(event.name, times, most_events, points, keep)
+    return kept
