@@ -2,7 +2,7 @@
 
     python -m experiments.sweep_cost
 
-Final state and drifts of T = 1000 s each, in CPU time of one core, medians over runs in turn: batches with all
+Final state and drifts of T = 1000 s each, CPU time of one core, medians over runs in turn: batches with all
 that comes before (families, their numbers, samples, drifts), against bare heyoka with ``par[]`` and nothing
 recorded.
 """
