@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
@@ -135,7 +136,7 @@ def print_sweep(result: SavedSweep) -> None:
     for name, drift in told["largest_drifts"].items():
         screen.print(f"drift    {name.removesuffix('_drift')}: at most {drift:.2g}", highlight=False)
     for text in told["warnings"]:
-        screen.print(f"[yellow]warning[/]  {text}", highlight=False)
+        screen.print(f"[yellow]warning[/]  {escape(text)}", highlight=False)
 
 
 def print_sweep_plan(made: dict[str, Any]) -> None:

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from functools import cached_property, lru_cache
-from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, parse, validated
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
-from rigidsim.scene.schema import config_model
+from rigidsim.scene.sweep_keys import unit_and_length
 from rigidsim.scene.sweep_table import SweepTable
 from rigidsim.scene.swept_values import AxisValues, axis_values
 from rigidsim.scene.toml_text import parse_toml
-from rigidsim.scene.validation_messages import nearest, shown
+from rigidsim.scene.validation_messages import shown
 
 MOST_MEMBERS = 100_000_000
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")
@@ -313,91 +312,3 @@ def _without_sweep(experiment: Experiment) -> Experiment:
         same = False
     base = parse(text if same else toml_text(tables), source=experiment.source)
     return exchanged(base, given=experiment.given, settings=experiment.settings)
-
-
-# --- what the schema says of a key --------------------------------------------------------------------------
-
-
-@lru_cache(maxsize=4)
-def _json_schema(model: Any) -> dict[str, Any]:
-    return dict(model.model_json_schema())
-
-
-def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
-    """SI unit of the numbers that a key takes ("1" for none), and how many they are (0: a plain number).
-
-    Args:
-        tables: of the config: which keys a load has depends on its kind.
-
-    Raises:
-        ValueError: no such key.
-    """
-    schema = _json_schema(config_model())
-    nodes: list[Mapping[str, Any]] = [schema]
-    value: Any = tables
-    for step in key_steps(key, "axes"):
-        found: list[Mapping[str, Any]] = []
-        for node in _alternatives(nodes, schema, value):
-            if isinstance(step, int) and "items" in node:
-                found.append(node["items"])
-            elif isinstance(step, str) and step in node.get("properties", {}):
-                found.append(node["properties"][step])
-            elif isinstance(step, str) and isinstance(node.get("additionalProperties"), Mapping):
-                found.append(node["additionalProperties"])
-        if not found and isinstance(step, str):
-            _refuse_unknown(step, nodes, schema, value)
-        nodes = found
-        value = _inside(value, step)
-    return _unit(nodes, schema), _length(nodes, schema)
-
-
-def _refuse_unknown(
-    key: str, nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any], value: Any
-) -> None:
-    """For a key that none of the tables has that may stand there."""
-    allowed = sorted({n for node in _alternatives(nodes, schema, value) for n in node.get("properties", {})})
-    if allowed:
-        raise ValueError(f'unknown key "{key[:60]}"{nearest(key, allowed)}; allowed: {", ".join(allowed)}')
-
-
-def _inside(value: Any, step: str | int) -> Any:
-    if isinstance(value, Mapping) and isinstance(step, str):
-        return value.get(step)
-    if isinstance(value, list) and isinstance(step, int) and step < len(value):
-        return value[step]
-    return None
-
-
-def _alternatives(
-    nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any], value: Any
-) -> Iterator[Mapping[str, Any]]:
-    """What nodes refer to, without those that another kind of table is for."""
-    for node in nodes:
-        if "$ref" in node:
-            yield from _alternatives([schema["$defs"][node["$ref"].rpartition("/")[2]]], schema, value)
-        elif "discriminator" in node and isinstance(value, Mapping):
-            target = node["discriminator"].get("mapping", {}).get(value.get("kind"))
-            yield from _alternatives([{"$ref": target}] if target else [], schema, value)
-        elif "anyOf" in node or "oneOf" in node:
-            yield from _alternatives([*node.get("anyOf", []), *node.get("oneOf", [])], schema, value)
-            if "description" in node:
-                yield {"description": node["description"]}
-        else:
-            yield node
-
-
-def _unit(nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any]) -> str:
-    for node in [*nodes, *_alternatives(nodes, schema, None)]:
-        told = re.match(r"number, in (\S.*)", str(node.get("description", "")))
-        if told and "SI or" not in told[1]:
-            return told[1]
-        if "items" in node:
-            inner = _unit([node["items"]], schema)
-            if inner != "1":
-                return inner
-    return "1"
-
-
-def _length(nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any]) -> int:
-    sizes = [node.get("minItems") for node in _alternatives(nodes, schema, None) if "items" in node]
-    return next((int(size) for size in sizes if size), 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
+from pydantic import Field, StrictBool, StrictInt, StrictStr, field_validator, model_validator
 
 from rigidsim.scene.fields import ConfigTable, refuse
 from rigidsim.scene.validation_messages import nearest, shown
@@ -112,6 +112,11 @@ class SweepTable(ConfigTable):
     )
     tile: StrictInt | None = Field(
         default=None, ge=1, description="members that are computed and saved at once; by default some seconds"
+    )
+    batch: StrictBool = Field(
+        default=True,
+        description="members that share their equations run side by side; false: each by itself, with an "
+        "estimate of its errors, in many times the time",
     )
     axes: dict[StrictStr, AxisTable] = Field(
         min_length=1, description="by the dotted keys whose values are swept, indices from 0"

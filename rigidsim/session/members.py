@@ -45,12 +45,14 @@ class MemberResults:
         reasons: by place among them, of those that didn't end well.
         engines: by which members were run, with their numbers.
         why_alone: code of the reason that members were run one by one; empty where none was.
+        unestimated: whether a batch ran some whose attitude's errors were to be estimated, and weren't.
     """
 
     kept: Kept
     reasons: Mapping[int, str]
     engines: Mapping[str, int] = field(default_factory=dict)
     why_alone: str = ""
+    unestimated: bool = False
 
     @classmethod
     def together(cls, parts: Sequence[MemberResults]) -> MemberResults:
@@ -65,7 +67,8 @@ class MemberResults:
             for engine, number in part.engines.items():
                 engines[engine] = engines.get(engine, 0) + number
         why = next((part.why_alone for part in parts if part.why_alone), "")
-        return cls(joined([part.kept for part in parts], counts), reasons, engines, why)
+        unestimated = any(part.unestimated for part in parts)
+        return cls(joined([part.kept for part in parts], counts), reasons, engines, why, unestimated)
 
 
 def status_codes(statuses: Sequence[str]) -> KeptVariable:

@@ -20,7 +20,8 @@ from rigidsim.store import atomic
 from rigidsim.store.hdf5_sink import sink
 from rigidsim.store.netcdf_file import NetcdfFile, write_box, write_rows, writing
 from rigidsim.store.seal import seal
-from rigidsim.store.sweep_folder import Generation, SweepFolder
+from rigidsim.store.sweep_folder import SweepFolder
+from rigidsim.store.sweep_generation import Generation
 from rigidsim.store.sweep_sources import ALWAYS, Sources, items_of, plain
 from rigidsim.store.sweep_tile import Tile, TileVariable
 from rigidsim.store.variables import LABELS

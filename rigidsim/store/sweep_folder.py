@@ -1,13 +1,8 @@
-"""The folder of a sweep: ``config.toml``, ``tiles/``, ``dataset.h5``, ``summary.json``.
-
-A generation is a config with the members that were missing when it was given, in tiles of so many. A sweep
-begins with one; a longer axis or one more output adds another, whose tiles hold only what was new.
-"""
+"""The folder of a sweep: ``config.toml``, ``tiles/``, ``dataset.h5``, ``summary.json``."""
 
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import json
 import os
 import re
@@ -15,7 +10,6 @@ import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,134 +18,11 @@ import numpy as np
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic
+from rigidsim.store.sweep_generation import Generation
 from rigidsim.store.sweep_tile import Tile, read_tile
 
 KIND = "sweep"
 _GENERATION = re.compile(r"g(\d{3})\.json")
-
-
-@dataclass(frozen=True)
-class Work:
-    """Members of which the same is to be computed.
-
-    Attributes:
-        keep: of what is kept.
-        ranges: [first, stop) of the members, ascending.
-    """
-
-    keep: tuple[str, ...]
-    ranges: tuple[tuple[int, int], ...]
-
-    @property
-    def count(self) -> int:
-        """Of members."""
-        return sum(stop - first for first, stop in self.ranges)
-
-    def members(self, first: int, stop: int) -> np.ndarray:
-        """The members at places first ... stop-1 among these."""
-        found, before = [np.zeros(0, dtype=np.int64)], 0
-        for begin, end in self.ranges:
-            low, high = max(first - before, 0), min(stop - before, end - begin)
-            if low < high:
-                found.append(np.arange(begin + low, begin + high))
-            before += end - begin
-        return np.concatenate(found)
-
-    def places(self, members: np.ndarray) -> np.ndarray:
-        """The places of members among these; -1 where one isn't."""
-        begins = np.array([first for first, _ in self.ranges], dtype=np.int64)
-        sizes = np.array([stop - first for first, stop in self.ranges], dtype=np.int64)
-        before = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-        which = np.searchsorted(begins, members, side="right") - 1
-        offset = members - begins[which]
-        inside = (which >= 0) & (members >= 0) & (offset < sizes[which])
-        return np.where(inside, before[which] + offset, -1)
-
-
-def ranges_of(members: np.ndarray) -> tuple[tuple[int, int], ...]:
-    """Ascending members as ranges."""
-    if not len(members):
-        return ()
-    breaks = np.flatnonzero(np.diff(members) != 1)
-    firsts = members[np.concatenate([[0], breaks + 1])]
-    lasts = members[np.concatenate([breaks, [len(members) - 1]])]
-    return tuple((int(a), int(b) + 1) for a, b in zip(firsts, lasts, strict=True))
-
-
-@dataclass(frozen=True)
-class Generation:
-    """A config with what was to be computed for it.
-
-    Attributes:
-        number: from 0.
-        config: TOML text.
-        length: of a tile, members.
-        works: in order; tiles are numbered through them.
-    """
-
-    number: int
-    config: str
-    length: int
-    works: tuple[Work, ...]
-
-    @property
-    def config_sha256(self) -> str:
-        """Of the TOML text."""
-        return hashlib.sha256(self.config.encode()).hexdigest()
-
-    @cached_property
-    def tile_counts(self) -> tuple[int, ...]:
-        """Tiles of each work."""
-        return tuple(-(-work.count // self.length) for work in self.works)
-
-    @property
-    def tiles(self) -> int:
-        """How many there are."""
-        return sum(self.tile_counts)
-
-    @property
-    def members(self) -> int:
-        """How many are to be run."""
-        return sum(work.count for work in self.works)
-
-    def work_of(self, tile: int) -> tuple[Work, int]:
-        """The work that a tile belongs to, and its number within."""
-        for work, count in zip(self.works, self.tile_counts, strict=True):
-            if tile < count:
-                return work, tile
-            tile -= count
-        raise IndexError(tile)
-
-    def members_of(self, tile: int) -> np.ndarray:
-        """The members of a tile."""
-        work, number = self.work_of(tile)
-        return work.members(number * self.length, (number + 1) * self.length)
-
-    def as_text(self) -> str:
-        """For ``gNNN.json``."""
-        works = [{"keep": list(work.keep), "ranges": [list(r) for r in work.ranges]} for work in self.works]
-        content = {"format": 1, "config": self.config, "length": self.length, "works": works}
-        return json.dumps(content) + "\n"
-
-    @classmethod
-    def read(cls, path: Path, number: int) -> Generation:
-        """From a ``gNNN.json``.
-
-        Raises:
-            RunFolderError: damaged.
-        """
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            works = tuple(
-                Work(tuple(map(str, w["keep"])), tuple((int(a), int(b)) for a, b in w["ranges"]))
-                for w in content["works"]
-            )
-            length = int(content["length"])
-            if content["format"] != 1 or length < 1:
-                raise ValueError("another format")
-            return cls(number, str(content["config"]), length, works)
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise RunFolderError(f"{path}: is damaged or of another version ({error})") from None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import numpy as np
 
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweep import Sweep
-from rigidsim.store.sweep_folder import Generation, SweepFolder, Work, ranges_of
+from rigidsim.store.sweep_folder import SweepFolder
+from rigidsim.store.sweep_generation import Generation, Work, ranges_of
 
 ALWAYS = "always"
 """The item of what is kept of every member."""

@@ -9,24 +9,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.overrides import apply_overrides
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.toml_text import parse_toml
-from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
-from rigidsim.store.sweep_dataset import Gathered, TileReader, gather, write_dataset
-from rigidsim.store.sweep_folder import Generation, SweepFolder
+from rigidsim.store.sweep_dataset import TileReader, gather, write_dataset
+from rigidsim.store.sweep_folder import SweepFolder
+from rigidsim.store.sweep_generation import Generation
 from rigidsim.store.sweep_run import SavedSweep, open_sweep
-from rigidsim.store.sweep_sources import ALWAYS, Sources, sources_of
+from rigidsim.store.sweep_sources import sources_of
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweep_check import check_sweep
 from rigidsim.workflows.sweep_members import recording, sweep_of
 from rigidsim.workflows.sweep_plan import tile_length
+from rigidsim.workflows.sweep_summary import summary_of
 from rigidsim.workflows.sweep_ways import OneProcess, Way
 
 
@@ -211,6 +209,7 @@ def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
 def identity(sweep: Sweep) -> str:
     """What members share: the config without what is swept, and without what no number depends on."""
     tables = parse_toml(sweep.experiment.text, sweep.experiment.source)
+    alone = not tables.get("sweep", {}).get("batch", True)
     for key in ("name", "description", "sweep"):
         tables.pop(key, None)
     for key in ("timeline", "timeline_rows"):
@@ -219,7 +218,7 @@ def identity(sweep: Sweep) -> str:
         del tables["output"]
     keys = sorted(axis.key for axis in sweep.axes)
     apply_overrides(tables, [f'{key}="swept"' for key in keys])
-    return json.dumps([keys, tables], sort_keys=True, default=str)
+    return json.dumps([keys, tables, *(["alone"] if alone else [])], sort_keys=True, default=str)
 
 
 def _generation(wanted: Sweep, folder: SweepFolder, *, exclusive: bool) -> Generation:
@@ -265,7 +264,7 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
     sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
     reader = TileReader(folder, generations)
     found = gather(sources, reader)
-    summary = _summary(wanted, sources, reader, found, wall, cpu)
+    summary = summary_of(wanted, sources, reader, found, wall, cpu)
     attributes = {
         "Conventions": "CF-1.11",
         "title": wanted.experiment.config.name,
@@ -289,88 +288,3 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
     summary["dataset_sha256"] = digest
     folder.write_summary(summary)
     return SavedSweep(folder, {"kind": "sweep", **summary})
-
-
-@dataclass
-class _Counted:
-    """What is told of all members together."""
-
-    outcomes: np.ndarray
-    warned: np.ndarray
-    steps: int
-    worst: dict[str, float]
-
-
-def _summary(
-    wanted: Sweep, sources: Sources, reader: TileReader, found: Gathered, wall: float, cpu: float
-) -> dict[str, Any]:
-    counted = _count(sources, reader)
-    outcomes = {OUTCOMES[i]: int(n) for i, n in enumerate(counted.outcomes) if n}
-    failing = wanted.count - sum(outcomes.get(status, 0) for status in ENDED_WELL)
-    warned = {WARNINGS[i]: int(n) for i, n in enumerate(counted.warned) if n}
-    warnings = [f"{number:,} members are warned of: {code}" for code, number in warned.items()]
-    if failing:
-        warnings.insert(0, f"{failing:,} members didn't end well; failed_member and failed_reason say which")
-    engines: dict[str, int] = {}
-    for made in found.made:
-        for engine, number in made["engines"].items():
-            engines[engine] = engines.get(engine, 0) + number
-    kinds = [
-        {k: v for k, v in made.items() if k.startswith(("version_", "cpu_model"))} for made in found.made
-    ]
-    differing = sorted({k for kind in kinds for k, v in kind.items() if v != kinds[0].get(k)})
-    mixed = ", ".join(differing) or None
-    if mixed:
-        warnings.append(f"tiles were computed with different {mixed}: members may differ in their last bits")
-    return {
-        "name": wanted.experiment.config.name,
-        "description": wanted.experiment.config.description,
-        "status": "finished",
-        "message": f"all {wanted.count:,} members were run",
-        "exit_code": 0,
-        "members": wanted.count,
-        "shape": dict(zip(wanted.dims, wanted.shape, strict=True)),
-        "axes": {axis.name: axis.key for axis in wanted.axes},
-        "keep": list(wanted.table.keep),
-        "outcomes": outcomes,
-        "warned": warned,
-        "warnings": warnings,
-        "engines": engines,
-        "why_alone": next((made["why_alone"] for made in found.made if made.get("why_alone")), None),
-        "cost": {
-            "steps": counted.steps,
-            "cpu_seconds": sum(made["cpu_seconds"] for made in found.made),
-            "wall_seconds_of_tiles": sum(made["wall_seconds"] for made in found.made),
-            "tiles": len(found.made),
-            "session_wall_seconds": wall,
-            "session_cpu_seconds": cpu,
-        },
-        "largest_drifts": counted.worst,
-        "config_sha256": wanted.experiment.sha256,
-        "provenance": kinds[0] if kinds else {},
-        "mixed_provenance": mixed,
-    }
-
-
-def _count(sources: Sources, reader: TileReader) -> _Counted:
-    outcomes, warned = np.zeros(len(OUTCOMES), dtype=np.int64), np.zeros(len(WARNINGS), dtype=np.int64)
-    steps = 0
-    worst: dict[str, float] = {}
-    always = sources.found[ALWAYS]
-    keys = always.generation.astype(np.int64) << 32 | always.tile
-    order = np.argsort(keys, kind="stable")
-    edges = np.flatnonzero(np.diff(keys[order])) + 1
-    for group in np.split(order, edges):
-        key = int(keys[group[0]])
-        tile = reader.tile(key >> 32, key & 0xFFFFFFFF)
-        rows = always.row[group]
-        outcomes += np.bincount(tile.arrays["status"][rows], minlength=len(OUTCOMES))
-        bits = tile.arrays["warnings"][rows]
-        warned += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
-        steps += int(tile.arrays["steps"][rows].sum())
-        for name, values in tile.arrays.items():
-            if name.endswith("_drift_largest"):
-                largest = np.nanmax(values[rows], initial=0.0)
-                drift = name.removesuffix("_largest")
-                worst[drift] = max(worst.get(drift, 0.0), float(largest))
-    return _Counted(outcomes, warned, steps, worst)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -55,6 +56,8 @@ def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
     for item in _ONE_BY_ONE:
         if item in keep:
             return item
+    if not sweep.table.batch:
+        return "asked"
     if sweep.base.config.limits.wall_time is not None:
         return "wall_time"
     reason = batchable(sweep.base, [])
@@ -90,6 +93,8 @@ class BatchTiles:
             run, variables = self._run_of(family, int(members[int(numbers.members[0])]))
             for block in run.blocks(numbers):
                 self._take(block, variables, keep, done)
+                if self._unestimated(family):
+                    done.results[-1:] = [replace(part, unestimated=True) for part in done.results[-1:]]
         done.left.sort()
         return done
 
@@ -105,6 +110,11 @@ class BatchTiles:
             variables = [v for v in dataset_variables(prepare(experiment)) if "units" in v.attributes]
             self._runs[id(family)] = BatchRun(family), variables
         return self._runs[id(family)]
+
+    def _unestimated(self, family: Family) -> bool:
+        """Whether a single run would have estimated the errors of its attitude."""
+        carried = family.traced.system.requirements.formulation != "rates"
+        return carried and self._sweep.base.config.output.estimate
 
     def _take(
         self, block: BatchBlock, variables: Sequence[Variable], keep: Sequence[str], done: Batched
@@ -156,7 +166,7 @@ def in_order(parts: Sequence[MemberResults], members: Sequence[np.ndarray]) -> M
     whole = MemberResults.together(parts)
     order = np.argsort(places, kind="stable")
     reasons = {int(places[row]): why for row, why in whole.reasons.items()}
-    return MemberResults(rows_of(whole.kept, order), reasons, whole.engines, whole.why_alone)
+    return replace(whole, kept=rows_of(whole.kept, order), reasons=reasons)
 
 
 def _kept(

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rigidsim.errors import RigidsimError, StoppedError
-from rigidsim.store.sweep_folder import Generation
+from rigidsim.store.sweep_generation import Generation
 from rigidsim.workflows.sweep_members import tile_image
 from rigidsim.workflows.sweep_ways import task
 

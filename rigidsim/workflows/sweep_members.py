@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweep import Sweep
@@ -79,6 +79,7 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> byte
     made = {
         "engines": dict(results.engines),
         "why_alone": results.why_alone,
+        "unestimated": results.unestimated,
         "wall_seconds": time.perf_counter() - began,
         "cpu_seconds": time.process_time() - cpu,
         "finished_at": provenance.now(),
@@ -115,6 +116,20 @@ def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> Me
 def _batches(config: str) -> BatchTiles:
     sweep = sweep_of(config)
     return BatchTiles(sweep, hidden_of(sweep))
+
+
+def single_member(experiment: Experiment, member: int) -> Experiment:
+    """A member of a config's ``[sweep]`` as a run of its own, named after the sweep and its number.
+
+    Raises:
+        ConfigError: there is no such sweep or member, or it can't be run.
+    """
+    sweep = Sweep.of(experiment)
+    if not 0 <= member < sweep.count:
+        what = f"given {member}; its members are 0 to {sweep.count - 1}, the last axis runs fastest"
+        raise ConfigError(Problem("--member", what), experiment.source)
+    name = f"{experiment.config.name}_{member}"
+    return sweep.experiment_of(member).having([f'name="{name}"'])
 
 
 def alone(sweep: Sweep, member: int) -> Experiment:

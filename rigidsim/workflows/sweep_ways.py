@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from rigidsim.store.sweep_folder import Generation
+from rigidsim.store.sweep_generation import Generation
 from rigidsim.workflows.sweep_members import tile_image
 
 

@@ -13,7 +13,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 
 from rigidsim.errors import StoppedError
-from rigidsim.store.sweep_folder import Generation
+from rigidsim.store.sweep_generation import Generation
 from rigidsim.workflows.sweep_members import tile_image
 from rigidsim.workflows.sweep_ways import task
 

@@ -17,7 +17,8 @@ from typer.testing import CliRunner
 import rigidsim
 from rigidsim.cli.app import app
 from rigidsim.errors import ConfigError, RunFolderError
-from rigidsim.store.sweep_folder import SweepFolder, Work, ranges_of
+from rigidsim.store.sweep_folder import SweepFolder
+from rigidsim.store.sweep_generation import Work, ranges_of
 from rigidsim.store.sweep_run import open_sweep
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import resume_sweep, scanned
@@ -260,6 +261,31 @@ def test_info_tells_how_far_a_sweep_is(tmp_path: Path) -> None:
         resume_sweep(tmp_path / "box")
     damaged.unlink()
     assert resume_sweep(tmp_path / "box").finished
+
+
+def test_what_a_batch_does_not_estimate_is_said(tmp_path: Path) -> None:
+    output = CONFIG[CONFIG.index("estimate") : CONFIG.index("[[ev")]
+    text = CONFIG.replace(output, "").replace('rates"', 'quaternion"')
+    text += '[sweep]\naxes."initial.angular_velocity[0]" = {values = [0.1, 0.2]}\n'
+    told = swept(tmp_path, text)
+    assert np.isnan(told.dataset.attitude_error).all()
+    assert told.summary["warning_codes"] == ["attitude_not_estimated"]
+    assert "of 2 members" in told.summary["warnings"][0]
+    shown = CliRunner().invoke(app, ["info", str(tmp_path / "box")])
+    assert "[sweep] batch = false" in " ".join(shown.stdout.split())
+    (tmp_path / "c.toml").write_text(text)
+    out = ["--out", str(tmp_path), "--set", "output.timeline=false", "--json"]
+    ran = CliRunner().invoke(app, ["run", str(tmp_path / "c.toml"), "--member", "1", *out])
+    single = json.loads(ran.stdout)
+    assert (tmp_path / "box_1").is_dir()
+    assert single["accuracy"]["estimated_attitude_error"] > 0
+    with pytest.raises(RunFolderError, match="another experiment"):
+        swept(tmp_path, text.replace("[sweep]", "[sweep]\nbatch = false"))
+    alone = swept(tmp_path, text.replace("[sweep]", "[sweep]\nbatch = false"), force=True)
+    assert (alone.dataset.attitude_error > 0).all()
+    assert alone.summary["why_alone"] == "asked"
+    refused = CliRunner().invoke(app, ["run", str(tmp_path / "c.toml"), "--member", "2"])
+    assert "its members are 0 to 1" in refused.output
 
 
 def test_a_quick_scan() -> None:

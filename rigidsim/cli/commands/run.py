@@ -34,6 +34,10 @@ def run(
             help="Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
         ),
     ] = None,
+    member: Annotated[
+        int | None,
+        typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N by itself, counted from 0."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -52,10 +56,16 @@ def run(
         from rigidsim.workflows.verify import embedded
 
         experiments.append(embedded(dataset, overrides=overrides or []))
+    if scan and member is not None:
+        raise RigidsimError("run: --member is one of a config's [sweep], --sweep makes another: give one")
     if scan:
         raise typer.Exit(_scanned(experiments, scan, out, force=force, as_json=as_json))
     if not experiments:
         raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
+    if member is not None:
+        from rigidsim.workflows.sweep_members import single_member
+
+        experiments = [single_member(experiment, member) for experiment in experiments]
     for experiment in experiments:
         if has_earlier_settings(experiment.given):
             print(
