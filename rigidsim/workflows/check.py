@@ -15,7 +15,7 @@ from rigidsim.solve.problem import prepare
 from rigidsim.store.summary import Caution
 from rigidsim.store.understood import Body, Span, Start
 from rigidsim.workflows.read import load
-from rigidsim.workflows.sweep_check import check_sweep
+from rigidsim.workflows.sweep_check import QUICK, check_sweep
 from rigidsim.workflows.sweep_members import recording
 
 
@@ -67,7 +67,8 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
             prepared = prepare(experiment)
             refuse_taken_names(prepared)
         else:
-            prepared = check_sweep(recording(Sweep.of(experiment)))
+            found = recording(Sweep.of(experiment))
+            prepared = check_sweep(found, every=found.count <= QUICK)
     except ConfigError as error:
         return Checked(error.source or str(path), problems=tuple(error.problems))
     scene = prepared.scene

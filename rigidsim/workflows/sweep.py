@@ -160,7 +160,7 @@ def run_sweep(
     observer.checking(wanted)
     complete = _complete(wanted, folder) and not force
     if not complete:
-        check_sweep(wanted)
+        check_sweep(wanted, every=not _known(wanted, folder))
     began, cpu = time.perf_counter(), time.process_time()
     with folder.locked(shared=share is not None):
         if complete:
@@ -193,6 +193,11 @@ def _complete(wanted: Sweep, folder: SweepFolder) -> bool:
         and summary.get("config_sha256") == wanted.experiment.sha256
         and folder.dataset.exists()
     )
+
+
+def _known(wanted: Sweep, folder: SweepFolder) -> bool:
+    """Whether it was begun before, which it is after all its members were checked."""
+    return any(g.config_sha256 == wanted.experiment.sha256 for g in folder.generations()[-1:])
 
 
 def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:

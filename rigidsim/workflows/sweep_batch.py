@@ -98,11 +98,20 @@ class BatchTiles:
         done.left.sort()
         return done
 
-    def refused(self, members: Sequence[int]) -> dict[int, ConfigError]:
-        """Of some members those that no run accepts; nothing is integrated."""
-        families = Families(Members.of(self._sweep, members))
+    def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], bool]:
+        """Of some members those that no run accepts; nothing is integrated.
+
+        Args:
+            most: of them, after which no more are looked for.
+
+        Returns:
+            What is wrong with each, and whether any member at all shares its equations with others: of those
+            that don't nothing is known.
+        """
+        families = Families(Members.of(self._sweep, members), most)
         families.known = self._known
-        return {int(members[place]): error for place, error in families.sort().refused.items()}
+        found = families.sort()
+        return {int(members[place]): error for place, error in found.refused.items()}, bool(found.groups)
 
     def _run_of(self, family: Family, member: int) -> tuple[BatchRun, list[Variable]]:
         if id(family) not in self._runs:

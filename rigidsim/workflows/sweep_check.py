@@ -13,16 +13,25 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.sweep_dataset import RESERVED, SUFFIXES
+from rigidsim.workflows.sweep_batch import why_alone
+from rigidsim.workflows.sweep_members import batches_of
 
 _ALL = 200
-"""As many members are all worked out; of more, each value of each axis once, and the corners."""
+"""As many members are all worked out; of more, each value of each axis once, and the corners, and all of them
+by their numbers alone, where these decide."""
 _OF_AN_AXIS = 400
 _MOST_CORNERS = 64
 _MOST_TOLD = 10
+_AT_ONCE = 16_384
+QUICK = 1_000_000
+"""As many members are all looked at where a plan is asked for; a sweep looks at all."""
 
 
-def check_sweep(sweep: Sweep) -> InitialValueProblem:
+def check_sweep(sweep: Sweep, *, every: bool = True) -> InitialValueProblem:
     """Refuse a sweep with a member that can't be run; the first member, prepared.
+
+    Args:
+        every: of more than ``_ALL`` members look at each one's numbers, too: 20 s for a million of them.
 
     Raises:
         ConfigError: names members and keys.
@@ -43,9 +52,26 @@ def check_sweep(sweep: Sweep) -> InitialValueProblem:
             problems += _blamed(sweep, member, error).problems
             if len(problems) >= _MOST_TOLD:
                 break
+    if not problems and every and sweep.count > _ALL:
+        problems = _of_families(sweep)
     if problems:
         raise ConfigError(problems, sweep.experiment.source)
     return first
+
+
+def _of_families(sweep: Sweep) -> list[Problem]:
+    """What is wrong with any member at all, where members share equations: their numbers alone tell it."""
+    if why_alone(sweep, ()) not in ("", "wall_time", "asked"):
+        return []
+    batches = batches_of(sweep.experiment.text)
+    for begin in range(0, sweep.count, _AT_ONCE):
+        refused, shared = batches.refused(range(begin, min(begin + _AT_ONCE, sweep.count)), _MOST_TOLD)
+        if refused:
+            errors = [_blamed(sweep, member, refused[member]) for member in sorted(refused)]
+            return [problem for error in errors for problem in error.problems]
+        if not shared:
+            break
+    return []
 
 
 def _blamed(sweep: Sweep, member: int, error: ConfigError) -> ConfigError:

@@ -104,7 +104,7 @@ def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> Me
     hidden = hidden_of(sweep)
     done = Batched([], [], list(range(len(members))), why_alone(sweep, keep))
     if not done.why:
-        done = _batches(sweep.experiment.text).run(members, keep)
+        done = batches_of(sweep.experiment.text).run(members, keep)
     for place in done.left:
         member = partial(_run_alone, sweep, members[place])
         done.results.append(run_alone(member, keep, most, events, more, hidden))
@@ -113,7 +113,8 @@ def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> Me
 
 
 @lru_cache(maxsize=4)
-def _batches(config: str) -> BatchTiles:
+def batches_of(config: str) -> BatchTiles:
+    """The families of a config's sweep, traced once in a process."""
     sweep = sweep_of(config)
     return BatchTiles(sweep, hidden_of(sweep))
 

@@ -9,7 +9,7 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.workflows.plan import plan
-from rigidsim.workflows.sweep_check import check_sweep
+from rigidsim.workflows.sweep_check import QUICK, check_sweep
 from rigidsim.workflows.sweep_members import alone, recording
 
 _SECONDS_OF_A_TILE = 10.0
@@ -68,7 +68,7 @@ def plan_sweep(sweep: Sweep) -> dict[str, Any]:
         ConfigError: a member can't be run.
     """
     sweep = recording(sweep)
-    first = check_sweep(sweep)
+    first = check_sweep(sweep, every=sweep.count <= QUICK)
     made = plan(alone(sweep, 0))
     seconds = _member_seconds(made)
     length = sweep.table.tile or (tile_length(sweep) if sweep.count <= _FEW else _length(sweep, seconds))

@@ -232,6 +232,17 @@ def test_bad_sweeps_are_refused_before_work_begins(case: str, tmp_path: Path) ->
     assert not list(tmp_path.iterdir())
 
 
+def test_one_bad_member_among_many_is_refused_before_work_begins(tmp_path: Path) -> None:
+    """It lies on no edge of the product; another value of either axis would make it possible."""
+    largest = ", ".join("2.9" if i == 40 else f"2.0{i:02}" for i in range(75))
+    axes = f'"body.principal_moments[2]".values = [{largest}]\n'
+    axes += '"body.principal_moments[0]".values = [1, 0.5, 1]\n'
+    with pytest.raises(ConfigError, match=r"member 121 .*2\.9.*0\.5.*principal moments") as refused:
+        swept(tmp_path, f"{CONFIG}[sweep.axes]\n{axes}")
+    assert len(refused.value.problems) == 1
+    assert not (tmp_path / "box").exists()
+
+
 def test_shares_make_the_same_dataset(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(CONFIG + SWEEP)
     run = CliRunner().invoke

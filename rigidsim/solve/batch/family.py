@@ -201,10 +201,12 @@ class Families:
 
     Args:
         members: all of the sweep.
+        most_refused: members that no run accepts, after which the rest is left unsorted; all by default.
     """
 
-    def __init__(self, members: Members) -> None:
+    def __init__(self, members: Members, most_refused: int | None = None) -> None:
         self._members = members
+        self._most_refused = most_refused
         self._swept = [Swept(numbers) for numbers in members.numbers]
         self.known: list[Family] = []
         self._hopeless: Alone | None = None
@@ -237,6 +239,8 @@ class Families:
             made = self._traced(first)
             if isinstance(made, ConfigError):
                 result.refused[first] = made
+                if self._most_refused is not None and len(result.refused) >= self._most_refused:
+                    return
                 waiting = waiting[1:]
             elif isinstance(made, Alone):
                 result.alone[first] = made
