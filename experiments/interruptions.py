@@ -38,7 +38,8 @@ from experiments.coverage.families import coverage_scene
 PROMISED = 0.5  # seconds from the signal to the end
 _LONGER = 1e5  # times a prolonged scene's time
 _MOMENTS = (0.3, 6.0)  # CPU seconds after the start, imports among them
-_PATIENCE = 120.0  # wall seconds for the next sign of life
+_PATIENCE = 120.0  # CPU seconds for the next sign of life
+_PATIENCE_WITH_NOTHING = 1800.0  # wall seconds, for what uses no CPU time
 _INTERRUPTED = 130
 
 _BODY = "[body]\nprincipal_moments = [1, 2, 2.5]\nmass = 1\n[initial]\nangular_velocity = [0.5, 0.25, 1]\n"
@@ -180,18 +181,21 @@ def interrupted(command: Sequence[str], folder: Path, line: str = "", seconds: f
         def said() -> str:
             return (folder / "stderr").read_text(errors="replace")
 
-        deadline = time.monotonic() + _PATIENCE
-        while line not in said() and not ended.wait(0.01) and time.monotonic() < deadline:
+        patience = _Patience(process.pid)
+        while line not in said() and not ended.wait(0.01) and patience:
             pass
         begin = 0.0 if ended.is_set() or not line else _cpu(process.pid)
-        while not ended.wait(0.005) and _cpu(process.pid) < begin + seconds and time.monotonic() < deadline:
+        while not ended.wait(0.005) and _cpu(process.pid) < begin + seconds and patience:
             pass
         before = 0.0 if ended.is_set() else _cpu(process.pid)
         alive = not ended.is_set()
         sent = time.monotonic()
         if alive:
             os.kill(process.pid, signal.SIGINT)
-        hangs = not ended.wait(_PATIENCE)
+        patience = _Patience(process.pid)
+        while not ended.wait(0.1) and patience:
+            pass
+        hangs = not ended.is_set()
         if hangs:
             os.kill(process.pid, signal.SIGKILL)
             ended.wait()
@@ -199,6 +203,17 @@ def interrupted(command: Sequence[str], folder: Path, line: str = "", seconds: f
         finished = process.returncode == 0 or not alive
         spent = None if finished and not hangs else total - before
         return Ending(process.returncode, spent, time.monotonic() - sent, said())
+
+
+class _Patience:
+    """True as long as a process may still be waited for, whatever else the machine does meanwhile."""
+
+    def __init__(self, pid: int) -> None:
+        self._pid, self._cpu, self._wall = pid, _cpu(pid), time.monotonic()
+
+    def __bool__(self) -> bool:
+        spent, waited = _cpu(self._pid) - self._cpu, time.monotonic() - self._wall
+        return spent < _PATIENCE and waited < _PATIENCE_WITH_NOTHING
 
 
 def _cpu(pid: int) -> float:

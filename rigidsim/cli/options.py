@@ -99,6 +99,9 @@ def user_errors(command: Callable[..., None]) -> Callable[..., None]:
             print("rigidsim: interrupted", file=sys.stderr)
             _leave_builds(130)
             raise typer.Exit(130) from None
+        except typer.Exit as ended:
+            _leave_builds(ended.exit_code)  # of a run that was interrupted, and saved meanwhile
+            raise
         except BrokenPipeError:
             sys.stderr.close()
             raise typer.Exit(0) from None

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rigidsim.session.statistics import SampleStatistics
-from rigidsim.solve.building import building
+from rigidsim.solve.building import building, give_up, take_up
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
@@ -40,7 +40,7 @@ class Observer:
 
 class Interruption:
     """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks; where
-    something is being compiled, nobody waits for it any more.
+    something is being compiled, nobody waits for it any more, and nothing more is.
     """
 
     def __init__(self) -> None:
@@ -55,6 +55,7 @@ class Interruption:
 
         def note(*_: object) -> None:
             self.requested = True
+            give_up()
             if building():
                 raise KeyboardInterrupt
 
@@ -64,6 +65,7 @@ class Interruption:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+            take_up()
 
 
 class Guards:

@@ -111,12 +111,20 @@ def sampler(
 
 
 def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
-    """The check, before which turns are counted as far as the run has come, a part of a chunk's time each."""
+    """The check, and turns counted as far as the run has come, a part of a chunk's time each."""
 
     def checked(progress: Progress) -> Status | None:
-        if progress.next_sample < clock.count:
-            reached = math.ldexp(progress.time, -clock.exponent)
+        stop = check(progress)
+        if stop is not None or progress.next_sample >= clock.count:
+            return stop
+        reached = math.ldexp(progress.time, -clock.exponent)
+        try:
             evaluator.follow(min(reached, float(clock.at(progress.next_sample))))
+        except KeyboardInterrupt:  # while what follows them was compiled
+            stop = check(progress)
+            if stop is None:
+                raise
+            return stop
         return check(progress)
 
     return checked

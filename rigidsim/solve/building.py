@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 _NAME = "rigidsim build"
+_LOOK = 0.05  # seconds
+_given_up = threading.Event()
 
 T = TypeVar("T")
 
@@ -16,9 +18,14 @@ def interruptible(work: Callable[[], T]) -> T:
 
     In the main thread, the only one that signals reach, the work is done by another one. A signal handler
     that raises ends the wait; the work itself goes on and what it makes is lost.
+
+    Raises:
+        KeyboardInterrupt: after ``give_up``, before anything is begun.
     """
     if threading.current_thread() is not threading.main_thread():
         return work()
+    if _given_up.is_set():
+        raise KeyboardInterrupt
     made: list[T] = []
     failed: list[BaseException] = []
     done = threading.Event()
@@ -32,7 +39,8 @@ def interruptible(work: Callable[[], T]) -> T:
             done.set()
 
     threading.Thread(target=build, name=_NAME, daemon=True).start()
-    done.wait()
+    while not done.wait(_LOOK):  # a signal that comes just before the wait isn't heeded within it
+        pass
     if failed:
         raise failed[0]
     return made[0]
@@ -41,3 +49,13 @@ def interruptible(work: Callable[[], T]) -> T:
 def building() -> bool:
     """Whether such work is under way, be it work that nobody waits for any more."""
     return any(thread.name == _NAME for thread in threading.enumerate())
+
+
+def give_up() -> None:
+    """Begin no such work for the main thread any more, until ``take_up``: nobody would wait for it."""
+    _given_up.set()
+
+
+def take_up() -> None:
+    """Such work may begin."""
+    _given_up.clear()

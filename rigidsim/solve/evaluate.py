@@ -14,6 +14,7 @@ import numpy as np
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
 from rigidsim.solve.angle_wrapping import AngleWrapping
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.charts import Lift
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import CompiledFunction
@@ -182,7 +183,7 @@ class Evaluator:
     @cached_property
     def _partner(self) -> _PartnerChart:
         """Compiled when there are samples in the partner chart."""
-        return _PartnerChart(self._system, self._compile, self._precision)
+        return interruptible(lambda: _PartnerChart(self._system, self._compile, self._precision))
 
     def _compile(self, expressions: list[hy.expression]) -> CompiledFunction:
         return compiled_function(

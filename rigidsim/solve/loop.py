@@ -161,8 +161,18 @@ class IntegrationLoop:
         return self.progress
 
     def _hand_over(self, *, patiently: bool = False) -> bool:
-        """Hand over what is collected; False where the receiver ended the run with one of the samples."""
-        refused = self.buffer.hand_over(patiently=patiently)
+        """Hand over what is collected; False where the receiver ended the run with one of the samples, or
+        Ctrl-C did while something that samples need was compiled: those not taken are left to the next
+        session.
+        """
+        try:
+            refused = self.buffer.hand_over(patiently=patiently)
+        except KeyboardInterrupt:
+            stop = self.check(self.progress)
+            if stop is None:
+                raise
+            self.progress.status, self.progress.next_sample = stop, self.buffer.handed
+            return False
         self.progress.next_sample = self.buffer.handed
         if refused is None:
             return True

@@ -109,6 +109,9 @@ class SampleBuffer:
         Returns:
             Where the receiver wants no sample past one of them: its index and a boundary before it; the
             others are dropped.
+
+        Raises:
+            KeyboardInterrupt: from the receiver; what it didn't take goes on waiting.
         """
         waiting, rows = self.count - self.handed, self._pacing.rows_at_once
         waited = time.perf_counter() - self._handed_at
@@ -123,13 +126,18 @@ class SampleBuffer:
         handed = len(whole)
         for start in range(0, handed, rows):
             block = whole.rows(start, start + rows)
-            self._receiver.take(block)
+            try:
+                self._receiver.take(block)
+            except KeyboardInterrupt:  # while something that it needs was compiled: it took none of these
+                self._blocks.insert(0, whole.rows(start, handed))
+                self._boundaries.insert(0, _before(block.first, boundaries))
+                raise
             self.handed += len(block)
             last = self._receiver.last_wanted
             if last is not None:
                 self._blocks, self._boundaries = [], []
                 self.count = self.handed = last + 1
-                return last, boundaries[max(first for first in boundaries if first <= last)]
+                return last, _before(last, boundaries)
         self.took("hand over", handed, time.perf_counter() - started)
         return None
 
@@ -156,3 +164,8 @@ class SampleBuffer:
         self._affordable[work] = int(rows * pacing.chunk_seconds / max(seconds, 1e-9))
         affordable = max(min(self._affordable.values()), _FEWEST_ROWS)
         self._most = min(affordable, _GROWTH * self._most, pacing.rows_waiting)
+
+
+def _before(sample: int, boundaries: dict[int, StepBoundary]) -> StepBoundary:
+    """The boundary before the piece that a sample was found in."""
+    return boundaries[max(first for first in boundaries if first <= sample)]

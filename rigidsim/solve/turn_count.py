@@ -28,6 +28,7 @@ from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import SampleTimes
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
@@ -205,7 +206,7 @@ class TurnCounter:
     def _bound(self) -> float:
         """Of the angular velocity, internal units."""
         if not self._built:
-            self._build()
+            interruptible(self._build)
         return self._largest
 
     @property

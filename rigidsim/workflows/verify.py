@@ -15,6 +15,7 @@ from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.config import Experiment, parse, parse_earlier
 from rigidsim.scene.records import dataclass
 from rigidsim.session.guards import Observer
+from rigidsim.solve.status import Status
 from rigidsim.store import netcdf, provenance
 from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
@@ -98,6 +99,7 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
     Raises:
         RunFolderError: no dataset there, or one that no config can reproduce.
         ConfigError: the embedded config isn't one.
+        KeyboardInterrupt: the integration was interrupted; nothing was compared.
     """
     dataset, folder = _dataset(Path(path))
     problems = _file_problems(dataset, folder)
@@ -114,6 +116,8 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         replaced = {"output": quiet, "limits": unguarded, "integrator": plain}
         config = experiment.config.model_copy(update=replaced)
         again = run(replace(experiment, config=config), out=scratch, observer=observer)
+        if again.status == Status.INTERRUPTED.value:
+            raise KeyboardInterrupt
         if not again.folder.dataset.exists():
             raise RunFolderError(f"{dataset}: the second run {again.outcome.message}; nothing was compared")
         differing, first, samples = _compare(dataset, again.folder.dataset, saved.schema_version)

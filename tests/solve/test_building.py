@@ -14,8 +14,9 @@ from support import config, run_text, same_bits
 
 import rigidsim
 from rigidsim.model.system import System
-from rigidsim.solve.building import building, interruptible
+from rigidsim.solve.building import building, give_up, interruptible, take_up
 from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.turn_count import TurnCounter
 
 PLAIN = "estimate = false"
 AWAKE = 60.0  # seconds that nobody waits for
@@ -48,6 +49,16 @@ def test_what_is_made_or_raised_comes_back() -> None:
     assert inside == [True]
 
 
+def test_nothing_more_is_begun_that_nobody_waits_for() -> None:
+    give_up()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interruptible(lambda: 1)
+    finally:
+        take_up()
+    assert interruptible(lambda: 1) == 1
+
+
 def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the middle of a chunk of steps: what was integrated before it is kept, and resumed with the bits of
     a run in one go.
@@ -70,4 +81,24 @@ def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pyt
     never.set()
     assert run.status == "interrupted"
     assert run.summary["samples"] < 241
+    same_bits(rigidsim.resume(run.folder.path), whole)
+
+
+def test_ctrl_c_while_what_counts_turns_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While samples are handed over: those that wait are left to the next session, with the same bits."""
+    text = config(time="end = 600\nsamples = 61", output=f'record = ["euler_angles"]\n{PLAIN}')
+    whole = run_text(text, out=tmp_path / "whole")
+    assert abs(whole.dataset["euler_angles"].values).max() > 100  # turns are counted
+    never = threading.Event()
+
+    def interrupted(self: TurnCounter) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        never.wait(AWAKE)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(TurnCounter, "_build", interrupted)
+        run = run_text(text, out=tmp_path / "cut")
+    never.set()
+    assert run.status == "interrupted"
+    assert run.summary["samples"] < 61
     same_bits(rigidsim.resume(run.folder.path), whole)

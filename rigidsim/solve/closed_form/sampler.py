@@ -69,7 +69,14 @@ class ClosedFormSampler:
             times = clock.internal(first, min(first + self._rows, clock.count))
             states = self._form.states(self._system, self._precision, times, clock.start)
             progress.integration_seconds += time.perf_counter() - started
-            self._receiver.take(SampleBlock.of(first, times, states, self._begin.angles))
+            try:
+                self._receiver.take(SampleBlock.of(first, times, states, self._begin.angles))
+            except KeyboardInterrupt:  # while what counts turns was compiled
+                stop = self._check(progress)
+                if stop is None:
+                    raise
+                progress.status = stop
+                return progress
             last = self._receiver.last_wanted
             progress.next_sample = first + len(times) if last is None else last + 1
             progress.time = float(times[progress.next_sample - first - 1]) * 2.0**clock.exponent
