@@ -22,10 +22,10 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     """Tests run in code that compiles fast and rounds otherwise than that of real runs, since their
     statements hold whatever the last bit is; those marked ``optimised`` in the code of real runs.
     """
-    from support import remembered_lookups, unoptimised_code
+    from support import unoptimised_code
 
     optimised = item.get_closest_marker("optimised") is not None
-    with remembered_lookups(), nullcontext() if optimised else unoptimised_code():
+    with nullcontext() if optimised else unoptimised_code():
         return (yield)
 
 

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5netcdf
 import heyoka as hy
 import numpy as np
 import pytest
@@ -155,29 +154,6 @@ def _unoptimised(make: Callable[..., Any], most: int) -> Callable[..., Any]:
         return make(expressions, *args, **{**options, "compact_mode": not small})
 
     return made
-
-
-@contextmanager
-def remembered_lookups() -> Iterator[None]:
-    """h5netcdf looks each variable up in its file whenever it is touched, 600 times to open a small dataset,
-    which takes longer than most runs of the tests: here what was found is kept as long as its file is open.
-    """
-
-    def found(self: Any) -> Any:
-        if getattr(self, "_phony", False):
-            return None
-        file = self._root._h5file
-        if self._root._writable:
-            return file[self._h5path]
-        kept = self.__dict__.get("_kept")
-        if kept is None or kept[0] is not file or not kept[1]:
-            kept = self.__dict__["_kept"] = file, file[self._h5path]
-        return kept[1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        for kind in (h5netcdf.core.BaseObject, h5netcdf.dimensions.Dimension):
-            patch.setattr(kind, "_h5ds", property(found))
-        yield
 
 
 def cases(every: Iterable[Any], usual: Collection[Any]) -> list[Any]:

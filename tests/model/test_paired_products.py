@@ -16,8 +16,6 @@ from rigidsim.model.system import System
 from rigidsim.scene.rotations import rotation_matrix
 from rigidsim.solve.assembly import assemble
 
-pytestmark = pytest.mark.compact
-
 BODY = "principal_moments = [1, 1.75, 2]"
 SPIN = "angular_velocity = [0.4, 0.9, 0.3]\nquaternion = [0.5, 0.1, -0.3, 0.7]"
 LOOSE = "tolerance = 1e-8"
