@@ -66,7 +66,7 @@ class LineObserver(Observer):
             self._say(PHASES[name])
         self._tried, self._verb = "", "comparing with" if name == "certify" else "trying"
 
-    def nothingleft(self, why: str) -> None:
+    def nothing_left(self, why: str) -> None:
         """See ``Observer``."""
         print(NOTHING_LEFT.format(why), file=sys.stderr, flush=True)
 

@@ -67,7 +67,7 @@ class TerminalObserver(Observer):
         if name in PHASES:
             self._draw(PHASES[name])
 
-    def nothingleft(self, why: str) -> None:
+    def nothing_left(self, why: str) -> None:
         """See ``Observer``."""
         self._bar.console.print(NOTHING_LEFT.format(why), highlight=False, markup=False)
 

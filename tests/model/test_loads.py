@@ -171,7 +171,8 @@ def test_two_orbits_have_states_of_their_own() -> None:
     loads = (
         gradient(1.0, {"semi_major_axis": 1.0}) + "\n[[loads]]\n" + gradient(2.0, {"semi_major_axis": 3.0})
     )
-    states = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [0, 0, 1]", loads).system.states
+    start = "angular_velocity = [0, 0.1, 1]"
+    states = prepared("principal_moments = [1, 2, 2.5]", start, loads).system.states
     assert len(set(states)) == len(states) == 3 + 4 + 2 + 2 + 1  # and the work
 
 

@@ -24,6 +24,8 @@ from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import resume_sweep, scanned
 from rigidsim.workflows.sweep import sweep as run_sweep
 
+pytestmark = pytest.mark.optimised  # compared with runs of other processes
+
 CONFIG = """\
 name = "box"
 [body]

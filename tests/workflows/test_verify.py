@@ -21,6 +21,8 @@ from rigidsim.errors import RunFolderError
 from rigidsim.store import seal
 from rigidsim.workflows.verify import embedded
 
+pytestmark = pytest.mark.optimised  # what is edited mustn't be zero
+
 TEXT = (
     'name = "v"\n[body]\nprincipal_moments = [1, 2, 2.5]\n'
     "[initial]\nangular_velocity = [0.3, 1.0, 0.5]\n"
