@@ -169,14 +169,19 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
         )
     times = np.array(spread.times) - start
     errors = level * margins.safety * leading(spread, carried)
-    power = min(max(power_of_time(times, errors), margins.power), margins.most_power)
-    beyond = max((end - start) / times[-1], 1.0) ** power
+    longer = max((end - start) / times[-1], 1.0)
+
+    def beyond(errors: np.ndarray) -> float:
+        return float(longer ** min(max(power_of_time(times, errors), margins.power), margins.most_power))
+
+    turned = beyond(errors)
+    moved = max(turned, beyond(np.array(spread.position))) if flight else turned
 
     label = math.ldexp(_label(prepared, duration), -exponent)
     rate = math.ldexp(float(system.rate_bound), exponent)
 
     def at_end(name: str, size: float, most: float, pace: float = 0.0) -> float:
-        further = beyond * followed.more.get(name, 1.0)
+        further = (moved if name in ("position", "velocity") else turned) * followed.more.get(name, 1.0)
         found = float(max(getattr(spread, name))) * level * margins.safety * further
         known = spread.whole and math.isfinite(found)
         return float(min(found + _LAST_BITS * level * size + label * pace, most)) if known else most

@@ -1,7 +1,8 @@
 """How far a run's neighbours are followed, and what carries them: as much as the cost allows.
 
-A short run is followed to its end. Of a longer one the beginning is, and windows that are spread over the
-rest; where errors grow in any of them by more than time makes them, the whole run is followed after all.
+A run of some ten thousand steps is followed to its end. Of a longer one the beginning is, and windows that
+are spread over the rest; where errors grow in any of them by more than time makes them, the whole run is
+followed after all.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.lanes import (
     NEIGHBOURS,
+    OWN_FIRST,
+    OWN_UNTIL,
     TIGHT,
     TOLERANCE,
-    UNROLLED_FROM,
     BatchLanes,
     Lanes,
     OwnLanes,
@@ -70,13 +72,6 @@ class Course:
         return self.prepared.system.requirements.formulation != "rates"
 
     @property
-    def terms(self) -> int:
-        """Of the equations' decomposition, to which a step's cost is in proportion."""
-        if self.stepper is not None:
-            return len(self.stepper.integrator.decomposition)
-        return sum(len(right) for _, right in self.prepared.system.equations)
-
-    @property
     def own(self) -> Stepper | None:
         """The run's stepper where it can carry the neighbours."""
         single = self.prepared.system.partner is None and self.prepared.precision.name == "double"
@@ -114,8 +109,7 @@ def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Follo
 
 def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:
     part = min(1.0, _affordable(course, margins) / max(course.steps, 1))
-    passes = "x" in course.prepared.system.states and course.uneven > margins.uneven
-    if part < 1 and (passes or not _waypoints(course, part, margins)):
+    if part < 1 and not _waypoints(course, part, margins):
         part = max(part, min(1.0, margins.all_steps / course.steps))
     found, tight = _follow(course, part, TOLERANCE, margins, go_on)
     spread, steps = found.spread, course.steps
@@ -132,16 +126,18 @@ def leading(spread: Spread, carried: bool) -> np.ndarray:
 
 
 def _affordable(course: Course, margins: Margins) -> float:
-    """Steps that may be followed: those that cost next to nothing, or a small part of the run."""
+    """Steps that may be followed: so many whatever they cost, or for a small part of the run's cost."""
     if course.prepared.system.switches:
         return max(margins.switching_steps, margins.switching_share * course.steps)
     dearer = dict(margins.dearer).get(course.prepared.precision.name)
     if dearer is None:
         return course.steps
     budget = margins.share * dearer * course.steps  # in steps of double precision
-    cheap = (margins.at_any_rate if course.own is not None else margins.compiled) / course.terms
-    own = budget / (NEIGHBOURS + 1) if course.own is not None else 0.0
-    return max(cheap, own, (budget - margins.unrolling) / margins.lane)
+    if course.own is not None and not _same_states(course.prepared) and course.steps > margins.all_steps:
+        return max(margins.own_steps, budget / (NEIGHBOURS + 1))  # windows, which nothing else can look at
+    passes = "x" in course.prepared.system.states and course.uneven > margins.uneven
+    least = margins.passing_steps if passes else margins.all_steps
+    return max(least, (budget - margins.unrolling) / margins.lane)
 
 
 def _follow(
@@ -152,10 +148,16 @@ def _follow(
     waypoints = _waypoints(course, part, margins) if part < 1 else []
     first = part * margins.beginning if waypoints else part
     neighbours = interruptible(lambda: _neighbours(course, part, first, tolerance, margins))
+    # what takes long to compile only where all isn't lost soon
+    soon = OWN_FIRST / steps
+    if isinstance(neighbours.lanes, OwnLanes) and _same_states(course.prepared) and first * steps > OWN_UNTIL:
+        neighbours.follow(course.at(soon), go_on, course.lost)
+        if not neighbours.all_lost(course.lost):
+            _prepare(neighbours, steps * (first - soon), course.at(first))
     spread = neighbours.follow(course.at(first), go_on, course.lost)
     seen: list[Spread] = []
     if first < 1 and spread.whole:
-        power = margins.wary_power if steps < margins.all_steps else margins.most_power
+        power = margins.wary_power if steps < margins.wary_steps else margins.most_power
         whole = _suspicious(spread, start, carried, power)
         if not whole and waypoints:
             seen = _windows(course, neighbours, waypoints, part - first, go_on)
@@ -163,8 +165,7 @@ def _follow(
             whole = any(
                 _suspicious(s, waypoint.time, carried, margins.most_power) for s, waypoint in beginnings
             )
-        # code that takes long to compile only when all isn't lost soon
-        for stage in (UNROLLED_FROM / steps, 1.0) if whole else ():
+        for stage in (margins.stage / steps, 1.0) if whole else ():
             if first < stage <= 1 and not neighbours.all_lost(course.lost):
                 _prepare(neighbours, steps * (stage - first), course.at(stage))
                 spread, first = neighbours.follow(course.at(stage), go_on, course.lost), stage
@@ -185,7 +186,7 @@ def _prepare(neighbours: Neighbours, steps: float, end: float) -> None:
 def _waypoints(course: Course, part: float, margins: Margins) -> list[Waypoint]:
     """Where windows begin; none where the neighbours' states are others than the run's."""
     system = course.prepared.system
-    own = course.own is not None and part * course.steps < UNROLLED_FROM
+    own = course.own is not None and part * course.steps < margins.most_own_steps
     if course.waypoints is None or system.switches or not (own or _same_states(course.prepared)):
         return []
     there = course.waypoints.between(part * course.steps, course.steps)
@@ -229,7 +230,10 @@ def _suspicious(spread: Spread, start: float, carried: bool, power: float) -> bo
     """Whether errors grow with more than a power of time, or the motion couldn't be followed."""
     if not (spread.whole and spread.times):
         return not spread.whole
-    return power_of_time(np.array(spread.times) - start, leading(spread, carried)) > power
+    times, found = np.array(spread.times) - start, [leading(spread, carried)]
+    if spread.extent > 0:
+        found.append(np.array(spread.position))
+    return any(power_of_time(times, errors) > power for errors in found)
 
 
 # --- what carries them -----------------------------------------------------------------------------------
@@ -238,6 +242,13 @@ def _suspicious(spread: Spread, start: float, carried: bool, power: float) -> bo
 def _same_states(prepared: InitialValueProblem) -> bool:
     """Unless they have singularities that a loose tolerance would run into."""
     return prepared.system.requirements.formulation not in ("euler_angles", "canonical")
+
+
+def _by_itself(course: Course, part: float, tolerance: float, margins: Margins) -> bool:
+    """Whether the run's own integrator carries its neighbours, at least at first."""
+    if tolerance <= TIGHT or (part < 1 and not _same_states(course.prepared)):
+        return course.steps * part < margins.most_own_steps
+    return _same_states(course.prepared) or course.steps * part < OWN_UNTIL
 
 
 def _neighbours(course: Course, part: float, first: float, tolerance: float, margins: Margins) -> Neighbours:
@@ -254,8 +265,8 @@ def _neighbours(course: Course, part: float, first: float, tolerance: float, mar
     follows = tolerance > TIGHT or not loose(prepared)  # it is as loose as the run
     if isinstance(own, SwitchingStepper):
         lanes: Lanes = SwitchingLanes(system, course.start, course.end, course.steps, own)
-    elif own is not None and follows and steps < UNROLLED_FROM:
-        lanes = OwnLanes(system, own.integrator)
+    elif own is not None and follows and _by_itself(course, part, tolerance, margins):
+        lanes = OwnLanes(system, own.integrator, loose=_same_states(prepared))
         series = (
             SeriesErrors(system, prepared.effective_tolerance, own.integrator) if loose(prepared) else None
         )

@@ -22,16 +22,15 @@ class Margins:
             rounding, and of series that a tolerance cuts off; of the latter with canonical momenta.
         near, very_near: singular factors below which canonical momenta lose more than elsewhere.
         cut_off: of a tolerance, what a step is wrong by in motions with switching surfaces.
-        at_any_rate: steps times terms of the equations' decomposition (to which a step's cost is in
-            proportion) that are followed whatever they cost, by the run's own integrator: some 30 ms on a
-            machine that takes 3 us for a step of 66 terms; ``compiled``: by code that takes 15 to 60 ms to
-            compile.
-        all_steps: that are followed whatever they cost of flights with close passages, which windows would
-            miss, and where there are no windows.
+        all_steps: that are followed whatever they cost: some 60 to 250 ms with what is compiled for them;
+            ``passing_steps``: of flights with close passages, which windows would miss; ``own_steps``: where
+            windows can only be looked at by the run's own integrator, at a tenth of that speed;
+            ``most_own_steps``: that it takes at most.
         uneven: longest step of a flight over its shortest, from which it passes something closely.
         share: of the run's cost that may be spent, where errors grow as those of stable motions do.
         lane: cost of a step of all neighbours, unrolled, over one of the run in double precision;
             ``unrolling``: of compiling that, in such steps.
+        stage: steps of a run that is to be followed whole after all, before it is seen whether all is lost.
         switching_steps, switching_share: of a motion with switching surfaces, whose neighbours cost as much
             as itself each: steps that are followed whatever they cost, and share of the run's.
         dearer: a step in other precisions than one in double precision, roughly.
@@ -40,7 +39,8 @@ class Margins:
         between_windows: by how much more errors grow at least where states have singularities, which may be
             passed between windows.
         stable: amplification up to which a motion is as stable as the law of rounding takes it to be.
-        wary_power: of time that errors grow with in the beginning, from which ``all_steps`` are followed.
+        wary_power: of time that errors grow with in the beginning, from which runs of ``wary_steps`` at most
+            are followed whole.
         power, most_power: of time that errors grow with, at least and at most, where no more was followed.
         exponential: power of time past which growth is none.
     """
@@ -57,22 +57,25 @@ class Margins:
     near: float = 0.2
     very_near: float = 0.01
     cut_off: float = 0.1
-    at_any_rate: int = 150_000
-    compiled: int = 75_000
     all_steps: int = 20_000
+    passing_steps: int = 60_000
+    own_steps: int = 3_000
+    most_own_steps: int = 20_000
     uneven: float = 10.0
     share: float = 0.05
-    lane: float = 0.3
-    unrolling: float = 1e5
+    lane: float = 0.5
+    unrolling: float = 1.3e4
+    stage: int = 30_000
     switching_steps: int = 1000
     switching_share: float = 0.25
     windows: int = 16
-    window: int = 256
+    window: int = 128
     beginning: float = 0.6
     between_windows: float = 2.0
     dearer: tuple[tuple[str, float], ...] = (("single", 0.3), ("double", 1.0), ("extended", 10.0))
     stable: float = 4.0
     wary_power: float = 2.0
+    wary_steps: int = 100_000
     power: float = 1.5
     most_power: float = 2.5
     exponential: float = 5.0

@@ -22,9 +22,14 @@ NEIGHBOURS = 3
 TOLERANCE, TIGHT = 1e-8, 1e-14
 """The tight one where errors grow so much that a loosely followed motion is soon another one."""
 _TIGHT_UNTIL = 50_000
-UNROLLED_FROM = 30_000
-"""Steps to be taken from which code pays that takes ten times as long to compile (5 ms for each term of the
-equations' decomposition in place of 0.4 ms) and a tenth of the time to run."""
+OWN_UNTIL, OWN_FIRST = 4_000, 1_000
+"""Steps up to which the run's own integrator, called for each lane, costs less than what is compiled for all;
+and so many that it takes of longer motions, lest code is compiled for one that is lost at once."""
+UNROLLED_FROM, OPTIMISED_FROM = 3_000, 300_000
+"""Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
+terms of the equations' decomposition, four lanes, tolerance 1e-8: compact 42 and 48 ms, 10 and 22 us a step;
+unrolled 60 and 132 ms, 2.2 and 5.4 us; unrolled and optimised 315 and 860 ms, 1.3 and 3.2 us. An own
+integrator takes 18 and 48 us for four lanes."""
 _HOPELESS_STEPS = 32_768
 """In one stretch: the motion comes to no end, say towards a collision."""
 _UNEVEN, _FEW_STEPS = 2.5, 8
@@ -115,17 +120,22 @@ class BatchLanes:
 
     def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
         self._system, self.tolerance = system, tolerance
-        self._unrolled = steps >= UNROLLED_FROM
+        self._level = self._level_for(steps)
         initial = np.repeat(np.array([[float(x)] for x in system.initial]), NEIGHBOURS + 1, axis=1)
         options: dict[str, Any] = {"compact_mode": True, "opt_level": 0}
-        if self._unrolled:
-            options = {"compact_mode": system.wide, "opt_level": 1}
+        if self._level:
+            options = {"compact_mode": system.wide, "opt_level": 1 if system.wide else self._level - 1}
         self._integrator = hy.taylor_adaptive_batch(system.equations, initial, tol=tolerance, **options)
         self._even = _Evenly()
 
+    @staticmethod
+    def _level_for(steps: float) -> int:
+        """0 for compact code, 1 for unrolled, 2 for optimised."""
+        return int(steps >= UNROLLED_FROM) + int(steps >= OPTIMISED_FROM)
+
     def again(self, steps: float) -> Lanes:
         """As of ``Lanes``."""
-        if self._unrolled or steps < UNROLLED_FROM:
+        if self._level_for(steps) <= self._level:
             return self
         return BatchLanes(self._system, steps, self.tolerance)
 
@@ -158,10 +168,11 @@ class OwnLanes:
 
     Args:
         integrator: of the system, in double precision; what is used is a copy.
+        loose: whether its states bear a loose tolerance, where many more steps are to be taken.
     """
 
-    def __init__(self, system: System, integrator: Integrator) -> None:
-        self._system = system
+    def __init__(self, system: System, integrator: Integrator, *, loose: bool = True) -> None:
+        self._system, self._loose = system, loose
         self._integrator = copy.deepcopy(integrator)
         self.tolerance = float(integrator.tol)
         self._even = _Evenly()
@@ -170,7 +181,8 @@ class OwnLanes:
         """As of ``Lanes``."""
         if steps < UNROLLED_FROM:
             return self
-        return BatchLanes(self._system, steps, TIGHT if steps < _TIGHT_UNTIL else TOLERANCE)
+        tight = not self._loose and steps < _TIGHT_UNTIL
+        return BatchLanes(self._system, steps, TIGHT if tight else TOLERANCE)
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int

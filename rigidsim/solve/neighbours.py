@@ -187,6 +187,11 @@ class Neighbours:
         return other
 
     @property
+    def lanes(self) -> Lanes:
+        """Those that carry them now."""
+        return self._lanes
+
+    @property
     def tolerance(self) -> float:
         """Of their steps."""
         return self._lanes.tolerance
@@ -264,8 +269,10 @@ class Neighbours:
         """Steps taken by the motion, at most so many, and the time that it got to; None where a state isn't
         finite.
         """
-        # a rounded time is another time, for loads that depend on it
-        wrong = self._pushes.clock * abs(self._time) * self._factor
+        # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
+        # neighbours' lasts for the stretch
+        steps = min(most, self._steps_at_once * _LONGER * (time - self._time) / self._longest)
+        wrong = self._pushes.clock * abs(self._time) * self._factor / math.sqrt(max(steps, 1.0))
         shifts = np.concatenate([[0.0], wrong * self._random.standard_normal(NEIGHBOURS)])
         found = self._lanes.advance(states, self._time + shifts, time + shifts, most)
         if found is None or not np.isfinite(found[0]).all() or self.steps > self._most_steps:

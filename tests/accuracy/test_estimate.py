@@ -99,7 +99,7 @@ def test_what_part_of_a_long_run_was_examined_is_said() -> None:
         prepare(rigidsim.parse(text)),
         run.summary["cost"]["steps"],
         12000.0,
-        margins=Margins(compiled=10**9),
+        margins=Margins(all_steps=10**9),
     )
     assert whole is not None
     assert whole.share == 1
