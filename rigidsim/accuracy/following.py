@@ -133,8 +133,11 @@ def _affordable(course: Course, margins: Margins) -> float:
     if dearer is None:
         return course.steps
     budget = margins.share * dearer * course.steps  # in steps of double precision
-    if course.own is not None and not _same_states(course.prepared) and course.steps > margins.all_steps:
-        return max(margins.own_steps, budget / (NEIGHBOURS + 1))  # windows, which nothing else can look at
+    if course.own is not None and not _same_states(course.prepared):
+        canonical = course.prepared.system.requirements.formulation == "canonical"
+        if course.steps > (margins.canonical_steps if canonical else margins.all_steps):
+            # windows, which nothing else can look at
+            return max(margins.own_steps, budget / (NEIGHBOURS + 1))
     passes = "x" in course.prepared.system.states and course.uneven > margins.uneven
     least = margins.passing_steps if passes else margins.all_steps
     return max(least, (budget - margins.unrolling) / margins.lane)
@@ -248,6 +251,8 @@ def _by_itself(course: Course, part: float, tolerance: float, margins: Margins) 
     """Whether the run's own integrator carries its neighbours, at least at first."""
     if tolerance <= TIGHT or (part < 1 and not _same_states(course.prepared)):
         return course.steps * part < margins.most_own_steps
+    if course.prepared.system.requirements.formulation == "canonical":
+        return course.steps * part <= margins.canonical_steps
     return _same_states(course.prepared) or course.steps * part < OWN_UNTIL
 
 
