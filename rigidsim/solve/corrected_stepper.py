@@ -12,6 +12,8 @@ grid output, which starts at such a time only. The move back to it is a step of 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rigidsim.scene.records import dataclass
@@ -123,13 +125,16 @@ class CorrectedStepper:
 
     def skip(self, count: int) -> bool:
         """``count`` steps without dense output, fewer where they collapse; False when the state is no longer
-        finite.
+        finite. The stepper's smallest and largest step are those of all.
         """
+        stepper, smallest, largest = self.stepper, math.inf, 0.0
         while count > 0 and not self.collapsed:
-            before = self.stepper.steps
-            if not self.stepper.skip(min(count, self.left)):
+            before = stepper.steps
+            if not stepper.skip(min(count, self.left)):
                 return False
-            count -= self.stepper.steps - before
+            smallest, largest = min(smallest, stepper.smallest), max(largest, stepper.largest)
+            stepper.smallest, stepper.largest = smallest, largest
+            count -= stepper.steps - before
             self.correct()
         return True
 
