@@ -53,6 +53,17 @@ DESPUN = scene(
     GRADIENT + '\n[[loads]]\nkind = "viscous_torque"\ncoefficients = [2e-4, 2e-4, 2e-4]',
 )
 """Regular while it spins eight times as fast as it revolves; after some 7000 s it doesn't any more."""
+BETWEEN = config(
+    "principal_moments = [4.153831768815532, 4.508888882583331, 4.233234316802411]\n"
+    "mass = 26846.303674218994",
+    "angular_velocity = [27.403224402397694, 16.294633117157524, -0.5547153409327604]\n"
+    "quaternion = [0.8418996848010685, 0.20228532617467565, -0.17039004206190994, 0.4703751705951401]",
+    """kind = "gravity_gradient"
+gravitational_parameter = 1551899.2258982374
+orbit = {semi_major_axis = 12.438906476777744, eccentricity = 0.29373991123843773, inclination = 1.2990489261368354, mean_anomaly = 5.858863371572157}""",  # noqa: E501
+    "end = 22.174763311466613\nsamples = 2",
+)
+"""In 3185 steps; errors begin to grow after the first third."""
 COMET = config(
     "principal_moments = [1, 1.3, 1.6]\nmass = 1",
     "angular_velocity = [1e-3, 2e-3, 3e-3]\nposition = [100, 0, 0]\nvelocity = [0, 0.022, 0.008]",
@@ -68,6 +79,16 @@ def test_chaos_that_sets_in_late_leaves_no_digits() -> None:
     assert accuracy["estimated_attitude_error"] == pytest.approx(np.pi)
     assert 100 < accuracy["predictable_seconds"] < 2000
     assert "attitude_uncertain" in run.summary["warning_codes"]
+
+
+@pytest.mark.slow
+def test_growth_that_sets_in_between_windows_is_seen() -> None:
+    """Announced at 1.6e-12 by a fifth of the run and one window, 9.4e-9 off."""
+    run = run_text(BETWEEN)
+    accuracy, true = run.summary["accuracy"], true_error(run, BETWEEN)
+    assert true > 1e-9
+    assert true <= COVERED * accuracy["estimated_attitude_error"] <= COVERED * HONEST * true
+    assert accuracy["examined_share"] == 1
 
 
 @pytest.mark.slow
