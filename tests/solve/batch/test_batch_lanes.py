@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import EPSILON, cases
-from test_families import FREE, ORBIT, PLANAR, TOP, TORQUE, swept
+from test_batch_families import FREE, ORBIT, PLANAR, TOP, TORQUE, swept
 
 import rigidsim
 from rigidsim.scene.sweep import Sweep
