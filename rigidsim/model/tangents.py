@@ -76,21 +76,25 @@ def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
         name: set(hy.get_variables(right)) for name, right in zip(whole.names, whole.derivatives, strict=True)
     }
     moving = moving_names(own, reads)
-    equations = list(zip(variables, whole.derivatives, strict=True))
-    first = variables[whole.names.index(own[0])]
+    # what the offset doesn't reach is constant to it: an orbit's place, numbers that differ between members
+    places = [n for n, name in enumerate(whole.names) if name in moving]
+    others = sorted({name for n in places for name in reads[whole.names[n]]} - moving)
+    constants = {hy.make_vars(name): hy.par[n] for n, name in enumerate(others)}
+    rights = [whole.derivatives[n] for n in places]
+    rights = hy.subs(rights, constants) if constants else rights
     # the derivative by one initial value obeys the equations that any tangent vector does
-    varied = hy.var_ode_sys(equations, [first]).sys[len(variables) :]
-    names = {old: name for (old, _), name in zip(varied, whole.names, strict=True)}
+    equations = [(variables[n], right) for n, right in zip(places, rights, strict=True)]
+    varied = hy.var_ode_sys(equations, [variables[whole.names.index(own[0])]]).sys[len(places) :]
+    names = [whole.names[n] for n in places]
     to: dict[Symbolic, Symbolic] = {
-        old: hy.make_vars(TANGENT + name) if name in moving else hy.expression(0.0)
-        for old, name in names.items()
+        old: hy.make_vars(TANGENT + name) for (old, _), name in zip(varied, names, strict=True)
     }
-    kept = [(name, hy.subs(right, to)) for (_, right), name in zip(varied, whole.names, strict=True)]
+    to |= {constant: variable for variable, constant in constants.items()}
     start = _direction(m, own)
     return StateBlock(
-        [TANGENT + name for name, _ in kept if name in moving],
-        [right for name, right in kept if name in moving],
-        [start.get(name, m.scene.context.zero) for name, _ in kept if name in moving],
+        [TANGENT + name for name in names],
+        [hy.subs(right, to) for _, right in varied],
+        [start.get(name, m.scene.context.zero) for name in names],
         exponents=[e for name, e in zip(whole.names, whole.unit_exponents, strict=True) if name in moving],
         why=f"{GROWTH}: a displacement, so small that no step of the motion knows of it",
     )
@@ -129,7 +133,8 @@ def _growth(m: Mechanics) -> list[Symbolic]:
     names = own_names(m)
     terms = []
     for name, weight in zip(names, _weights(m, names), strict=True):
-        scaled = 2.0 ** (SMALL + weight) * hy.make_vars(TANGENT + name)
+        unit = m.number(m.scene.context.ldexp(m.scene.context.one, SMALL + weight))
+        scaled = unit * hy.make_vars(TANGENT + name)
         terms.append(scaled * scaled)
     growth = 0.5 * hy.log(hy.sum(terms))
     lost = hy.log(hy.expression(-1.0))

@@ -45,7 +45,8 @@ class EventExpressions:
 
     @cached_property
     def _function(self) -> Any:
-        variables = [*self._traced.system.variables, *self._traced.parameters.variables]
+        moving = self._traced.system.variables[: self._traced.moving]
+        variables = [*moving, *self._traced.parameters.variables]
         return compiled_function(self._meant, variables, compact_mode=True)
 
     def values(
@@ -54,7 +55,8 @@ class EventExpressions:
         """Their parameters, (2 * events, members).
 
         Args:
-            initial: (states, members); swept: (parameters, members); start, end: (members,), internal units.
+            initial: of the motion, (states, members); swept: (parameters, members); start, end: (members,),
+                internal units.
         """
         members = initial.shape[1]
         found = np.zeros((self.parameters, members))

@@ -71,6 +71,16 @@ class Lanes:
         parts = (self.finite[back], self.arrived[back], self.steps[back])
         return Lanes(np.ascontiguousarray(self.states[:, :, back]), *parts, found)
 
+    def put(self, places: np.ndarray, others: Lanes) -> None:
+        """How some fared, in place of what was known of them."""
+        self.states[:, :, places] = others.states
+        for mine, theirs in (
+            (self.finite, others.finite),
+            (self.arrived, others.arrived),
+            (self.steps, others.steps),
+        ):
+            mine[places] = theirs
+
 
 @dataclass(frozen=True)
 class BatchSystem:

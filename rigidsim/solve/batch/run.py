@@ -6,24 +6,20 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from rigidsim.model.outputs import Recorded
 from rigidsim.solve.batch.events import EventExpressions
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem, Lanes, recommended_width
-from rigidsim.solve.compiled import compiled_function
-from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.batch.lanes import Lanes, recommended_width
+from rigidsim.solve.batch.motion import BatchMotion
+from rigidsim.solve.batch.outputs import BatchOutputs, Values
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
 _VALUES_AT_ONCE = 4_000_000
 """Of samples, evaluated together."""
-_GROUP = 64  # a multiple of every SIMD width: padded to it, a column's bits don't depend on its place
 _MOST_STEPS = 10_000
 _STEPS_PER_UNIT = 200.0
 """A natural step is of the order of one internal unit of time. A lane that takes so many more is given up
@@ -31,8 +27,6 @@ here, before it holds the others any longer, and run by itself."""
 
 DRIFT_FACTOR = 50.0
 """As of ``rigidsim.accuracy.error_law``."""
-
-Values = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -97,32 +91,8 @@ class BatchRun:
         self._precision = precision_of("double")
         self._clocks: dict[int, SampleClock] = {}
         self._crossings = EventExpressions(family.traced)
-
-    @cached_property
-    def _engine(self) -> BatchEngine:
-        traced = self._traced
-        rights = traced.as_parameters([right for _, right in self._system.equations])
-        tolerance = traced.prepared.tolerance
-        described = BatchSystem(
-            list(zip(self._system.variables, rights, strict=True)),
-            self._crossings.over_parameters(),
-            len(traced.in_equations) + self._crossings.parameters,
-            None if tolerance is None else float(tolerance),
-            self._system.wide,
-        )
-        return BatchEngine(described, self.width)
-
-    def _compiled(self, expressions: list[Any]) -> CompiledFunction:
-        variables = [*self._system.variables, *self._traced.parameters.variables]
-        return compiled_function(expressions, variables, compact_mode=self._system.wide, fp_type=float)
-
-    @cached_property
-    def _outputs(self) -> CompiledFunction:
-        return self._compiled(self._system.outputs)
-
-    @cached_property
-    def _components(self) -> list[Any]:
-        return [x for invariant in self._system.invariants for x in invariant.expressions]
+        self._motion = BatchMotion(family.traced, self._crossings, self.width)
+        self._outputs = BatchOutputs(family.traced)
 
     def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:
         """Run members, as many at a time as memory takes.
@@ -143,20 +113,23 @@ class BatchRun:
         swept = numbers.parameters[:, part]
         units = numbers.whole_numbers(self._system.scaling.time)[part]
         start, times = self._times(units)
+        moving = initial[: self._traced.moving]
         parameters = np.concatenate(
-            [swept[self._traced.in_equations], self._crossings.values(initial, swept, start, times[-1])]
+            [swept[self._traced.in_equations], self._crossings.values(moving, swept, start, times[-1])]
         )
         most = self._most_steps(start, times)
         # those that take about as many steps side by side: none waits for long
         order = np.argsort(numbers.doubles(self._system.rate_bound)[part], kind="stable")
-        lanes = self._engine.run(
+        lanes, along = self._motion.run(
             initial[:, order], parameters[:, order], start[order], times[:, order], most
-        ).placed(order)
+        )
+        lanes = lanes.placed(order)
+        if along is not None:
+            along = np.ascontiguousarray(along[:, :, np.argsort(order)])
         states, steps = lanes.states, lanes.steps
-        begun = self._evaluated(self._components, initial[None], swept, start[None])[:, 0]
-        values_of = self._evaluated(self._system.outputs, states, swept, times, begun)
-        values, drifts = self._named(values_of, numbers, part)
-        self._join(values, numbers, part)
+        begun = self._outputs.begun(moving, swept, start)
+        values_of = self._outputs.at(states, swept, times, begun, along)
+        values, drifts = self._outputs.named(values_of, numbers, part)
         finite = np.isfinite(states).all(axis=1)
         reached = np.where(finite.all(axis=0), len(times), np.argmin(finite, axis=0))
         block = BatchBlock(
@@ -212,68 +185,6 @@ class BatchRun:
             spacing = max((b - a for a, b in pairs), default=Fraction(0))
         return numbers.doubles(self._system.rate_bound)[part] * float(spacing)
 
-    # --- evaluation -----------------------------------------------------------------------------------------
-
-    def _evaluated(
-        self,
-        expressions: list[Any],
-        states: np.ndarray,
-        swept: np.ndarray,
-        times: np.ndarray,
-        begun: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """Values (expressions, samples, m).
-
-        Args:
-            states: (samples, states, m); times: (samples, m), internal units.
-            begun: initial values of the invariants' components, (components, m).
-        """
-        samples, _, m = states.shape
-        if not expressions:
-            return np.empty((0, samples, m))
-        function: Any = self._compiled(expressions)
-        columns = samples * m
-        padded = -(-columns // _GROUP) * _GROUP
-
-        def spread(table: np.ndarray) -> np.ndarray:
-            """From (k, m) to (k, padded), the same for all samples."""
-            return _padded(np.broadcast_to(table[:, None], (len(table), samples, m)), padded)
-
-        inputs = np.concatenate([_padded(states.transpose(1, 0, 2), padded), spread(swept)])
-        arguments = {}
-        if function.is_time_dependent:
-            arguments["time"] = _padded(times[None], padded)[0]
-        if function.nparams and begun is not None:
-            arguments["pars"] = spread(begun)
-        found = np.asarray(function(np.ascontiguousarray(inputs), **arguments))
-        return found[:, :columns].reshape(len(expressions), samples, m)
-
-    def _named(self, found: np.ndarray, numbers: Numbers, part: slice) -> tuple[Values, Values]:
-        values: Values = {}
-        for variable in self._system.recorded:
-            columns = [
-                _to_si(found[variable.first + k], numbers, variable.exponents[k], part)
-                for k in range(variable.count)
-            ]
-            values[variable.name] = np.stack(columns, axis=2)
-        first = len(self._system.outputs) - len(self._system.invariants)
-        drifts = {
-            f"{invariant.name}_drift": found[first + n] for n, invariant in enumerate(self._system.invariants)
-        }
-        return values, drifts
-
-    def _join(self, values: Values, numbers: Numbers, part: slice) -> None:
-        """Give each quaternion the sign nearest to the one before, as in a single run."""
-        for variable in self._system.recorded:
-            if variable.continuity != "nearest":
-                continue
-            block = values[variable.name]
-            begin = [numbers.doubles(x)[part] for x in self._traced.system.scene.quaternion]
-            before = np.concatenate([np.stack(begin, axis=1)[None], block[:-1]])
-            products = np.einsum("smc,smc->sm", block, before)
-            signs = np.cumprod(np.where(products < 0, -1.0, 1.0), axis=0)
-            block *= signs[:, :, None]
-
     # --- events and guards ----------------------------------------------------------------------------------
 
     def _events(
@@ -294,14 +205,8 @@ class BatchRun:
             values: Values = {}
             if rows:
                 states = np.array([f.state for _, f in rows]).T[None]
-                at = self._evaluated(
-                    self._system.outputs, states, swept[:, place], times[None], begun[:, place]
-                )
-                chosen = part.start + place
-                values = {
-                    variable.name: _at_events(variable, at, numbers, chosen)
-                    for variable in self._system.recorded
-                }
+                at = self._outputs.at(states, swept[:, place], times[None], begun[:, place])
+                values = self._outputs.named_at_events(at, numbers, part.start + place)
             seconds = np.ldexp(times, units[place]) if rows else times
             events.append(BatchEvents(crossing.name, place, seconds, values))
         return events
@@ -338,27 +243,3 @@ def _end(block: BatchBlock, member: int, samples: int) -> None:
     block.reached[member] = samples
     for values in (*block.values.values(), *block.drifts.values()):
         values[samples:, member] = np.nan
-
-
-def _padded(table: np.ndarray, columns: int) -> np.ndarray:
-    """From (k, samples, m) to (k, columns), the last column repeated."""
-    if not len(table):
-        return np.empty((0, columns))
-    flat = table.reshape(len(table), -1)
-    if flat.shape[1] == columns:
-        return flat
-    return np.concatenate([flat, np.repeat(flat[:, -1:], columns - flat.shape[1], axis=1)], axis=1)
-
-
-def _to_si(values: np.ndarray, numbers: Numbers, exponent: Any, part: slice) -> np.ndarray:
-    if isinstance(exponent, int):
-        return np.ldexp(values, exponent) if exponent else values
-    return np.ldexp(values, numbers.whole_numbers(exponent)[part])
-
-
-def _at_events(variable: Recorded, at: np.ndarray, numbers: Numbers, chosen: np.ndarray) -> np.ndarray:
-    columns = [
-        np.ldexp(at[variable.first + k, 0], numbers.whole_numbers(variable.exponents[k])[chosen])
-        for k in range(variable.count)
-    ]
-    return np.stack(columns, axis=1)

@@ -11,6 +11,7 @@ import heyoka as hy
 
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.scaling import Drive
+from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import Experiment
@@ -71,9 +72,14 @@ class TracedSystem:
     graph: Graph
 
     @cached_property
+    def moving(self) -> int:
+        """How many of the states are the motion's: those of a tangent vector come after them."""
+        return sum(not name.startswith(TANGENT) for name in self.system.states)
+
+    @cached_property
     def in_equations(self) -> list[int]:
-        """Which of the parameters the equations, and events, read."""
-        expressions = [right for _, right in self.system.equations]
+        """Which of the parameters the motion's equations, and events, read."""
+        expressions = [right for _, right in self.system.equations[: self.moving]]
         expressions += [crossing.expression for crossing in self.system.crossings]
         read = {name for x in expressions for name in hy.get_variables(hy.expression(x))}
         return [k for k, v in enumerate(self.parameters.variables) if str(v) in read]

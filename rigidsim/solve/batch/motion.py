@@ -1,0 +1,114 @@
+"""Members' motions, and beside them their tangent vectors, which move no bit of them.
+
+The motion's numbers are always those of an integrator without tangent vectors. Compiled along with them its
+equations may be rounded otherwise; where a system is small they aren't, and one integrator does for both:
+some lanes of each block are taken by both, and where these differ in any bit, or a vector has grown so far
+that steps would know of it, the motion is taken from the integrator without.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from rigidsim.model.tangents import LARGEST, SMALL
+from rigidsim.solve.batch.events import EventExpressions
+from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem, Lanes
+from rigidsim.solve.batch.tracing import TracedSystem
+
+_LARGEST = float(np.exp(LARGEST - SMALL * np.log(2.0)))
+"""Of a vector's components, up to which no step knows of it."""
+
+
+class BatchMotion:
+    """The integrators of a traced system.
+
+    Args:
+        crossings: its events.
+        width: lanes of the integrators.
+    """
+
+    def __init__(self, traced: TracedSystem, crossings: EventExpressions, width: int) -> None:
+        self._traced, self._crossings, self._width = traced, crossings, width
+        self._tangents = len(traced.system.states) > traced.moving
+        planar = traced.system.requirements.formulation == "planar"
+        self._may_share = self._tangents and planar and not traced.system.crossings
+
+    @cached_property
+    def _plain(self) -> BatchEngine:
+        return self._engine(self._traced.moving, with_events=True)
+
+    @cached_property
+    def _along(self) -> BatchEngine:
+        return self._engine(len(self._traced.system.states), with_events=False)
+
+    def _engine(self, states: int, *, with_events: bool) -> BatchEngine:
+        system, tolerance = self._traced.system, self._traced.prepared.tolerance
+        rights = self._traced.as_parameters([right for _, right in system.equations[:states]])
+        described = BatchSystem(
+            list(zip(system.variables[:states], rights, strict=True)),
+            self._crossings.over_parameters() if with_events else [],
+            len(self._traced.in_equations) + (self._crossings.parameters if with_events else 0),
+            None if tolerance is None else float(tolerance),
+            system.wide,
+        )
+        return BatchEngine(described, self._width)
+
+    def run(
+        self,
+        initial: np.ndarray,
+        parameters: np.ndarray,
+        start: np.ndarray,
+        times: np.ndarray,
+        most_steps: int,
+    ) -> tuple[Lanes, np.ndarray | None]:
+        """Take members to their last samples.
+
+        Args:
+            initial: (states, members), tangent vectors included; parameters: (parameters, members), those of
+                events after those of the equations.
+            start: (members,), times: (samples, members), internal units.
+            most_steps: that one may take.
+
+        Returns:
+            the motion's lanes, and the states of motion and tangent vector, (samples, states, members); None
+            where the scene has none.
+        """
+
+        moving = self._traced.moving
+
+        def plain(which: np.ndarray) -> Lanes:
+            return self._plain.run(
+                initial[:moving, which], parameters[:, which], start[which], times[:, which], most_steps
+            )
+
+        everybody = np.arange(initial.shape[1])
+        if not self._tangents:
+            return plain(everybody), None
+        read = parameters[: len(self._traced.in_equations)]
+        along = self._along.run(initial, read, start, times, most_steps)
+        if not self._may_share:
+            return plain(everybody), along.states
+        tried = np.unique(np.linspace(0, len(everybody) - 1, self._width).astype(np.int64))
+        motion = replace(along, states=along.states[:, :moving].copy())
+        if not _same_bits(plain(tried), motion, tried):
+            return plain(everybody), along.states
+        large = ~(np.abs(along.states[:, moving:]) < _LARGEST).all(axis=(0, 1))
+        again = np.flatnonzero(large | ~along.arrived | ~along.finite)
+        if len(again):
+            motion.put(again, plain(again))
+        return motion, along.states
+
+
+def _same_bits(some: Lanes, whole: Lanes, which: np.ndarray) -> bool:
+    """Whether members fared the same in both.
+
+    Args:
+        which: of the whole, in the order of the others.
+    """
+    there = np.ascontiguousarray(whole.states[:, :, which])
+    return np.ascontiguousarray(some.states).tobytes() == there.tobytes() and bool(
+        (some.steps == whole.steps[which]).all()
+    )

@@ -1,0 +1,81 @@
+"""Growth of tangent vectors beside members that run side by side: no bit of the motion moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from test_families import FREE, ORBIT, PLANAR, TORQUE, swept
+from test_lanes import blocks_of, by_member
+
+import rigidsim
+from rigidsim.solve.batch import motion
+from rigidsim.solve.batch.lanes import BatchEngine, Lanes, recommended_width
+
+RATES = {"initial.angular_velocity[2]": "uniform = [0.3, 2.2], count = 9"}
+
+
+def growing(text: str) -> str:
+    """The same with the growth recorded, between others."""
+    return text.replace('["angular_velocity", ', '["angular_velocity", "tangent_growth", ')
+
+
+def motions(text: str, axes: dict[str, str]) -> dict[int, Any]:
+    """Bits of all that is recorded of members but the growth, which is apart; steps and status."""
+    found = {}
+    for member, (values, *rest) in by_member(blocks_of(swept(text, axes))).items():
+        growth = values.pop("tangent_growth", None)
+        found[member] = ({name: table.tobytes() for name, table in values.items()}, rest), growth
+    return found
+
+
+@pytest.mark.parametrize(
+    ("text", "axes"),
+    [
+        (PLANAR, RATES),
+        (FREE, RATES),
+        pytest.param(PLANAR.replace("samples = 5", "samples = 2"), RATES, marks=pytest.mark.slow),
+        pytest.param(ORBIT, RATES | {"body.principal_moments[0]": "uniform = [0.5, 1], count = 9"},
+                     marks=pytest.mark.slow),
+        pytest.param(TORQUE, {"parameters.k": "uniform = [0.05, 0.3], count = 9"}, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_the_motion_has_the_same_bits_with_and_without(text: str, axes: dict[str, str]) -> None:
+    without, along = motions(text, axes), motions(growing(text), axes)
+    assert len(along) == 9
+    for member, (bits, growth) in along.items():
+        assert bits == without[member][0]
+        assert growth.shape == (len(growth), 1)
+        assert np.isfinite(growth).all()
+    sweep = swept(growing(text), axes)
+    single = rigidsim.run(sweep.experiment_of(4), changes={"output.estimate": False}, out=None).dataset
+    np.testing.assert_allclose(along[4][1][:, 0], single.tangent_growth.values, rtol=0, atol=1e-9)
+
+
+def test_one_integrator_does_for_both_only_where_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of planar members: those of large vectors are run without, and all where bits differ."""
+    taken: list[tuple[int, int]] = []
+    plain = BatchEngine.run
+
+    def counted(self: BatchEngine, initial: np.ndarray, *arguments: Any) -> Lanes:
+        taken.append(initial.shape)
+        return plain(self, initial, *arguments)
+
+    monkeypatch.setattr(BatchEngine, "run", counted)
+    usual = motions(growing(PLANAR), RATES)
+    whole, tried = (7, 9), (5, recommended_width())  # angle, spin, an orbit's place, work; the vector's two
+    assert taken == [whole, tried]
+    taken.clear()
+    growth = np.array([g[:, 0] for _, g in usual.values()]).max(axis=1)
+    monkeypatch.setattr(motion, "_LARGEST", np.exp(np.median(growth)) * 2.0**-900)
+    assert motions(growing(PLANAR), RATES).keys() == usual.keys()
+    assert taken[:2] == [whole, tried]
+    assert 0 < taken[2][1] < 9
+    monkeypatch.setattr(motion, "_same_bits", lambda *_: False)
+    taken.clear()
+    again = motions(growing(PLANAR), RATES)
+    assert taken == [whole, tried, (5, 9)]
+    for member, (bits, growth) in again.items():
+        assert bits == usual[member][0]
+        assert (growth == usual[member][1]).all()
