@@ -75,6 +75,8 @@ orbit = {{semi_major_axis = 1, eccentricity = "0.1"}}
 [time]
 end = {end}
 samples = {samples}
+[integrator]
+formulation = "quaternion"
 [output]
 record = ["angular_velocity", "quaternion"]
 """.replace("RATIOS", str(list(PRESETS["hyperion"].ratios)))

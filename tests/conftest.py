@@ -24,7 +24,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     """
     from support import unoptimised_code
 
-    optimised = item.get_closest_marker("optimised") is not None
+    optimised = any(item.get_closest_marker(name) for name in ("optimised", "slow"))  # long runs step long
     with nullcontext() if optimised else unoptimised_code():
         return (yield)
 
