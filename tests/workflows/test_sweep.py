@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 import rigidsim
 from rigidsim.cli.app import app
 from rigidsim.errors import ConfigError, RunFolderError
+from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
 from rigidsim.store.sweep_folder import SweepFolder
 from rigidsim.store.sweep_generation import Work, ranges_of
 from rigidsim.store.sweep_run import open_sweep
@@ -376,3 +377,19 @@ def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: P
     assert killer.killed
     expected = open_sweep(folder).dataset.angular_velocity_final
     np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
+
+
+def test_every_kept_quantity_can_be_drawn(folder: Path) -> None:
+    """A map has the values of the dataset, in the order of its axes, and labels with units."""
+    with open_sweep(folder).dataset as dataset:
+        names = drawable(dataset)
+        assert {"angular_velocity_final", "energy_mean", "middle_first"} <= set(names)
+        for name in names:
+            assert sweep_figure(dataset, name).axes
+        axes = sweep_figure(dataset, "angular_velocity_final[1]").axes[0]
+        (mesh,) = axes.collections
+        shown = np.sort(np.asarray(mesh.get_array()).ravel())
+        np.testing.assert_allclose(shown, np.sort(dataset.angular_velocity_final.values[..., 1].ravel()))
+        assert "rad/s" in axes.get_xlabel() + axes.get_ylabel()
+        with pytest.raises(ValueError, match="is nothing that this sweep kept; allowed: "):
+            sweep_figure(dataset, "velocity")

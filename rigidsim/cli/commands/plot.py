@@ -31,13 +31,17 @@ def plot(
         ),
     ] = None,
 ) -> None:
-    """Draw the page that suits the scene, or the figures named."""
+    """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes."""
     from rigidsim.look.figures import available, check_name, figure_format, save_figure
     from rigidsim.look.spectrum import save_spectrum
     from rigidsim.store import atomic
     from rigidsim.store.run import open_run
+    from rigidsim.store.sweep_folder import is_sweep
     from rigidsim.workflows.analyse import analyse
 
+    if is_sweep(run_path):
+        _plot_sweep(run_path, what, out)
+        return
     opened = open_run(run_path)
     wanted = list(dict.fromkeys(what or [OVERVIEW]))
     try:
@@ -70,6 +74,36 @@ def plot(
         except OSError as error:
             why = error.strerror or error
             raise RigidsimError(f"{target}: can't be written: {why}; choose another --out") from None
+
+
+def _plot_sweep(run_path: Path, what: list[str] | None, out: Path | None) -> None:
+    """Variables of a sweep over its axes."""
+    from rigidsim.look.figures.saving import figure_format
+    from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
+    from rigidsim.store import atomic
+    from rigidsim.store.sweep_run import open_sweep
+
+    found = open_sweep(run_path)
+    several = what is not None and (len(what) > 1 or ALL in what)
+    if several and out is not None and not out.is_dir():
+        raise RigidsimError(f"{out}: several figures need a folder that is there; give one as --out, or none")
+    with found.dataset as dataset:
+        wanted: list[str | None] = [*what] if what else [None]
+        if ALL in wanted:
+            wanted = [*drawable(dataset)]
+        for name in wanted:
+            own = "figure.png" if name is None else f"figure_{name.replace('[', '_').replace(']', '')}.png"
+            target = found.folder.path / own if out is None else (out / own if several else out)
+            try:
+                file_format = figure_format(target)
+                with atomic.replacing(target) as new:
+                    save_sweep_figure(dataset, new, name, file_format=file_format)
+            except ValueError as error:
+                raise RigidsimError(f"plot: {error}") from None
+            except OSError as error:
+                why = error.strerror or error
+                raise RigidsimError(f"{target}: can't be written: {why}; choose another --out") from None
+            print(target)
 
 
 plot.__doc__ = f"""{plot.__doc__}

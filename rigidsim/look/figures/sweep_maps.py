@@ -1,0 +1,324 @@
+"""Figures of a sweep: lines along one axis, a map over two, points of a section.
+
+What is drawn is a variable of the dataset: one number of each member. A vector has a line for each component,
+or the map of one of them. Where the members have more axes than two, the others are cut at their first value,
+and the page says so.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.figures.style import GREY, MOST_VECTOR_POINTS, PALE, PALETTE, STYLE, blank, key, titled
+from rigidsim.look.plots import pretty_unit
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+INDICATORS = ("megno", "fli", "lyapunov")
+_ALWAYS = ("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error")
+_BESIDE = ("failed_member", "failed_reason")
+_LAST = ("_drift_largest", "_drift_final", "_time", "_times", "_count")
+_SECTION = "_occurrence"  # dimension of the points of a section
+_DECADES = 1.5  # from which on values of one sign have a logarithmic scale
+_MOST_LINES = 16
+_MOST_POINTS = 400_000
+
+
+def drawable(dataset: xarray.Dataset) -> list[str]:
+    """Names that a sweep's figure can show, the one that it shows by default first."""
+    axes = _axes(dataset)
+    found = [
+        str(name)
+        for name, variable in dataset.data_vars.items()
+        if set(axes) <= set(map(str, variable.dims))
+        and variable.dtype.kind in "fi"
+        and not {"time", "sample"} & set(map(str, variable.dims))
+        and name not in _BESIDE
+    ]
+    return sorted(found, key=lambda name: (_rank(dataset, name), found.index(name)))
+
+
+def _rank(dataset: xarray.Dataset, name: str) -> int:
+    if name in INDICATORS:
+        return INDICATORS.index(name)
+    if name in _ALWAYS:
+        return 30 + _ALWAYS.index(name)
+    if any(str(dim).endswith(_SECTION) for dim in dataset[name].dims):
+        return 12
+    return 20 if name.endswith(_LAST) else 10
+
+
+def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
+    """A sweep's page: one variable over its axes.
+
+    Args:
+        dataset: of a sweep, lazy or not.
+        what: name of the variable, with ``[INDEX]`` for one component; by default the first indicator, else
+            the first quantity that was kept.
+
+    Raises:
+        ValueError: no such variable; names those there are.
+    """
+    from matplotlib import rc_context
+
+    names = drawable(dataset)
+    name, component = _asked(names, what)
+    variable = dataset[name]
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        if any(str(dim).endswith(_SECTION) for dim in variable.dims):
+            return _points(dataset, variable)
+        axes, cut, said = _cut(dataset, variable)
+        if component is not None:
+            cut, said = _component(cut, axes, component, said)
+        if len(axes) == 1:
+            return _lines(dataset, cut, axes[0], said)
+        return _map(dataset, cut, axes, said)
+
+
+def _asked(names: list[str], what: str | None) -> tuple[str, int | None]:
+    if what is None:
+        return names[0], None
+    name, bracket, index = what.partition("[")
+    if name not in names or (bracket and not index.removesuffix("]").isdigit()):
+        raise ValueError(
+            f"{what!r} is nothing that this sweep kept; allowed: {', '.join(names)}, of a vector "
+            "with [0], [1] ... for one component"
+        )
+    return name, int(index.removesuffix("]")) if bracket else None
+
+
+def _axes(dataset: xarray.Dataset) -> list[str]:
+    """Dimensions of the members."""
+    names = [str(dim) for dim in dataset["status"].dims]
+    return names
+
+
+def _cut(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[list[str], xarray.DataArray, str]:
+    """At most two axes of more than one value: the longest; the others are cut where they begin."""
+    axes = _axes(dataset)
+    longest = sorted(axes, key=lambda dim: -dataset.sizes[dim])[:2]
+    kept = [dim for dim in axes if dim in longest and dataset.sizes[dim] > 1] or axes[:1]
+    said = []
+    for dim in axes:
+        if dim not in kept:
+            value = dataset[dim].values[0] if dim in dataset.coords else 0
+            said.append(f"{dim} = {value if isinstance(value, str) else format(float(value), '.4g')}")
+            variable = variable.isel({dim: 0})
+    return kept, variable, ", ".join(said)
+
+
+def _component(cut: xarray.DataArray, axes: list[str], index: int, said: str) -> tuple[xarray.DataArray, str]:
+    extra = [str(dim) for dim in cut.dims if dim not in axes]
+    count = math.prod(cut.sizes[dim] for dim in extra)
+    if index >= count:
+        raise ValueError(f"{cut.name} has the components 0 to {count - 1}, given {index}")
+    places = np.unravel_index(index, [cut.sizes[dim] for dim in extra]) if extra else ()
+    words = [said] if said else []
+    for dim, place in zip(extra, places, strict=True):
+        words.append(f"{dim.replace('_', ' ')} {_label(cut, dim, int(place))}")
+        cut = cut.isel({dim: int(place)})
+    return cut, ", ".join(words)
+
+
+def _label(variable: xarray.DataArray, dim: str, place: int) -> str:
+    return str(variable.coords[dim].values[place]) if dim in variable.coords else str(place)
+
+
+# --- one axis: lines ----------------------------------------------------------------------------------------
+
+
+def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str) -> Figure:
+    figure = blank(dataset, 9.0, 4.4)
+    axes = figure.add_subplot()
+    place, label = _along(dataset, axis)
+    values = np.asarray(cut.transpose(axis, ...).values, dtype=np.float64).reshape(len(place), -1)
+    extra = [str(dim) for dim in cut.dims if dim != axis]
+    labels = [
+        " ".join(parts)
+        for parts in product(*([_label(cut, d, i) for i in range(cut.sizes[d])] for d in extra))
+    ]
+    order = np.argsort(place, kind="stable")
+    few = len(place) <= 100
+    for column in range(min(values.shape[1], _MOST_LINES)):
+        axes.plot(
+            place[order], values[order, column], color=PALETTE[column % len(PALETTE)],
+            marker="o" if few else None, ms=3.2, label=labels[column] if len(labels) > 1 else None,
+            rasterized=len(place) > MOST_VECTOR_POINTS,
+        )  # fmt: skip
+    title = _title(cut, said)
+    if values.shape[1] > _MOST_LINES:
+        title += f" (the first {_MOST_LINES} of {values.shape[1]})"
+    key(axes, title)
+    axes.set_xlabel(label)
+    axes.set_ylabel(_named(cut))
+    if _log(place) and _geometric(np.unique(place)):
+        axes.set_xscale("log")
+    if _log(values):
+        axes.set_yscale("log")
+    return figure
+
+
+# --- two axes: a map ----------------------------------------------------------------------------------------
+
+
+def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: str) -> Figure:
+    extra = [str(dim) for dim in cut.dims if dim not in dims]
+    if extra:  # one component at a time; another is asked for by its index
+        cut, said = _component(cut, dims, 0, said)
+    figure = blank(dataset, 8.4, 6.0)
+    axes = figure.add_subplot()
+    (x, x_label), (y, y_label) = (_along(dataset, dim) for dim in dims)
+    values = np.asarray(cut.transpose(*dims).values, dtype=np.float64)
+    values, x, y = values[np.argsort(x)][:, np.argsort(y)], np.sort(x), np.sort(y)
+    logs = [_log(place) and _geometric(place) for place in (x, y)]
+    edges = [_edges(place, log) for place, log in zip((x, y), logs, strict=True)]
+    scale = _colours(values)
+    axes.set_facecolor(PALE)
+    mesh = axes.pcolormesh(*edges, values.T, cmap="viridis", rasterized=True, **scale)
+    axes.grid(visible=False)
+    for log, setting in zip(logs, (axes.set_xscale, axes.set_yscale), strict=True):
+        if log:
+            setting("log")
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    title = _title(cut, said)
+    if not np.isfinite(values).all():
+        title += " (grey: no value)"
+    titled(axes, title)
+    bar = figure.colorbar(mesh, ax=axes, pad=0.02, aspect=30, extend=_extended(values, scale))
+    bar.set_label(_named(cut))
+    bar.outline.set_visible(False)
+    return figure
+
+
+def _colours(values: Array) -> dict[str, Any]:
+    """Scale of a map's colours: logarithmic where the values span decades, signs apart where both occur.
+
+    A hundredth of the values at either end doesn't take the colours from all others.
+    """
+    from matplotlib.colors import LogNorm
+
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return {"vmin": 0.0, "vmax": 1.0}
+    if _log(values):
+        low, high = np.percentile(finite[finite > 0], [0.5, 99.5])
+        return {"norm": LogNorm(low, high)}
+    low, high = np.percentile(finite, [0.5, 99.5])
+    if high - low < 0.5 * np.ptp(finite) or low == high:  # few different values: all of them
+        low, high = finite.min(), finite.max()
+    return {"vmin": low, "vmax": high if high > low else low + 1.0}
+
+
+def _extended(values: Array, scale: dict[str, Any]) -> str:
+    low = scale["norm"].vmin if "norm" in scale else scale["vmin"]
+    high = scale["norm"].vmax if "norm" in scale else scale["vmax"]
+    with np.errstate(invalid="ignore"):
+        below, above = bool((values < low).any()), bool((values > high).any())
+    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
+
+
+# --- sections: points ---------------------------------------------------------------------------------------
+
+
+def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
+    """Points of all members: two components against each other, or one against the axis of the members."""
+    members = [dim for dim in variable.dims if dim in _axes(dataset)]
+    occurrence = next(str(dim) for dim in variable.dims if str(dim).endswith(_SECTION))
+    rest = [str(dim) for dim in variable.dims if dim not in members and dim != occurrence]
+    table = np.asarray(variable.transpose(*members, occurrence, *rest).values, dtype=np.float64)
+    count = math.prod(variable.sizes[dim] for dim in members)
+    table = table.reshape(count, variable.sizes[occurrence], -1)
+    figure = blank(dataset, 8.4, 6.0)
+    axes = figure.add_subplot()
+    stride = max(1, -(-table[..., 0].size // _MOST_POINTS))
+    which = np.repeat(np.arange(count), table.shape[1])[::stride]
+    rows = table.reshape(-1, table.shape[2])[::stride]
+    style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
+    if rows.shape[1] > 1:
+        first, second = (_label(variable, rest[0], i) for i in (0, 1)) if len(rest) == 1 else ("0", "1")
+        axes.scatter(rows[:, 0], rows[:, 1], c=which, cmap="viridis", **style)
+        axes.set_xlabel(f"{_named(variable)}, {first}")
+        axes.set_ylabel(f"{_named(variable)}, {second}")
+        titled(axes, f"{_title(variable, '')}; coloured by member")
+        return figure
+    place, label = _along(dataset, str(members[0])) if len(members) == 1 else (np.arange(count), "member")
+    axes.scatter(np.asarray(place, dtype=np.float64)[which], rows[:, 0], color=GREY, **style)
+    axes.set_xlabel(label)
+    axes.set_ylabel(_named(variable))
+    titled(axes, _title(variable, ""))
+    return figure
+
+
+# --- axes and names -----------------------------------------------------------------------------------------
+
+
+def _along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
+    """Where the values of an axis stand, and the words beside it; texts and vectors are counted."""
+    if dim in dataset.coords and dataset[dim].ndim == 1 and dataset[dim].dtype.kind in "fi":
+        coordinate = dataset[dim]
+        return np.asarray(coordinate.values, dtype=np.float64), _named(coordinate, dim)
+    for name, coordinate in dataset.coords.items():  # a zip's axes lie along its members
+        if coordinate.dims == (dim,) and coordinate.dtype.kind == "f" and "swept_key" in coordinate.attrs:
+            return np.asarray(coordinate.values, dtype=np.float64), _named(coordinate, str(name))
+    return np.arange(dataset.sizes[dim], dtype=np.float64), f"{dim}, counted from 0"
+
+
+def _named(variable: xarray.DataArray, name: str | None = None) -> str:
+    """A variable's name and unit; of an axis its key beside."""
+    words = (name or str(variable.name)).replace("_", " ")
+    swept = str(variable.attrs.get("swept_key", ""))
+    if swept and swept != name:
+        words += f" ({swept})"
+    unit = pretty_unit(str(variable.attrs.get("units", "")))
+    return f"{words} [{unit}]" if unit else words
+
+
+def _title(variable: xarray.DataArray, said: str) -> str:
+    title = str(variable.attrs.get("long_name") or variable.name).replace("_", " ")
+    title = title[:1].upper() + title[1:]
+    return f"{title}; {said}" if said else title
+
+
+def _log(values: Array) -> bool:
+    finite = values[np.isfinite(values)]
+    if not len(finite) or finite.min() <= 0:
+        return False
+    low, high = np.percentile(finite, [2, 98])
+    return bool(math.log10(finite.max() / finite.min()) > 1 and math.log10(high / low) > _DECADES)
+
+
+def _geometric(place: Array) -> bool:
+    ratios = np.diff(np.log(place))
+    return len(ratios) < 2 or float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
+
+
+def _edges(place: Array, log: bool) -> Array:
+    """Borders of cells about values, (n + 1,)."""
+    at = np.log(place) if log else place
+    if len(at) == 1:
+        at = np.array([at[0] - 0.5, at[0] + 0.5])
+    else:
+        middles = (at[1:] + at[:-1]) / 2
+        at = np.concatenate([[2 * at[0] - middles[0]], middles, [2 * at[-1] - middles[-1]]])
+    return np.exp(at) if log else at
+
+
+def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, file_format: str) -> None:
+    """Draw a sweep's figure to a file; see ``sweep_figure``."""
+    from matplotlib import rc_context
+
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        sweep_figure(dataset, what).savefig(path, dpi=160, format=file_format)
+
+
+__all__ = ["drawable", "save_sweep_figure", "sweep_figure"]
