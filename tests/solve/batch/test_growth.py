@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_families import FREE, ORBIT, PLANAR, TORQUE, swept
+from test_batch_families import FREE, ORBIT, PLANAR, TORQUE, swept
 from test_lanes import blocks_of, by_member
 
 import rigidsim
