@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from test_batch_families import FREE, ORBIT, PLANAR, TORQUE, swept
-from test_lanes import blocks_of, by_member
+from test_batch_lanes import blocks_of, by_member
 
 import rigidsim
 from rigidsim.solve.batch import motion
