@@ -104,6 +104,14 @@ def recommended_width() -> int:
     return int(hy.recommended_simd_size())
 
 
+def _parameters_used(system: BatchSystem) -> int:
+    """How many of the parameters the engine is to have: as far as its equations and events read them. What is
+    recorded may read more.
+    """
+    read = [right for _, right in system.equations] + [expression for expression, _ in system.events]
+    return max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
+
+
 class BatchEngine:
     """A compiled batch integrator.
 
@@ -114,6 +122,7 @@ class BatchEngine:
     def __init__(self, system: BatchSystem, width: int) -> None:
         self.width = width
         self._system = system
+        self._used = _parameters_used(system)
         self._log: list[Found] = []
         described = (
             system.equations,
@@ -133,8 +142,8 @@ class BatchEngine:
         options: dict[str, Any] = {"compact_mode": system.compact}
         if system.tolerance is not None:
             options["tol"] = system.tolerance
-        if system.parameters:
-            options["pars"] = np.zeros((system.parameters, width))
+        if self._used:
+            options["pars"] = np.zeros((self._used, width))
         if system.events:
             options["nt_events"] = [
                 hy.nt_event_batch(expression, self._noting(n), direction=DIRECTIONS[direction])
@@ -223,8 +232,8 @@ class BatchEngine:
             inside[lane] = waiting.popleft() if waiting else _IDLE
             member = max(inside[lane], 0)
             integrator.state[:, lane] = initial[:, member]
-            if len(parameters):
-                integrator.pars[:, lane] = parameters[:, member]
+            if self._used:
+                integrator.pars[:, lane] = parameters[: self._used, member]
             high[lane], low[lane], begun[lane] = start[member], 0.0, start[member]
             target[lane] = start[member] if inside[lane] == _IDLE else end[member]
             taken[lane] = 0
@@ -280,8 +289,8 @@ class BatchEngine:
         self._log.clear()
         integrator.set_time(start)
         integrator.state[:] = initial
-        if len(parameters):
-            integrator.pars[:] = parameters
+        if self._used:
+            integrator.pars[:] = parameters[: self._used]
         taken, first, begin, left = [0] * len(members), 0, start, most_steps
         while True:
             part = times[first : first + _GRID]
