@@ -31,7 +31,7 @@ from rigidsim.scene.body_pieces import (
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.presets import PRESETS
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.traced import plain
+from rigidsim.scene.tracing_context import plain
 from rigidsim.scene.validation_messages import nearest, shown
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")

@@ -13,7 +13,7 @@ from rigidsim.scene.arithmetic import Matrix, Vector, diagonal, dot, multiply, t
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.shapes import DIMENSIONS, SHAPES
-from rigidsim.scene.traced import plain
+from rigidsim.scene.tracing_context import plain
 from rigidsim.scene.validation_messages import shown
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.traced import TracedExact, exactly
+from rigidsim.scene.traced_exact import TracedExact, exactly
 
 # Past any value that means something, and still quick to take the sine of: 5000 decimal digits fit.
 _LARGEST_BITS = 20_000

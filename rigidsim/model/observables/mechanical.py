@@ -28,7 +28,7 @@ from rigidsim.model.observables.observable import (
 from rigidsim.model.rotating_frame import jacobi_constant
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.registry import register_observable
-from rigidsim.scene.traced import binary_magnitude
+from rigidsim.scene.traced_whole import binary_magnitude
 
 WORK = "work"
 

@@ -16,7 +16,9 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.sweep import Sweep
-from rigidsim.scene.traced import Guard, Traced, TracedWhole, Untraceable
+from rigidsim.scene.trace_graph import Guard, Untraceable
+from rigidsim.scene.traced import Traced
+from rigidsim.scene.traced_whole import TracedWhole
 from rigidsim.solve.batch.replay import Replay, Swept
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.problem import prepare

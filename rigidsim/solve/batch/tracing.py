@@ -19,7 +19,11 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.traced import Graph, Traced, TracedWhole, TracingContext, Untraceable
+from rigidsim.scene.trace_graph import Graph, Untraceable
+from rigidsim.scene.traced import Traced
+from rigidsim.scene.traced_exact import swept_number
+from rigidsim.scene.traced_whole import TracedWhole
+from rigidsim.scene.tracing_context import TracingContext
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
@@ -121,7 +125,7 @@ def trace(
     graph = Graph(context_for(representative.config.integrator.precision))
     config = representative.config
     for column, (key, number) in enumerate(zip(keys, numbers, strict=True)):
-        config = _replaced(config, key_steps(key, "axes"), graph.column(column, number))
+        config = _replaced(config, key_steps(key, "axes"), swept_number(graph, column, number))
     context = TracingContext(graph)
     try:
         scene: Scene = build_scene(replace(representative, config=config), context)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import parse
 from rigidsim.scene.sweep import Sweep
-from rigidsim.scene.traced import Traced, TracedWhole
+from rigidsim.scene.traced import Traced
+from rigidsim.scene.traced_whole import TracedWhole
 from rigidsim.solve.batch.family import Alone, Families, Members, batchable
 from rigidsim.solve.problem import prepare
 

@@ -1,0 +1,107 @@
+"""Whole numbers that depend on traced ones: binary exponents and magnitudes (see ``traced``)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rigidsim.scene.trace_graph import Graph
+from rigidsim.scene.traced import Traced
+
+
+class TracedWhole:
+    """A whole number that depends on traced ones, such as the binary exponent of a unit."""
+
+    __slots__ = ("graph", "node")
+
+    def __init__(self, graph: Graph, node: int) -> None:
+        self.graph, self.node = graph, node
+
+    @property
+    def value(self) -> int:
+        """The representative's."""
+        return self.graph.whole_values[self.node]
+
+    def _other(self, other: Any) -> int:
+        if isinstance(other, TracedWhole):
+            return other.node
+        return self.graph.whole("constant", (int(other),), int(other))
+
+    def _made(self, operation: str, arguments: tuple[int, ...], value: int) -> TracedWhole:
+        return TracedWhole(self.graph, self.graph.whole(operation, arguments, value))
+
+    def __add__(self, other: Any) -> TracedWhole:
+        if not isinstance(other, TracedWhole) and other == 0:
+            return self
+        there = self._other(other)
+        return self._made("add", (self.node, there), self.value + self.graph.whole_values[there])
+
+    __radd__ = __add__
+
+    def __neg__(self) -> TracedWhole:
+        return self._made("negative", (self.node,), -self.value)
+
+    def __sub__(self, other: Any) -> TracedWhole:
+        return self + (-other)
+
+    def __rsub__(self, other: Any) -> TracedWhole:
+        return -self + other
+
+    def __mul__(self, other: Any) -> TracedWhole:
+        there = self._other(other)
+        return self._made("multiply", (self.node, there), self.value * self.graph.whole_values[there])
+
+    __rmul__ = __mul__
+
+    def __abs__(self) -> TracedWhole:
+        return self._made("absolute", (self.node,), abs(self.value))
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __eq__(self, other: object) -> bool:
+        there = self._other(other)
+        return self._decide("=", self.node, there, self.value == self.graph.whole_values[there])
+
+    def __lt__(self, other: Any) -> bool:
+        there = self._other(other)
+        return self._decide("<", self.node, there, self.value < self.graph.whole_values[there])
+
+    def __gt__(self, other: Any) -> bool:
+        there = self._other(other)
+        return self._decide("<", there, self.node, self.graph.whole_values[there] < self.value)
+
+    def __le__(self, other: Any) -> bool:
+        return not self > other
+
+    def __ge__(self, other: Any) -> bool:
+        return not self < other
+
+    def __bool__(self) -> bool:
+        return self != 0
+
+    def _decide(self, kind: str, left: int, right: int, outcome: bool) -> bool:
+        return self.graph.decide(kind, left, right, outcome, whole=True)
+
+    def __index__(self) -> int:
+        self._decide("=", self.node, self._other(self.value), True)
+        return self.value
+
+    __int__ = __index__
+
+    def __float__(self) -> float:
+        return float(self.__index__())
+
+
+def binary_exponent(value: Traced) -> TracedWhole:
+    """The smallest e with abs(value) <= 2**e, of a number that isn't zero."""
+    mantissa, power = value.graph.context.frexp(abs(value.value))
+    exponent = int(power) - 1 if mantissa == 0.5 else int(power)
+    return TracedWhole(value.graph, value.graph.whole("exponent", (value.node,), exponent))
+
+
+def binary_magnitude(context: Any, value: Any) -> int:
+    """The smallest e with abs(value) < 2**e, of a number that isn't zero."""
+    power = int(context.frexp(abs(value.value if isinstance(value, Traced) else value))[1])
+    if not isinstance(value, Traced):
+        return power
+    return TracedWhole(value.graph, value.graph.whole("magnitude", (value.node,), power))  # type: ignore
