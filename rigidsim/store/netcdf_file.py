@@ -18,8 +18,8 @@ import numpy as np
 from h5py import h5a, h5d, h5ds, h5g, h5p, h5s, h5t
 
 from rigidsim.scene.records import dataclass
+from rigidsim.store.variables import BARE_DIMENSION
 
-_BARE = "This is a netCDF dimension but not a netCDF variable."
 _LEAST_CHUNK_ROWS = 1024  # of variables along a dimension that can grow
 
 
@@ -167,7 +167,7 @@ class NetcdfFile:
         how = _new_dataset(None if size else (_LEAST_CHUNK_ROWS,))
         space = h5s.create_simple((size,), (size or h5s.UNLIMITED,))
         scale = h5d.create(self._root, dim.encode(), h5t.IEEE_F32BE, space, dcpl=how)
-        h5ds.set_scale(scale, f"{_BARE}{size:10}".encode())
+        h5ds.set_scale(scale, f"{BARE_DIMENSION}{size:10}".encode())
         _attribute(scale, "_Netcdf4Dimid", np.array(number), _ID)
         return scale
 

@@ -11,7 +11,8 @@ import h5py
 
 from rigidsim.errors import RunFolderError
 from rigidsim.look.rows import Column, Rows
-from rigidsim.store.validated_open import inspect, is_bare_dimension
+from rigidsim.store.validated_open import inspect
+from rigidsim.store.variables import is_bare_dimension
 
 # what HDF5 and netCDF-4 note beside a variable's own attributes
 _OF_THE_FORMAT = {

@@ -55,6 +55,8 @@ class SavedSweep:
         """
         import xarray
 
+        from rigidsim.store.xarray_reader import NetcdfBackend
+
         if not self.folder.dataset.exists():
             raise RunFolderError(f"{self.place}: has no dataset.h5 yet; {RESUME} completes it")
         _, digest = check_whole(self.folder.dataset)
@@ -63,7 +65,7 @@ class SavedSweep:
             raise RunFolderError(
                 f"{self.folder.dataset}: isn't the dataset that summary.json beside it was written for"
             )
-        return xarray.open_dataset(self.folder.dataset, engine="h5netcdf", chunks=None)
+        return xarray.open_dataset(self.folder.dataset, engine=NetcdfBackend, chunks=None)
 
     def __repr__(self) -> str:
         return f"<Sweep {self.summary.get('name', '')!r} ({self.place}): {self.status}>"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.variables import LABELS, SCHEMA_VERSION
+from rigidsim.store.variables import LABELS, SCHEMA_VERSION, is_bare_dimension
 
 if TYPE_CHECKING:
     import xarray
@@ -33,10 +33,12 @@ def open_dataset(path: Path, *, indexed: bool = True) -> xarray.Dataset:
     """
     import xarray
 
+    from rigidsim.store.xarray_reader import NetcdfBackend
+
     try:
         inspect(path)
         options: dict[str, Any] = {} if indexed else {"create_default_indexes": False}
-        opened = xarray.open_dataset(path, engine="h5netcdf", **options)
+        opened = xarray.open_dataset(path, engine=NetcdfBackend, **options)
     except RunFolderError:
         raise
     except Exception as error:  # HDF5 and its readers raise many kinds on files that aren't whole
@@ -101,7 +103,7 @@ def _check_numbers(item: Any, name: str, path: Path) -> None:
     """Every row that is declared is there: none would be read as a fill value."""
     if item.dtype.kind not in "fiuSOV" or item.dtype.hasobject:
         raise RunFolderError(f"{path}: the variable {name!a} holds no numbers")
-    if item.attrs.get("CLASS", b"") == b"DIMENSION_SCALE" and name != "time" and is_bare_dimension(item):
+    if name != "time" and is_bare_dimension(item):
         return
     size = item.size or 0
     if item.chunks is None:
@@ -111,11 +113,3 @@ def _check_numbers(item: Any, name: str, path: Path) -> None:
     wanted = math.prod(-(-length // chunk) for length, chunk in zip(item.shape, item.chunks, strict=True))
     if item.id.get_num_chunks() < wanted:
         raise RunFolderError(f"{path}: the variable {name!a} declares {size} numbers that it lacks")
-
-
-def is_bare_dimension(item: Any) -> bool:
-    """Whether it is a dimension without coordinate values, which netCDF-4 keeps as an empty variable."""
-    name = item.attrs.get("NAME", b"")
-    return isinstance(name, bytes) and name.startswith(
-        b"This is a netCDF dimension but not a netCDF variable"
-    )

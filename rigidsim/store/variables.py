@@ -12,6 +12,7 @@ import numpy as np
 from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
+    import h5py
     import xarray
 
 LABELS: dict[str, list[str]] = {
@@ -32,6 +33,14 @@ SCHEMA_VERSION = 4
 """1: without seals. 2: files end with the SHA-256 of their content; checkpoints. 3: what was put back of held
 invariants along time (runs that hold none have the same variables as before). 4: dates along time (runs
 without an epoch have the same variables as before)."""
+
+BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
+"""How the ``NAME`` of the empty variable begins that netCDF-4 keeps for a dimension without coordinates."""
+
+
+def is_bare_dimension(item: h5py.Dataset) -> bool:
+    """Whether it is such a variable."""
+    return bytes(item.attrs.get("NAME", b"")).startswith(BARE_DIMENSION[:-1].encode())
 
 
 @dataclass(frozen=True)

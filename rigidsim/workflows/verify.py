@@ -22,6 +22,7 @@ from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal, read_seal
 from rigidsim.store.segments import root_attributes
+from rigidsim.store.variables import is_bare_dimension
 from rigidsim.workflows.recorded_then import as_recorded
 from rigidsim.workflows.run import run
 from rigidsim.workflows.verify_summary import summary_problems, timeline_problems
@@ -233,18 +234,13 @@ def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Differe
 
 def _numbers(file: h5py.File) -> Iterator[str]:
     for name, item in file.items():
-        if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not _bare(item):
+        if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not is_bare_dimension(item):
             yield name
 
 
 def _is_date(item: h5py.Dataset) -> bool:
     """Whether it follows from the epoch and the time alone; residuals name what they belong to."""
     return "time_scale" in item.attrs or item.attrs.get("residual_of") == "julian_date"
-
-
-def _bare(item: h5py.Dataset) -> bool:
-    """A dimension without values, as netCDF-4 stores it."""
-    return b"This is a netCDF dimension but not a netCDF variable" in bytes(item.attrs.get("NAME", b""))
 
 
 def _first_difference(name: str, one: h5py.Dataset, other: h5py.Dataset) -> Difference | None:

@@ -28,6 +28,7 @@ from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.store.validated_open import open_dataset
 
 PRECISIONS = ['"single"', '"double"', '"extended"', '"quadruple"', "50"]
 PARTS = {'"single"': 1, '"double"': 1, '"extended"': 2, '"quadruple"': 3, "50": 4}
@@ -106,7 +107,10 @@ def test_every_reader_reads_the_same(free: tuple[str, rigidsim.Run]) -> None:
         xarray.open_dataset(path, engine="h5netcdf") as other,
         netCDF4.Dataset(path) as old,
         h5py.File(path, "r") as raw,
+        free[1].dataset as ours,
     ):
+        assert ours.identical(other)
+        assert ours.encoding == other.encoding
         assert {"time", *FREE} <= set(map(str, plain.variables))
         assert set(map(str, plain.variables)) == set(old.variables) == set(raw)
         for name in map(str, plain.variables):
@@ -116,6 +120,25 @@ def test_every_reader_reads_the_same(free: tuple[str, rigidsim.Run]) -> None:
             np.testing.assert_array_equal(values, old[name][:])
             if values.dtype == np.float64:
                 np.testing.assert_array_equal(values, raw[name][:], strict=True)
+
+
+@pytest.mark.parametrize(
+    "path", sorted((Path(__file__).parents[1] / "data").glob("*.h5")), ids=lambda p: p.stem
+)
+def test_our_reader_sees_what_the_general_one_sees(path: Path) -> None:
+    """Files that earlier versions wrote with h5netcdf, as well as those of this one."""
+    with open_dataset(path) as ours, xarray.open_dataset(path, engine="h5netcdf") as other:
+        assert ours.identical(other)
+        assert list(ours.variables) == list(other.variables)
+        assert ours.encoding == other.encoding
+        for name, variable in other.variables.items():
+            found = ours.variables[name]
+            assert (found.dtype, found.attrs) == (variable.dtype, variable.attrs)
+            told = set(found.encoding)
+            assert found.encoding == {key: variable.encoding[key] for key in told}
+        rows = np.array([3, 0, 2])
+        assert ours.isel(time=rows).identical(other.isel(time=rows))
+        assert ours.isel(time=slice(None, None, -2)).identical(other.isel(time=slice(None, None, -2)))
 
 
 def test_times_stay_numbers(free: tuple[str, rigidsim.Run]) -> None:
