@@ -21,6 +21,9 @@ from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
 from rigidsim.scene.units import UnitError, time_unit
 from rigidsim.scene.validation_messages import shown
 
+_NUMBER_TEXT = r"^\s*[-+]?(\d|\.\d|pi)"
+"""How every text of a number begins; the unit behind it is left to ``parse_number``."""
+
 
 def refuse(text: str) -> PydanticCustomError:
     """The error by which a validator refuses a value; the text is shown as it is."""
@@ -36,8 +39,13 @@ def quantity(unit: str) -> Any:
         except ValueError as error:
             raise refuse(str(error)) from None
 
-    schema = {"anyOf": [{"type": "number"}, {"type": "string"}], "description": f"number, in {unit}"}
-    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(schema)]
+    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(number_schema(unit))]
+
+
+def number_schema(unit: str) -> dict[str, Any]:
+    """What the JSON schema says of a number in the SI unit ``unit``, "" for any unit."""
+    text = {"type": "string", "pattern": _NUMBER_TEXT}
+    return {"anyOf": [{"type": "number"}, text], "x-unit": unit}
 
 
 def _exactly(count: int) -> BeforeValidator:
@@ -95,9 +103,7 @@ def _any_quantity(value: Any) -> ExactNumber:
 AnyQuantity = Annotated[
     ExactNumber,
     PlainValidator(_any_quantity),
-    WithJsonSchema(
-        {"anyOf": [{"type": "number"}, {"type": "string"}], "description": "number, in SI or with any unit"}
-    ),
+    WithJsonSchema(number_schema("")),
 ]
 """A number with whatever unit is written behind it."""
 
@@ -151,4 +157,8 @@ def _sequence(value: str | None) -> str | None:
     return value
 
 
-EulerSequence = Annotated[StrictStr, AfterValidator(_sequence)]
+EulerSequence = Annotated[
+    StrictStr,
+    AfterValidator(_sequence),
+    WithJsonSchema({"type": "string", "enum": list(EULER_SEQUENCES)}),
+]

@@ -22,7 +22,9 @@ def _kind_of_plane(value: Any) -> str | None:
 class Frame(ConfigTable):
     """``[frame]``: what the scene's axes are, beside its own equations, and what angles are counted from."""
 
-    axes: SpaceAxes | None = Field(default=None, description="of space; an ephemeris has ecliptic J2000")
+    axes: SpaceAxes | None = Field(
+        default=None, description="what the axes of space are; an ephemeris has ecliptic J2000"
+    )
     reference: Annotated[
         Annotated[Literal["space", "orbit"], Tag(PLANE_OR_NORMAL[0])]
         | Annotated[Triple[Dimensionless], Tag(PLANE_OR_NORMAL[1])],

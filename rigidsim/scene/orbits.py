@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from pydantic import Field
+
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
 from rigidsim.scene.records import dataclass
@@ -18,15 +20,17 @@ class Orbit(ConfigTable):
     the one of Kepler's third law.
     """
 
-    semi_major_axis: Metre
-    eccentricity: Dimensionless = ZERO
-    inclination: Angle = ZERO
-    ascending_node: Angle = ZERO
-    periapsis: Angle = ZERO
-    mean_anomaly: Angle = ZERO
-    node_rate: Rate = ZERO
-    periapsis_rate: Rate = ZERO
-    period: Second | None = None
+    semi_major_axis: Metre = Field(description="of the ellipse", examples=["7000 km"])
+    eccentricity: Dimensionless = Field(default=ZERO, description="0 to below 1")
+    inclination: Angle = Field(default=ZERO, description="to the plane XY of space", examples=["51.6 deg"])
+    ascending_node: Angle = Field(default=ZERO, description="its longitude from X, at time 0")
+    periapsis: Angle = Field(default=ZERO, description="from the ascending node, at time 0")
+    mean_anomaly: Angle = Field(default=ZERO, description="at time 0")
+    node_rate: Rate = Field(default=ZERO, description="of the ascending node", examples=["-19.3 deg/yr"])
+    periapsis_rate: Rate = Field(default=ZERO, description="of the periapsis against the node")
+    period: Second | None = Field(
+        default=None, description="instead of that of Kepler's third law", examples=["27.3 day"]
+    )
 
 
 @dataclass(frozen=True)

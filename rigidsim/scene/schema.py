@@ -15,6 +15,7 @@ from pydantic import (
     StrictBool,
     StrictInt,
     StrictStr,
+    WithJsonSchema,
     create_model,
     field_validator,
     model_validator,
@@ -38,6 +39,7 @@ from rigidsim.scene.fields import (
     Speed,
     TimeUnitName,
     Triple,
+    number_schema,
     refuse,
 )
 from rigidsim.scene.frame_table import Frame
@@ -50,18 +52,41 @@ from rigidsim.scene.validation_messages import nearest, shown
 LARGEST_DIGITS = 250
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
 FORMULATIONS = ("auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar")
+_FOLDER_NAME = "^[A-Za-z0-9._-]{1,100}$"
+_ABOUT_LOADS = "what acts on the body, told apart by kind; none: free rotation"
 STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
 
 
 class Initial(ConfigTable):
     """``[initial]``: the state at ``time.start``."""
 
-    angular_velocity: Triple[Rate] | None = None
-    angular_momentum: Triple[Momentum] | None = None
-    quaternion: Four[Dimensionless] | None = None
-    euler_angles: Triple[Angle] | None = None
-    position: Triple[Metre] | None = None
-    velocity: Triple[Speed] | None = None
+    angular_velocity: Triple[Rate] | None = Field(
+        default=None,
+        description="of the body in space, in body axes; this or angular_momentum",
+        examples=[[0.1, 1.0, 0.05], ["0 deg/s", "0 deg/s", "20 deg/h"]],
+    )
+    angular_momentum: Triple[Momentum] | None = Field(
+        default=None, description="in space axes; instead of angular_velocity", examples=[[0, 0, 12.5]]
+    )
+    quaternion: Four[Dimensionless] | None = Field(
+        default=None,
+        description="w, x, y, z: takes body axes to space axes; any norm but zero; without it and "
+        "euler_angles the body's axes lie along those of space",
+        examples=[[1, 0, 0, 0]],
+    )
+    euler_angles: Triple[Angle] | None = Field(
+        default=None,
+        description="phi, theta, psi of [integrator] euler_sequence, intrinsic; instead of quaternion",
+        examples=[["10 deg", "23.44 deg", "0 deg"]],
+    )
+    position: Triple[Metre] | None = Field(
+        default=None,
+        description="of the centre of mass, in space axes; with it or velocity the body flies freely",
+        examples=[["7000 km", 0, 0]],
+    )
+    velocity: Triple[Speed] | None = Field(
+        default=None, description="of the centre of mass, in space axes", examples=[[0, "7.5 km/s", 0]]
+    )
 
 
 class Time(ConfigTable):
@@ -69,36 +94,81 @@ class Time(ConfigTable):
     the unit that times are shown in.
     """
 
-    start: Second = ZERO
-    end: Second | None = None
-    samples: StrictInt | None = None
-    every: Second | None = None
-    times: list[Second] | None = None
-    epoch: Instant | None = Field(default=None, description="what time 0 is; scales TDB, TT and UTC")
+    start: Second = Field(default=ZERO, description="of the run: when the state is [initial]'s")
+    end: Second | None = Field(
+        default=None, description="of the run; with samples or every", examples=[1000.0, "10 yr"]
+    )
+    samples: StrictInt | None = Field(
+        default=None, description="how many, evenly from start to end, both included", examples=[10001]
+    )
+    every: Second | None = Field(
+        default=None, description="between samples, instead of samples", examples=[0.1, "1 day"]
+    )
+    times: list[Second] | None = Field(
+        default=None, description="of the samples, ascending, instead of end", examples=[[0, 1, 10, 100]]
+    )
+    epoch: Instant | None = Field(
+        default=None,
+        description="what time 0 is; scales TDB, TT and UTC",
+        examples=["J2000", "2029-04-13T21:46:00 TDB"],
+    )
     unit: TimeUnitName | None = Field(
         default=None,
         description="what times are shown in, such as day, yr or kyr; bare numbers stay seconds",
+        examples=["day"],
     )
 
 
 class Integrator(ConfigTable):
     """``[integrator]``: how accurately, and in which variables."""
 
-    precision: Literal["single", "double", "extended", "quadruple"] | StrictInt = "double"
+    precision: (
+        Literal["single", "double", "extended", "quadruple"]
+        | Annotated[StrictInt, WithJsonSchema({"type": "integer", "minimum": 1, "maximum": LARGEST_DIGITS})]
+    ) = Field(
+        default="double",
+        description="of the arithmetic: 24, 53, 64 or 113 bits, or so many decimal digits",
+        examples=["extended", 50],
+    )
     tolerance: Literal["auto"] | Dimensionless = Field(
         default="auto",
         description="of each step, relative to the largest component of the state; auto is the precision's "
         "epsilon in double precision and an eighth of it in others, whose series would otherwise be just too "
         "short to keep what is cut off well below rounding",
+        examples=["auto", 1e-12],
+        json_schema_extra={"x-above": 0, "x-at-most": 1},
     )
     formulation: Literal[
         "auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar"
-    ] = "auto"
-    euler_sequence: EulerSequence = "zxz"
-    method: Literal["taylor", "closed_form"] = "taylor"
-    hold_invariants: StrictBool = False
-    accuracy: Dimensionless | None = None
-    accuracy_position: Metre | None = None
+    ] = Field(
+        default="auto",
+        description="which variables are integrated; canonical: Euler angles and their momenta; planar: an "
+        "angle and its rate, for a body that turns about one axis",
+    )
+    euler_sequence: EulerSequence = Field(
+        default="zxz", description="axes of intrinsic rotations, of [initial] and of what is recorded"
+    )
+    method: Literal["taylor", "closed_form"] = Field(
+        default="taylor",
+        description="Taylor series step by step, or, for a free body or a heavy symmetric top, theta "
+        "functions at a cost that doesn't depend on the time",
+    )
+    hold_invariants: StrictBool = Field(
+        default=False,
+        description="put what is conserved back as the run goes on: errors of long runs grow far slower",
+    )
+    accuracy: Annotated[Dimensionless, WithJsonSchema(number_schema("rad"))] | None = Field(
+        default=None,
+        description="attitude error to hold at the end, instead of precision and tolerance; certified",
+        examples=[1e-9],
+        json_schema_extra={"x-above": 0, "x-below": 3},
+    )
+    accuracy_position: Metre | None = Field(
+        default=None,
+        description="error of the position to hold at the end, where the body flies; certified",
+        examples=["1 um"],
+        json_schema_extra={"x-above": 0},
+    )
 
     @field_validator("precision", mode="before")
     @classmethod
@@ -149,15 +219,31 @@ class Integrator(ConfigTable):
 class Output(ConfigTable):
     """``[output]``: what is kept and how it is shown."""
 
-    record: list[StrictStr] | None = None
-    timeline: StrictBool = True
-    timeline_rows: StrictInt = Field(default=100_000, ge=2)
-    estimate: StrictBool = True
-    lyapunov: StrictBool = False
+    record: list[StrictStr] | None = Field(
+        default=None,
+        description="variables of the dataset; by default all that the scene has (drifts of invariants "
+        "always are there)",
+        examples=[["quaternion", "obliquity"]],
+        json_schema_extra={"x-items": "observables"},
+    )
+    timeline: StrictBool = Field(default=True, description="write timeline.rrd, for rigidsim view")
+    timeline_rows: StrictInt = Field(
+        default=100_000,
+        ge=2,
+        description="of the timeline at most; a longer run is thinned there, never in the dataset",
+    )
+    estimate: StrictBool = Field(
+        default=True, description="announce the errors of attitude and path; a few percent of the run"
+    )
+    lyapunov: StrictBool = Field(
+        default=False,
+        description="Lyapunov exponents from variational equations; tens of times the plain run",
+    )
     tip: Triple[Metre] | None = Field(
         default=None,
         description="the point whose path is recorded as tip, in body axes from the reference point; by "
         "default the centre of mass of a body that turns about another point",
+        examples=[[0, 0, 0.1]],
     )
 
     @field_validator("record")
@@ -183,10 +269,16 @@ class Output(ConfigTable):
 class EventTable(ConfigTable):
     """``[[events]]``: where an expression of time and the state crosses zero."""
 
-    name: StrictStr
-    expression: StrictStr
-    direction: Literal["any", "up", "down"] = "any"
-    action: Literal["record", "stop"] = "record"
+    name: StrictStr = Field(
+        description="of the dataset's variables: NAME_time, NAME_quaternion, ...", examples=["flip"]
+    )
+    expression: StrictStr = Field(
+        description="of t, the states (wx wy wz, qw qx qy qz, phi theta psi, x y z, vx vy vz) and "
+        "[parameters], in SI: the event is where it crosses zero",
+        examples=["wy", "theta - pi/2"],
+    )
+    direction: Literal["any", "up", "down"] = Field(default="any", description="of the crossing")
+    action: Literal["record", "stop"] = Field(default="record", description="stop: the run ends there")
 
     @field_validator("name")
     @classmethod
@@ -201,27 +293,49 @@ class EventTable(ConfigTable):
 class Limits(ConfigTable):
     """``[limits]``: guards that stop the run, resumable, with the reason named."""
 
-    wall_time: Second | None = None
-    max_steps: StrictInt | None = Field(default=None, ge=1)
-    max_drift: Dimensionless | None = None
+    wall_time: Second | None = Field(
+        default=None, description="of integrating and recording in one session", examples=["2 h"]
+    )
+    max_steps: StrictInt | None = Field(
+        default=None, ge=1, description="in one session, never exceeded", examples=[1_000_000_000]
+    )
+    max_drift: Dimensionless | None = Field(
+        default=None,
+        description="largest relative drift of any invariant; the run ends with the first sample past it",
+        examples=[1e-9],
+    )
 
 
 class Config(ConfigTable):
     """One experiment; ``config_model`` knows the kinds of loads beside."""
 
-    name: StrictStr
-    description: StrictStr = ""
-    parameters: dict[StrictStr, AnyQuantity] = Field(default_factory=dict)
-    body: Body
-    initial: Initial
-    loads: list[LoadFields] = Field(default_factory=list)
-    events: list[EventTable] = Field(default_factory=list)
-    frame: Frame = Field(default_factory=Frame)
-    time: Time
-    integrator: Integrator = Field(default_factory=Integrator)
-    output: Output = Field(default_factory=Output)
-    limits: Limits = Field(default_factory=Limits)
-    sweep: SweepTable | None = None
+    name: StrictStr = Field(
+        description="of the run folder: letters, digits, dots, underscores and hyphens",
+        examples=["intermediate_axis"],
+        json_schema_extra={"pattern": _FOLDER_NAME},
+    )
+    description: StrictStr = Field(default="", description="free text, shown with the results")
+    parameters: dict[StrictStr, AnyQuantity] = Field(
+        default_factory=dict,
+        description="named constants for expressions",
+        examples=[{"k": 0.25, "c": "2e-4 N m s"}],
+    )
+    body: Body = Field(description="what turns")
+    initial: Initial = Field(description="the state at the start")
+    loads: list[LoadFields] = Field(default_factory=list, description=_ABOUT_LOADS)
+    events: list[EventTable] = Field(
+        default_factory=list, description="where an expression of time and the state crosses zero"
+    )
+    frame: Frame = Field(
+        default_factory=Frame, description="what the axes of space are, and what angles count from"
+    )
+    time: Time = Field(description="how long, and where the samples lie")
+    integrator: Integrator = Field(
+        default_factory=Integrator, description="how accurately, and in which variables"
+    )
+    output: Output = Field(default_factory=Output, description="what is kept and how it is shown")
+    limits: Limits = Field(default_factory=Limits, description="guards that stop the run, resumable")
+    sweep: SweepTable | None = Field(default=None, description="many members of one experiment")
 
     @field_validator("events")
     @classmethod
@@ -245,7 +359,7 @@ class Config(ConfigTable):
     @field_validator("name")
     @classmethod
     def _folder_name(cls, value: str) -> str:
-        if not re.fullmatch(r"[A-Za-z0-9._-]{1,100}", value) or not value.strip("."):
+        if not re.fullmatch(_FOLDER_NAME, value) or not value.strip("."):
             raise refuse(
                 f"given {shown(value)}; allowed: 1 to 100 letters, digits, dots, underscores and "
                 "hyphens, not dots alone, since it names the run folder"
@@ -272,5 +386,5 @@ def _with_loads(fields: tuple[type[LoadFields], ...]) -> type[Config]:
         "Config",
         __base__=Config,
         __doc__="One experiment.",
-        loads=(list[union], Field(default_factory=list)),
+        loads=(list[union], Field(default_factory=list, description=_ABOUT_LOADS)),
     )

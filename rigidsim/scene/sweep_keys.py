@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -74,17 +73,16 @@ def _alternatives(
             yield from _alternatives([{"$ref": target}] if target else [], schema, value)
         elif "anyOf" in node or "oneOf" in node:
             yield from _alternatives([*node.get("anyOf", []), *node.get("oneOf", [])], schema, value)
-            if "description" in node:
-                yield {"description": node["description"]}
+            if "x-unit" in node:
+                yield {"x-unit": node["x-unit"]}
         else:
             yield node
 
 
 def _unit(nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any]) -> str:
     for node in [*nodes, *_alternatives(nodes, schema, None)]:
-        told = re.match(r"number, in (\S.*)", str(node.get("description", "")))
-        if told and "SI or" not in told[1]:
-            return told[1]
+        if node.get("x-unit"):
+            return str(node["x-unit"])
         if "items" in node:
             inner = _unit([node["items"]], schema)
             if inner != "1":
@@ -93,5 +91,5 @@ def _unit(nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any]) -> str:
 
 
 def _length(nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any]) -> int:
-    sizes = [node.get("minItems") for node in _alternatives(nodes, schema, None) if "items" in node]
-    return next((int(size) for size in sizes if size), 0)
+    lists = [node for node in _alternatives(nodes, schema, None) if "items" in node]
+    return next((int(of["minItems"]) for of in lists if of.get("minItems") == of.get("maxItems", 0)), 0)

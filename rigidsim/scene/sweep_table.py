@@ -105,7 +105,9 @@ class SweepTable(ConfigTable):
     )
     seed: StrictInt = Field(default=0, description="of random values; each depends on seed, key and index")
     keep: list[StrictStr] = Field(
-        default_factory=lambda: ["final"], description=f"what is kept of a member: {', '.join(KEPT)}"
+        default_factory=lambda: ["final"],
+        description="what is kept of a member, beside drifts, steps and warnings",
+        json_schema_extra={"items": {"type": "string", "enum": list(KEPT)}, "default": ["final"]},
     )
     most_events: StrictInt = Field(
         default=16, ge=1, description="times (events) and points (section) kept of an event, at most"

@@ -8,8 +8,9 @@ import json
 def schema() -> None:
     """Print the config's JSON schema, for editors.
 
-    Example: rigidsim schema > rigidsim.schema.json
+    Example: rigidsim schema > rigidsim.schema.json; editors read the config's first line
+    "#:schema rigidsim.schema.json"
     """
-    from rigidsim.workflows.read import config_model
+    from rigidsim.workflows.read import editor_schema
 
-    print(json.dumps(config_model().model_json_schema(), indent=2))
+    print(json.dumps(editor_schema(), indent=2))

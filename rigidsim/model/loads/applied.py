@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from decimal import Decimal
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import PlainValidator, WithJsonSchema
+from pydantic import Field, PlainValidator, WithJsonSchema
 
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
@@ -48,8 +48,11 @@ class TorqueFields(LoadFields):
     """A torque as expressions of t, the state and [parameters], N m."""
 
     kind: Literal["torque"]
-    components: Triple[Formula]
-    frame: Literal["body", "space"] = "body"
+    components: Triple[Formula] = Field(
+        description="in N m: expressions of t, the state and [parameters], or numbers",
+        examples=[["0", "0", "k*sin(t)^2"]],
+    )
+    frame: Literal["body", "space"] = Field(default="body", description="whose axes the components are along")
 
 
 class ForceFields(LoadFields):
@@ -58,9 +61,18 @@ class ForceFields(LoadFields):
     """
 
     kind: Literal["force"]
-    components: Triple[Formula]
-    frame: Literal["body", "space"] = "space"
-    point: Triple[Metre] | None = None
+    components: Triple[Formula] = Field(
+        description="in N: expressions of t, the state and [parameters], or numbers",
+        examples=[["0", "0", "-c*vz"]],
+    )
+    frame: Literal["body", "space"] = Field(
+        default="space", description="whose axes the components are along"
+    )
+    point: Triple[Metre] | None = Field(
+        default=None,
+        description="where it acts, in body axes from the reference point; by default the centre of mass",
+        examples=[[0, 0, 0.2]],
+    )
 
 
 @dataclass(frozen=True)

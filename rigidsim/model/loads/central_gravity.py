@@ -25,8 +25,14 @@ class CentralGravityFields(LoadFields):
     """A point that attracts a freely flying body: force and torque to second degree."""
 
     kind: Literal["central_gravity"]
-    gravitational_parameter: GravitationalParameter
-    position: Triple[Metre] = Field(default_factory=lambda: [ZERO] * 3)
+    gravitational_parameter: GravitationalParameter = Field(
+        description="G M of the attracting point", examples=["3.986004418e14 m^3/s^2"]
+    )
+    position: Triple[Metre] = Field(
+        default_factory=lambda: [ZERO] * 3,
+        description="of the attracting point, space axes",
+        json_schema_extra={"default": [0, 0, 0]},
+    )
 
 
 @register_load

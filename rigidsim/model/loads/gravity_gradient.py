@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import heyoka as hy
+from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
@@ -29,10 +30,20 @@ class GravityGradientFields(LoadFields):
     """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]
-    gravitational_parameter: GravitationalParameter
-    orbit: Orbit | None = None
-    position: Triple[Metre] | None = None
-    ephemeris: Literal["sun", "moon"] | None = None
+    gravitational_parameter: GravitationalParameter = Field(
+        description="G M of the attracting body", examples=["3.986004418e14 m^3/s^2"]
+    )
+    orbit: Orbit | None = Field(
+        default=None,
+        description="of the attracting body as seen from this one; this, position or ephemeris",
+        examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
+    )
+    position: Triple[Metre] | None = Field(
+        default=None, description="of a source at rest, space axes", examples=[["7000 km", 0, 0]]
+    )
+    ephemeris: Literal["sun", "moon"] | None = Field(
+        default=None, description="as seen from the Earth, by analytic series in the ecliptic of J2000"
+    )
 
 
 @register_load

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import heyoka as hy
+from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
@@ -35,11 +36,21 @@ class MagneticDipoleFields(LoadFields):
     """
 
     kind: Literal["magnetic_dipole"]
-    moment: Triple[MagneticMoment]
-    field: Triple[FluxDensity] | None = None
-    orbit: Orbit | None = None
-    source_moment: Triple[MagneticMoment] | None = None
-    gravitational_parameter: GravitationalParameter | None = None
+    moment: Triple[MagneticMoment] = Field(
+        description="of the body, body axes", examples=[["0 A m^2", "0 A m^2", "0.5 A m^2"]]
+    )
+    field: Triple[FluxDensity] | None = Field(
+        default=None, description="uniform flux density, space axes", examples=[["30 uT", 0, 0]]
+    )
+    orbit: Orbit | None = Field(
+        default=None, description="of the source as seen from the body, instead of field; with source_moment"
+    )
+    source_moment: Triple[MagneticMoment] | None = Field(
+        default=None, description="of the dipole that is circled, space axes", examples=[[0, 0, -7.7e22]]
+    )
+    gravitational_parameter: GravitationalParameter | None = Field(
+        default=None, description="G M of the source, from which the orbit's period follows"
+    )
 
 
 @register_load

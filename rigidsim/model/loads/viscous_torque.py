@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from pydantic import Field
+
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
@@ -17,7 +19,10 @@ class ViscousTorqueFields(LoadFields):
     """A torque -c_i w_i about each body axis."""
 
     kind: Literal["viscous_torque"]
-    coefficients: Triple[Damping]
+    coefficients: Triple[Damping] = Field(
+        description="c_i of the torque -c_i w_i about each body axis, zero or more",
+        examples=[[0.01, 0.01, 0.02]],
+    )
 
 
 @register_load
