@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -26,13 +27,39 @@ FLIGHT = {
 }
 
 
+@pytest.fixture(scope="module")
+def finished() -> dict[str, Path]:
+    """Folders of runs by the texts of their configs: most tests export the same few."""
+    return {}
+
+
 @pytest.fixture
-def exported(config: Config, rigidsim_command: Command) -> Callable[..., Path]:
+def run_once(
+    finished: dict[str, Path], rigidsim_command: Command, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], None]:
+    """Puts the run of a config below ``runs``, which is integrated where no test has done so."""
+
+    def run(config: str) -> None:
+        text, folder = Path(config).read_text(), Path("runs", Path(config).stem)
+        if text not in finished:
+            assert rigidsim_command("run", config, "--force").exit_code == 0
+            finished[text] = tmp_path_factory.mktemp("finished") / "run"
+            shutil.copytree(folder, finished[text])
+        elif not folder.exists():
+            shutil.copytree(finished[text], folder)
+
+    return run
+
+
+@pytest.fixture
+def exported(
+    config: Config, run_once: Callable[[str], None], rigidsim_command: Command
+) -> Callable[..., Path]:
     """Runs a small flight and exports it; returns the file."""
 
     def export(file_format: str, integrator: str = "", *options: str) -> Path:
         name = config("throw", time="end = 2\nsamples = 9", integrator=integrator, **FLIGHT)
-        assert rigidsim_command("run", name, "--force").exit_code == 0
+        run_once(name)
         result = rigidsim_command("export", "runs/throw", "--format", file_format, *options)
         assert result.exit_code == 0, result.output
         assert result.output.splitlines()[0] == f"throw.{file_format}"
@@ -212,10 +239,10 @@ EVENTFUL = '[[events]]\nname = "half"\nexpression = "t - 0.125"\n'
 
 
 @pytest.fixture
-def sky(config: Config, rigidsim_command: Command) -> xarray.Dataset:
+def sky(config: Config, run_once: Callable[[str], None], rigidsim_command: Command) -> xarray.Dataset:
     """A flight with an epoch, axes and an event, exported to the formats of text; its dataset."""
     text = config("sky", time=TIMED, rest=SKY.replace("ecliptic J2000", "EME2000") + EVENTFUL, **FLIGHT)
-    assert rigidsim_command("run", text).exit_code == 0
+    run_once(text)
     for file_format in ("csv", "aem", "oem"):
         assert rigidsim_command("export", "runs/sky", "--format", file_format).exit_code == 0
     with rigidsim.open_run("runs/sky").dataset as dataset:
@@ -285,9 +312,11 @@ def test_an_independent_reader_reads_attitude_messages(sky: xarray.Dataset) -> N
     assert str(segment.states[1].epoch) == "2029-04-13 21:46:00.250 TDB"
 
 
-def test_no_message_names_what_nobody_said(config: Config, rigidsim_command: Command) -> None:
-    assert rigidsim_command("run", config("plain", time="end = 2\nsamples = 9")).exit_code == 0
-    assert rigidsim_command("run", config("sky", time=TIMED, rest=SKY)).exit_code == 0
+def test_no_message_names_what_nobody_said(
+    config: Config, run_once: Callable[[str], None], rigidsim_command: Command
+) -> None:
+    run_once(config("plain", time="end = 2\nsamples = 9"))
+    run_once(config("sky", time=TIMED, rest=SKY))
     refusals = {
         ("plain",): "doesn't say what its time 0 is, which a message must: give [time] epoch in the config",
         ("plain", "--epoch", "J2000"): "what its space axes are, which a message must: give [frame] axes",

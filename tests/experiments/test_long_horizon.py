@@ -64,6 +64,7 @@ def measured() -> dict[tuple[str, bool], xarray.Dataset]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", study.BODIES)
 def test_errors_stay_within_the_law(body: str, measured: dict[tuple[str, bool], xarray.Dataset]) -> None:
     plain, held = (measured[body, h]["error"].sel(quantity="attitude") for h in (False, True))

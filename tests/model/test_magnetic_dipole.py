@@ -124,7 +124,7 @@ def test_loads_of_one_orbit_share_its_states() -> None:
     assert len(rigidsim.plan(rigidsim.parse(text(load, extra=apart)))["states"]) == plan["state_count"] + 4
 
 
-@pytest.mark.optimised  # the bound is that of the code of real runs
+@pytest.mark.slow
 def test_every_formulation_gives_the_same_motion() -> None:
     load = text(f"moment = [2e5, -3e5, 5e5]\n{ORBIT}\nsource_moment = {array(SOURCE)}")
     exact = tried(load, "extended")

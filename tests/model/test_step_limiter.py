@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from equations import EPS, prepared
 from scipy.integrate import quad
-from support import EPSILON
+from support import EPSILON, cases
 
 import rigidsim
 from rigidsim.model.loads import LoadModel, seconds
@@ -48,10 +48,12 @@ def spun(torque: str, runs: Path, *, width: str = "1", spin: str = "0.5", precis
 @pytest.mark.parametrize(
     ("form", "precision", "width"),
     [
-        *(("exp(-((t-50)/w)^2)/w", "double", width) for width in ("1e-1", "1e-2", "1e-3", "1e-4")),
-        ("exp(-((t-50)/w)^2)/w", "extended", "1e-3"),
-        ("exp(-(t-50)^2/w^2)/w", "double", "1e-4"),
-        ("sigmoid((t-50)/w)*sigmoid((50-t)/w)/w", "double", "1e-1"),
+        *(("exp(-((t-50)/w)^2)/w", "double", width) for width in ("1e-2", "1e-4")),
+        pytest.param("exp(-((t-50)/w)^2)/w", "double", "1e-1", marks=pytest.mark.slow),
+        pytest.param("exp(-((t-50)/w)^2)/w", "double", "1e-3", marks=pytest.mark.slow),
+        pytest.param("exp(-((t-50)/w)^2)/w", "extended", "1e-3", marks=pytest.mark.slow),
+        pytest.param("exp(-(t-50)^2/w^2)/w", "double", "1e-4", marks=pytest.mark.slow),
+        pytest.param("sigmoid((t-50)/w)*sigmoid((50-t)/w)/w", "double", "1e-1", marks=pytest.mark.slow),
         ("sigmoid((t-50)/w)*sigmoid((50-t)/w)/w", "double", "1e-4"),
     ],
 )
@@ -76,11 +78,11 @@ def test_a_pulse_gives_its_whole_impulse_and_work(form: str, width: str, precisi
 
 @pytest.mark.parametrize(
     "torque",
-    [
+    cases([
         "tanh((t-5)/0.001)", "erf((t-5)/0.001)", "atan((t-5)/0.001)", "sigmoid(100*(sin(t)-0.5))",
         "cos(t)^64", "(2+cos(t))^-64", "exp(-50*cos(t)^2)", "exp(-1000*sin(t/7)^2)",
         "1/(1+((t-50)/1e-3)^2)^4", "(t/100)^40", "1/cosh(3*(t-50))",
-    ],
+    ], ["tanh((t-5)/0.001)", "cos(t)^64", "exp(-1000*sin(t/7)^2)", "1/(1+((t-50)/1e-3)^2)^4"]),
 )  # fmt: skip
 def test_switches_and_combs(torque: str, runs: Path) -> None:
     """Against quadrature in pieces."""

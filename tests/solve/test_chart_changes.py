@@ -265,9 +265,9 @@ SCENES = {
     [
         ("free", "zxz", "double", "extended", 1000),
         ("heavy top", "xyz", "double", "extended", 1000),
-        ("gravity gradient", "xyz", "double", "extended", 1000),
+        pytest.param("gravity gradient", "xyz", "double", "extended", 1000, marks=pytest.mark.slow),
         ("heavy top", "zxz", "extended", "quadruple", 100),
-        ("gravity gradient", "zxz", "extended", "quadruple", 100),
+        pytest.param("gravity gradient", "zxz", "extended", "quadruple", 100, marks=pytest.mark.slow),
         ("free", "xyz", "quadruple", "40", 20),
     ],
 )

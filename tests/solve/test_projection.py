@@ -117,7 +117,7 @@ def rounding(precision: str, every: int) -> float:
     return (8 + math.sqrt(10 * every)) * float(precision_of(precision).epsilon)
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("formulation", cases(FORMULATIONS, [f for f in FORMULATIONS if f != "canonical"]))
 @pytest.mark.parametrize("parts", [FREE, LAGRANGE, KOVALEVSKAYA], ids=["free", "lagrange", "kovalevskaya"])
 def test_invariants_stay_within_rounding(parts: Scene, formulation: str) -> None:
     held = Motion(scene(parts, formulation), held=True)
