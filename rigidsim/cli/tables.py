@@ -102,6 +102,9 @@ def _print_ended(summary: Summary, on: Page) -> None:
     _print_accuracy(summary.accuracy, on)
     for number, name in enumerate(summary.events):
         on.line("" if number else "events", _event(summary, name))
+    if summary.undefined_samples:
+        told = [f"{name} at {count:,} samples" for name, count in summary.undefined_samples.items()]
+        on.line("undefined", f"{', '.join(told)}, where NaN is recorded")
     chaos = summary.lyapunov
     if chaos is not None:
         what = "chaotic" if chaos.chaotic else "regular"

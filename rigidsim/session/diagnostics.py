@@ -84,6 +84,7 @@ class Diagnostics:
             *self._singularity(),
             *self._digits(),
             *self._joining(),
+            *self._undefined(),
         ]
 
     @property
@@ -153,6 +154,21 @@ class Diagnostics:
                 f"{turns * 180:.3g} degrees between samples; sample more often, or choose the formulation "
                 "that carries them",
             )
+
+    def _undefined(self) -> Iterator[Caution]:
+        """Variables that are lost on the way; those that aren't defined from the start on are the scene's
+        own, as the node of a top that sleeps.
+        """
+        conventions = {r.name: r.attributes.get("convention", "") for r in self.prepared.system.recorded}
+        for name, seen in self.statistics.undefined.items():
+            if seen.count > seen.leading:
+                why = conventions.get(name, "")
+                yield Caution(
+                    WarningCode.UNDEFINED,
+                    f"{name} isn't defined, and recorded as NaN, at {seen.count} of "
+                    f"{self.progress.next_sample} samples, first at {self._words.moment(seen.since, 6)}"
+                    + (f" (its convention: {why})" if why else ""),
+                )
 
     def _since(self, found: Estimate) -> str:
         if found.predictable_seconds is None or found.growth_rate == 0.0:

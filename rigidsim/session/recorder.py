@@ -82,6 +82,9 @@ class Recorder(SampleReceiver):
         if self._prepared.scene.config.output.estimate:
             self.trail.take(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)
+        for variable in self._prepared.system.recorded:
+            values = recorded[variable.name][0]
+            self.statistics.see_undefined(variable.name, values, block.first, recorded["time"][0])
         if self._dates is not None:
             recorded |= self._dates.of_samples(block.first, len(block))
         for invariant in self._prepared.system.invariants:
@@ -138,10 +141,13 @@ class Recorder(SampleReceiver):
             wall_seconds=effort.wall,
             cpu_seconds=effort.cpu,
             integration_seconds=progress.integration_seconds,
+            undefined=seen.undefined,
         )
         checkpoint = Checkpoint(position, self._evaluator.continuity, statistics)
-        names = [invariant.name for invariant in self._prepared.system.invariants]
-        return pack_checkpoint(checkpoint, self._prepared.precision, names)
+        system = self._prepared.system
+        names = [invariant.name for invariant in system.invariants]
+        recorded = [variable.name for variable in system.recorded]
+        return pack_checkpoint(checkpoint, self._prepared.precision, names, recorded)
 
     def all_events(self, position: Position) -> Arrays:
         """Every crossing up to a position."""
@@ -153,6 +159,7 @@ class Recorder(SampleReceiver):
         seen.largest |= statistics.largest_drift
         seen.final |= statistics.final_drift
         seen.put_back |= statistics.put_back
+        seen.undefined |= statistics.undefined
         seen.nearest_singularity = statistics.nearest_singularity
         seen.singularity_time = statistics.singularity_time
         self._note_lost_turns()

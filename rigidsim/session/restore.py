@@ -30,7 +30,9 @@ def restore(
     try:
         arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
         names = [invariant.name for invariant in prepared.system.invariants]
-        checkpoint = unpack_checkpoint(arrays, prepared.precision, names, corrected.boundary())
+        recorded = [variable.name for variable in prepared.system.recorded]
+        start = corrected.boundary()
+        checkpoint = unpack_checkpoint(arrays, prepared.precision, names, recorded, start)
         for path in chain.paths:
             if "previous_seal" in root_attributes(path):
                 saved = netcdf.read_group(path, "events")

@@ -8,6 +8,7 @@ from dataclasses import field
 import numpy as np
 
 from rigidsim.scene.records import dataclass
+from rigidsim.solve.checkpoint import Undefined
 
 
 @dataclass
@@ -21,6 +22,7 @@ class SampleStatistics:
         singularity_time: of that sample, seconds.
         angles_wrapped_from: time of the first sample whose angles are within one turn, since their turns
             aren't known, seconds; nan where all are.
+        undefined: by recorded variable that has samples which are NaN.
     """
 
     largest: dict[str, float] = field(default_factory=dict)
@@ -29,6 +31,7 @@ class SampleStatistics:
     nearest_singularity: float = math.inf
     singularity_time: float = math.nan
     angles_wrapped_from: float = math.nan
+    undefined: dict[str, Undefined] = field(default_factory=dict)
 
     def see(self, invariant: str, drifts: np.ndarray) -> None:
         """Follow one invariant through a block of samples.
@@ -39,6 +42,28 @@ class SampleStatistics:
         size = np.abs(drifts)
         self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.max(size)))
         self.final[invariant] = float(drifts[-1])
+
+    def see_undefined(self, variable: str, values: np.ndarray, first: int, times: np.ndarray) -> None:
+        """Count the samples of a block at which a recorded variable isn't defined.
+
+        Args:
+            values: shape (samples, components).
+            first: index of the block's first sample.
+            times: seconds, shape (samples,).
+        """
+        bad = np.isnan(values).any(axis=1)
+        if not bad.any():
+            return
+        known = self.undefined.get(variable, Undefined())
+        leading, since = known.leading, known.since
+        start = 0
+        if leading == first:  # none was defined so far
+            start = int(np.argmin(bad)) if not bad.all() else len(bad)
+            leading += start
+        later = np.flatnonzero(bad[start:])
+        if len(later) and math.isnan(since):
+            since = float(times[start + later[0]])
+        self.undefined[variable] = Undefined(known.count + int(bad.sum()), leading, since)
 
     def see_singular(self, factors: np.ndarray, times: np.ndarray) -> None:
         """Follow the distance from a formulation's singularity.

@@ -95,6 +95,7 @@ def summarise(
         events=events,
         event_times=event_times,
         chart_changes=chart_changes,
+        undefined_samples={name: seen.count for name, seen in found.statistics.undefined.items()},
     )
 
 

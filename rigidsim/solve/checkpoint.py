@@ -5,6 +5,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import field
+
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.joined_angles import Continuity
@@ -24,6 +28,21 @@ class Position:
 
 
 @dataclass(frozen=True)
+class Undefined:
+    """Samples at which a recorded variable is NaN.
+
+    Attributes:
+        count: of them, among those so far.
+        leading: of them, those before its first defined sample.
+        since: time of the first one past those (s); nan where there is none.
+    """
+
+    count: int = 0
+    leading: int = 0
+    since: float = math.nan
+
+
+@dataclass(frozen=True)
 class Statistics:
     """What was counted and watched from a run's beginning on, over all its sessions.
 
@@ -32,6 +51,7 @@ class Statistics:
         put_back: what was put back until the latest sample, by projected invariant.
         nearest_singularity, singularity_time: smallest singular factor of a chart of Euler angles, and when
             (s).
+        undefined: by recorded variable that has such samples.
         smallest_step, largest_step: internal units.
         redone_steps: taken back and taken again.
         sessions: that took part.
@@ -50,6 +70,7 @@ class Statistics:
     wall_seconds: float
     cpu_seconds: float
     integration_seconds: float
+    undefined: Mapping[str, Undefined] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

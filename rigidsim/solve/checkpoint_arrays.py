@@ -13,7 +13,7 @@ import mpmath
 import numpy as np
 
 from rigidsim.solve.angle_wrapping import AngleState
-from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
+from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics, Undefined
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.events import FoundEvent
 from rigidsim.solve.joined_angles import Continuity
@@ -77,11 +77,13 @@ def _power(precision: Precision, exponent: int) -> Scalar:
     return precision.number(mpmath.mpf(2) ** exponent)
 
 
-def pack_checkpoint(checkpoint: Checkpoint, precision: Precision, invariants: Sequence[str]) -> Arrays:
+def pack_checkpoint(
+    checkpoint: Checkpoint, precision: Precision, invariants: Sequence[str], recorded: Sequence[str]
+) -> Arrays:
     """A checkpoint as arrays.
 
     Args:
-        invariants: the system's, in order.
+        invariants, recorded: the system's invariants and recorded variables, in order.
     """
     position, continuity, counted = checkpoint.position, checkpoint.continuity, checkpoint.statistics
     boundary = position.boundary
@@ -107,6 +109,8 @@ def pack_checkpoint(checkpoint: Checkpoint, precision: Precision, invariants: Se
     drifts = counted.largest_drift, counted.final_drift
     arrays["watched"] = np.array([_values(found, invariants) for found in drifts])
     arrays["put_back"] = np.array(_values(counted.put_back, invariants))
+    if counted.undefined:
+        arrays["undefined"] = _pack_undefined(counted.undefined, recorded)
     arrays["singularity"] = np.array([counted.nearest_singularity, counted.singularity_time])
     arrays["steps_seen"] = np.array([counted.smallest_step, counted.largest_step])
     arrays["effort"] = np.array([counted.wall_seconds, counted.cpu_seconds, counted.integration_seconds])
@@ -115,12 +119,16 @@ def pack_checkpoint(checkpoint: Checkpoint, precision: Precision, invariants: Se
 
 
 def unpack_checkpoint(
-    arrays: Mapping[str, np.ndarray], precision: Precision, invariants: Sequence[str], start: StepBoundary
+    arrays: Mapping[str, np.ndarray],
+    precision: Precision,
+    invariants: Sequence[str],
+    recorded: Sequence[str],
+    start: StepBoundary,
 ) -> Checkpoint:
     """What was packed.
 
     Args:
-        invariants: the system's, in order.
+        invariants, recorded: the system's invariants and recorded variables, in order.
         start: any boundary of the system that is resumed, for what it has to remember.
 
     Raises:
@@ -169,6 +177,7 @@ def unpack_checkpoint(
         wall_seconds=wall,
         cpu_seconds=cpu,
         integration_seconds=integration,
+        undefined=_unpack_undefined(arrays.get("undefined"), recorded),
     )
     return Checkpoint(Position(boundary, int(next_sample)), continuity, statistics)
 
@@ -189,6 +198,22 @@ def _by_name(values: Iterable[float], names: Sequence[str]) -> dict[str, float]:
     """Those that are there."""
     pairs = zip(names, map(float, values), strict=False)  # older runs have none of some
     return {name: value for name, value in pairs if not math.isnan(value)}
+
+
+def _pack_undefined(found: Mapping[str, Undefined], names: Sequence[str]) -> np.ndarray:
+    """One row for each name."""
+    rows = [found.get(name, Undefined()) for name in names]
+    return np.array([[row.count, row.leading, row.since] for row in rows], dtype=np.float64)
+
+
+def _unpack_undefined(table: np.ndarray | None, names: Sequence[str]) -> dict[str, Undefined]:
+    """Those of which there are samples; older checkpoints don't tell, and have none."""
+    if table is None:
+        return {}
+    if table.shape != (len(names), 3):
+        raise ValueError(f"the checkpoint counts undefined samples of shape {table.shape}")
+    rows = zip(names, table.tolist(), strict=True)
+    return {name: Undefined(int(n), int(leading), since) for name, (n, leading, since) in rows if n}
 
 
 def _pack_angles(found: Sequence[AngleState]) -> np.ndarray:

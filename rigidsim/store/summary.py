@@ -47,6 +47,7 @@ class WarningCode(Enum):
     EPHEMERIS_OF_EARTH = "ephemeris_of_earth"
     NEVER_HAPPENS = "never_happens"
     TIME_WITHOUT_UNIT = "time_without_unit"
+    UNDEFINED = "undefined"
 
 
 @dataclass(frozen=True)
@@ -214,6 +215,7 @@ class Summary(Brief):
         time_reached: seconds: of the last sample, or of the event that ended the run.
         engine_time: seconds: where the integration stood, which goes past samples in steps of its own.
         events, event_times: how often each happened, and when those that did.
+        undefined_samples: by recorded variable that is NaN at some, how many.
         provenance: attributes of the dataset that are repeated here.
         dataset_sha256, timeline_sha256: of the files, once there are any.
     """
@@ -242,6 +244,7 @@ class Summary(Brief):
     events: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
     event_times: dict[Text, EventTimes] = Field(default_factory=dict)
     chart_changes: Annotated[ChartChanges | None, Claim()] = None
+    undefined_samples: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
     dataset_sha256: Digest | None = None
     timeline_sha256: Digest | None = None
 

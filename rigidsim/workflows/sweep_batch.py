@@ -135,7 +135,9 @@ class BatchTiles:
         drifts = [np.abs(values) for values in block.drifts.values()]
         worst = np.max([np.nanmax(d, axis=0, initial=0) for d in drifts], axis=0) if drifts else 0
         over = worst > block.drift_bound
-        kept["warnings"] = warning_bits([[WarningCode.DRIFT.value] if bad else [] for bad in over])
+        reasons_to_warn = zip(over.tolist(), _lost(block).tolist(), strict=True)
+        drift, undefined = [WarningCode.DRIFT.value], [WarningCode.UNDEFINED.value]
+        kept["warnings"] = warning_bits([drift * bad + undefined * lost for bad, lost in reasons_to_warn])
         rows = np.maximum(block.reached - 1, 0)
         reached = np.where(block.reached > 0, block.times[rows], np.nan)
         kept |= plain_variables(
@@ -158,6 +160,18 @@ class BatchTiles:
             engines = {f"batch of {block.width}": len(chosen)}
             done.results.append(MemberResults(kept, reasons, engines))
             done.members.append(block.members[chosen])
+
+
+def _lost(block: BatchBlock) -> np.ndarray:
+    """Members of which a recorded variable isn't defined past a sample at which it is, (members,)."""
+    found = np.zeros(len(block.members), dtype=bool)
+    for values in block.values.values():
+        bad = np.isnan(values).reshape(*values.shape[:2], -1).any(axis=2)
+        if bad.any():
+            taken = np.arange(len(bad))[:, None] < block.reached
+            known = np.logical_or.accumulate(~bad & taken, axis=0)
+            found |= (bad & taken & known).any(axis=0)
+    return found
 
 
 def rows_of(kept: Kept, rows: np.ndarray) -> Kept:

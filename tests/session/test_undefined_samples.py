@@ -1,0 +1,126 @@
+"""Samples that aren't defined are counted: those lost on the way are warned of, those of the start are not."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from support import IMPATIENT
+
+import rigidsim
+from rigidsim.cli.tables import print_summary
+from rigidsim.session.statistics import SampleStatistics
+from rigidsim.solve.checkpoint import Undefined
+
+# spins about its middle axis and turns over: its spin leaves the cone about that axis and comes back
+FLIPPING = """
+name = "flipping"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1.0, 0.05]
+[frame]
+figure_axis = "y"
+[time]
+end = 60
+samples = 241
+[output]
+record = ["polar_motion", "angular_velocity"]
+timeline = false
+estimate = false
+"""
+# falls over from upright: it has no node as long as it hasn't left the vertical
+UPRIGHT = """
+name = "upright"
+[body]
+principal_moments = [2, 2, 1]
+mass = 1
+center_of_mass = [0, 0, 1]
+[initial]
+angular_velocity = [{push}, 0, 1]
+[[loads]]
+kind = "uniform_gravity"
+acceleration = [0, 0, -1]
+[time]
+end = 3
+samples = 13
+[output]
+record = ["precession_angle", "tilt"]
+timeline = false
+estimate = false
+"""
+
+
+def undefined(run: rigidsim.Run, name: str) -> np.ndarray:
+    return np.isnan(run.dataset[name].values).reshape(run.dataset.sizes["time"], -1).any(axis=1)
+
+
+@pytest.fixture(scope="module")
+def flipping(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
+    return rigidsim.run(rigidsim.parse(FLIPPING), out=tmp_path_factory.mktemp("runs"), tuning=IMPATIENT)
+
+
+def test_a_variable_lost_on_the_way_is_warned_of(flipping: rigidsim.Run) -> None:
+    rates = flipping.dataset.angular_velocity.values
+    outside = np.hypot(rates[:, 0], rates[:, 2]) > np.abs(rates[:, 1])
+    assert 0 < outside.sum() < len(outside)  # the definition, not what was recorded
+    np.testing.assert_array_equal(undefined(flipping, "polar_motion"), outside)
+    assert flipping.summary["undefined_samples"] == {"polar_motion": int(outside.sum())}
+    assert flipping.summary["warning_codes"] == ["undefined"]
+    (told,) = flipping.summary["warnings"]
+    first = flipping.dataset.time.values[outside][0]
+    assert f"at {outside.sum()} of 241 samples, first at {first:g} s" in told
+    assert "more than 45 degrees from the figure axis" in told
+    shown = Console(file=io.StringIO(), width=400)
+    print_summary(flipping.outcome, "here", shown)
+    assert f"polar_motion at {outside.sum()} samples, where NaN is recorded" in shown.file.getvalue()
+
+
+def test_the_count_is_that_of_all_sessions(flipping: rigidsim.Run, tmp_path: Path) -> None:
+    steps = flipping.summary["cost"]["steps"]
+    text = f"{FLIPPING}[limits]\nmax_steps = {2 * steps // 3}\n"
+    cut = rigidsim.run(rigidsim.parse(text), out=tmp_path, tuning=IMPATIENT)
+    assert cut.status == "stopped: max_steps"
+    assert 0 < cut.summary["undefined_samples"]["polar_motion"]
+    done = rigidsim.resume(cut.folder.path)
+    assert done.status == "finished"
+    for key in ("undefined_samples", "warnings", "warning_codes"):
+        assert done.summary[key] == flipping.summary[key]
+
+
+@pytest.mark.parametrize(("push", "since"), [(0.0, 13), (1e-9, 1)])
+def test_what_the_start_leaves_undefined_is_told_but_no_alarm(push: float, since: int) -> None:
+    run = rigidsim.run(rigidsim.parse(UPRIGHT.format(push=push)), out=None)
+    assert undefined(run, "precession_angle").tolist() == [True] * since + [False] * (13 - since)
+    assert run.summary["undefined_samples"] == {"precession_angle": since}
+    assert run.summary["warnings"] == []
+
+
+def test_members_of_a_batch_are_warned_of_as_single_runs_are(tmp_path: Path) -> None:
+    axes = 'axes."initial.angular_velocity[0]" = {values = [0.1, 0.0]}'  # the other stays where it is
+    text = FLIPPING.replace("0.05]", "0.0]") + f'[sweep]\nkeep = ["final"]\n{axes}\n'
+    codes = {}
+    for batch in (True, False):
+        experiment = rigidsim.parse(f"{text}batch = {str(batch).lower()}\n")
+        sweep = rigidsim.sweep(experiment, out=tmp_path / str(batch))
+        assert any("batch" in engine for engine in sweep.summary["engines"]) == batch
+        warnings = sweep.dataset.warnings
+        meanings = warnings.attrs["flag_meanings"].split()
+        bit = 1 << meanings.index("undefined")
+        codes[batch] = [bool(bits & bit) for bits in warnings.values.tolist()]
+    assert codes == {True: [True, False], False: [True, False]}
+
+
+@pytest.mark.parametrize("cuts", [(7,), (1, 6), (2, 5), (3, 4), (1, 1, 1, 1, 1, 1, 1)])
+def test_counts_dont_depend_on_the_blocks_that_samples_come_in(cuts: tuple[int, ...]) -> None:
+    bad = np.array([1, 1, 0, 1, 0, 0, 1], dtype=bool)
+    values = np.column_stack([np.where(bad, np.nan, 1.0), np.zeros(7)])
+    seen, first = SampleStatistics(), 0
+    for count in cuts:
+        rows = slice(first, first + count)
+        seen.see_undefined("x", values[rows], first, np.arange(7.0)[rows])
+        first += count
+    assert seen.undefined == {"x": Undefined(count=4, leading=2, since=3.0)}
