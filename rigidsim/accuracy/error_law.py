@@ -14,10 +14,6 @@ from rigidsim.solve.problem import InitialValueProblem, double_twin
 if TYPE_CHECKING:
     from rigidsim.solve.closed_form import ClosedForm
 
-DRIFT_FACTOR = 50.0
-"""A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
-steps add up like a random walk (Brouwer 1937), with a few roundings per step."""
-
 CLOSED_FORM = 50.0
 """eps: rounding of a sample from a closed form, thirty operations and sines right to 4 ulp, at any time."""
 

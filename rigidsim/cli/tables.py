@@ -103,8 +103,9 @@ def _print_ended(summary: Summary, on: Page) -> None:
     for number, name in enumerate(summary.events):
         on.line("" if number else "events", _event(summary, name))
     if summary.undefined_samples:
-        told = [f"{name} at {count:,} samples" for name, count in summary.undefined_samples.items()]
-        on.line("undefined", f"{', '.join(told)}, where NaN is recorded")
+        counts = summary.undefined_samples.items()
+        told = [f"{name} at {count:,} sample{'s' * (count > 1)}" for name, count in counts]
+        on.line("undefined", f"{', '.join(told)}; NaN is recorded there")
     chaos = summary.lyapunov
     if chaos is not None:
         what = "chaotic" if chaos.chaotic else "regular"

@@ -15,6 +15,7 @@ from rigidsim.model import rotations
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import dot
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
@@ -115,22 +116,30 @@ def euler_states(scene: Scene, rates: list[Symbolic], sequence: str | None = Non
     names = ["phi", "theta", "psi"]
     angles = list(hy.make_vars(*names))
     derivatives, factor = rotations.euler_rates(sequence, angles, rates)
-    initial = scene.euler_angles if sequence == asked else None
-    if initial is None:
-        matrix = attitude.rotation_matrix(scene.quaternion)
-        initial = attitude.euler_from_matrix(scene.context, matrix, sequence)
+    matrix = attitude.rotation_matrix(scene.quaternion)
+    start = scene.euler_angles or attitude.euler_from_matrix(scene.context, matrix, asked)
+    initial = start if sequence == asked else attitude.euler_from_matrix(scene.context, matrix, sequence)
+    quaternion = rotations.quaternion_from_euler(sequence, angles)
+    if scene.euler_angles is None and _opposite(scene, start):
+        quaternion = [-x for x in quaternion]  # in both charts: from one to the other its sign is kept
     return AttitudeStates(
         "euler_angles",
         names,
         derivatives,
         list(initial),
         rotations.euler_matrix(sequence, angles),
-        rotations.quaternion_from_euler(sequence, angles),
+        quaternion,
         "wrapping",
         angles=(0, 1, 2),
         singular_factor=factor,
         sequence=sequence,
     )
+
+
+def _opposite(scene: Scene, angles: list[Any]) -> bool:
+    """Whether the quaternion of the asked sequence's angles is minus the one that the scene was given."""
+    made = attitude.quaternion_from_euler(scene.context, angles, scene.config.integrator.euler_sequence)
+    return bool(dot(made, list(scene.quaternion)) < 0)
 
 
 def matrix_states(scene: Scene, rates: list[Symbolic]) -> AttitudeStates:

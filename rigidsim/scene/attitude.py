@@ -1,11 +1,17 @@
-"""Attitudes as numbers of mpmath: ``rigidsim.scene.rotations`` in the precision of a context."""
+"""Attitudes as numbers of mpmath: ``rigidsim.scene.rotations`` in the precision of a context.
+
+What rounding leaves of a zero (the cosine of 90 degrees, a difference of equal products) is zero: single
+precision can't hold it, and an unstable equilibrium must not be left because of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from rigidsim.scene.arithmetic import Matrix, Vector, norm
-from rigidsim.scene.rotations import AXES, Rotations, parity, product, rotation_matrix, shepperd
+from rigidsim.scene import rotations
+from rigidsim.scene.arithmetic import GUARD_BITS, Matrix, Vector, negligible, norm
+from rigidsim.scene.rotations import AXES, Rotations, parity, shepperd
 
 __all__ = [
     "AXES",
@@ -21,8 +27,47 @@ __all__ = [
 
 def _within(context: Any) -> Rotations:
     tiny = context.mpf(2) ** (8 - context.prec)
-    functions = context.sin, context.cos, context.atan2, context.hypot
-    return Rotations(*functions, constant=context.mpf, negligible=lambda length: bool(length < tiny))
+
+    def sine(angle: Any) -> Any:
+        return _beside(context.sin(angle), [angle])
+
+    def cosine(angle: Any) -> Any:
+        return _beside(context.cos(angle), [angle])
+
+    functions = sine, cosine, context.atan2, context.hypot
+    is_tiny = lambda length: bool(length < tiny)  # noqa: E731
+    return Rotations(*functions, constant=context.mpf, negligible=is_tiny, total=_total)
+
+
+def _beside(value: Any, terms: Sequence[Any]) -> Any:
+    """A value, or zero where it is nothing but the rounding of what it was made of.
+
+    Numbers without guard bits (floats, arrays) have no digits to spare and are left as they are.
+    """
+    context = getattr(getattr(value, "graph", value), "context", None)  # a traced number's is its graph's
+    if context is None or context.prec < GUARD_BITS:
+        return value
+    size = rotations.from_left([abs(term) for term in terms])  # no comparison of terms: a guard of a batch
+    return value if abs(value) > negligible(context) * size else value * 0
+
+
+def _total(terms: Sequence[Any]) -> Any:
+    return _beside(rotations.from_left(terms), terms)
+
+
+def product(p: Sequence[Any], q: Sequence[Any]) -> Vector:
+    """Hamilton product p q (first q, then p, as rotations body to space)."""
+    return rotations.product(p, q, _total)
+
+
+def rotation_matrix(q: Vector) -> Matrix:
+    """R of a unit quaternion."""
+    w, x, y, z = q
+    pairs = {(0, 1): (x * y, w * z), (0, 2): (x * z, w * y), (1, 2): (y * z, w * x)}
+    return [
+        [_beside(r, pairs[min(i, j), max(i, j)] if i != j else (1.0,)) for j, r in enumerate(row)]
+        for i, row in enumerate(rotations.rotation_matrix(q))
+    ]
 
 
 def unit_quaternion(context: Any, q: Vector) -> Vector:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from rigidsim.accuracy.error_law import DRIFT_FACTOR
 from rigidsim.accuracy.growth import UNCERTAIN
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.scene.records import dataclass
@@ -44,7 +43,7 @@ class Diagnostics:
     @property
     def drift_bound(self) -> float:
         """Relative drift that rounding alone explains."""
-        return DRIFT_FACTOR * self.prepared.law_tolerance * math.sqrt(max(self.progress.steps, 1))
+        return float(self.prepared.drift_bound(self.progress.steps))
 
     def estimated(
         self,

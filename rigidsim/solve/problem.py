@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import heyoka as hy
 import mpmath
+import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.model.load import Load
@@ -26,6 +27,10 @@ from rigidsim.solve.sampling import SampleClock
 
 if TYPE_CHECKING:
     from rigidsim.solve.closed_form import ClosedForm
+
+DRIFT_FACTOR = 50.0
+"""A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
+steps add up like a random walk (Brouwer 1937), with a few roundings per step."""
 
 _SPARE_ORDER = 0.9
 _AUTO_BITS = 3
@@ -79,6 +84,10 @@ class InitialValueProblem:
         smaller.
         """
         return max(self.effective_tolerance, float(self.precision.epsilon))
+
+    def drift_bound(self, steps: int | np.ndarray) -> np.ndarray:
+        """Relative drift of an invariant that rounding alone explains, after so many steps; any shape."""
+        return DRIFT_FACTOR * self.law_tolerance * np.sqrt(np.maximum(steps, 1))
 
 
 def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialValueProblem:

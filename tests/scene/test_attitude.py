@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from support import run_text
 
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import context_for, multiply, transpose
@@ -182,3 +187,79 @@ def test_angular_momentum_is_given_in_space_axes() -> None:
     """The body is turned by 90 degrees about z: its x axis points along Y."""
     found = scene('angular_momentum = [0, 3, 0]\neuler_angles = ["90 deg", 0, 0]')
     assert max(abs(a - b) for a, b in zip(found.angular_velocity, [3, 0, 0], strict=True)) <= LAST
+
+
+RIGHT = [0, 90, 180, -90, 270, 360]
+
+
+@pytest.mark.parametrize("sequence", ["zxz", "zyx"])
+def test_multiples_of_a_right_angle_leave_nothing_beside_zero(sequence: str) -> None:
+    context = context_for("single")
+    for angles in itertools.product(RIGHT, repeat=3):
+        turns = [context.radians(context.mpf(angle)) for angle in angles]
+        q = attitude.quaternion_from_euler(context, turns, sequence)
+        exact = Rotation.from_euler(sequence.upper(), angles, degrees=True).as_matrix().round()
+        assert [[int(x) for x in row] for row in exact] == [
+            [x if x == 0 else context.nint(x) for x in row] for row in attitude.rotation_matrix(q)
+        ]
+        smallest = min(abs(x) for x in q if x != 0)
+        assert smallest > 0.4  # half a turn's halves: 1/2, sqrt(1/2) or 1
+
+
+def test_tiny_angles_that_are_meant_are_kept() -> None:
+    tiny = CONTEXT.mpf(10) ** -200
+    zero = CONTEXT.zero
+    assert attitude.quaternion_from_euler(CONTEXT, [tiny, zero, zero], "zxz")[3] == CONTEXT.sin(tiny / 2)
+    off = CONTEXT.pi / 2 + CONTEXT.mpf(10) ** -45  # of some 88 digits
+    cosine = attitude.rotation_matrix(attitude.quaternion_from_euler(CONTEXT, [off, zero, zero], "zxz"))[0][0]
+    assert abs(cosine / CONTEXT.cos(off) - 1) < CONTEXT.mpf(10) ** -35
+
+
+def test_floats_are_left_as_they_are() -> None:
+    assert attitude.quaternion_from_euler(mpmath.fp, [math.pi, 0.0, 0.0], "xyz")[0] == math.cos(math.pi / 2)
+
+
+QUARTERS = """
+name = "quarters"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1.0, 0.05]
+euler_angles = {angles}
+[time]
+end = 1
+samples = 2
+[integrator]
+precision = "single"
+formulation = "{formulation}"
+"""
+
+
+@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles"])
+@pytest.mark.parametrize(
+    "angles", [["90 deg", "90 deg", "180 deg"], ["0", "180 deg", "0"], ["pi", "pi/2", "pi"]]
+)
+def test_single_precision_takes_exact_right_angles(angles: list[str], formulation: str) -> None:
+    prepared = prepare(parse(QUARTERS.format(angles=angles, formulation=formulation)))
+    if formulation != "euler_angles":
+        assert min(abs(x) for x in prepared.system.initial[3:] if x != 0) > 0.4
+
+
+@pytest.mark.parametrize("formulation", ["euler_angles", "canonical"])
+@pytest.mark.parametrize("sequence", ["zxz", "zyx"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_recorded_quaternions_begin_with_the_one_given(formulation: str, sequence: str, sign: int) -> None:
+    given = [0.3 * sign, -0.5 * sign, 0.2 * sign, 0.75 * sign]
+    text = (
+        'name = "signs"\n[body]\nprincipal_moments = [1, 2, 2.5]\n'
+        "[initial]\nangular_velocity = [0.1, 1, 0.05]\n"
+        f"quaternion = {given}\n[time]\nend = 12\nsamples = 49\n"
+        f'[integrator]\neuler_sequence = "{sequence}"\n[output]\nrecord = ["quaternion"]\n'
+    )
+    carried, other = (
+        run_text(text, f'integrator.formulation="{how}"').dataset.quaternion.values
+        for how in ("quaternion", formulation)
+    )
+    unit_of_it = np.array(given) / np.linalg.norm(given)
+    np.testing.assert_allclose(other[0], unit_of_it, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(other, carried, rtol=0, atol=1e-12)  # and goes on with its sign

@@ -1,4 +1,4 @@
-"""Samples that aren't defined are counted: those lost on the way are warned of, those of the start are not."""
+"""Samples that aren't defined are counted; those lost on the way are warned of, those of the start aren't."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_variable_lost_on_the_way_is_warned_of(flipping: rigidsim.Run) -> None
     assert "more than 45 degrees from the figure axis" in told
     shown = Console(file=io.StringIO(), width=400)
     print_summary(flipping.outcome, "here", shown)
-    assert f"polar_motion at {outside.sum()} samples, where NaN is recorded" in shown.file.getvalue()
+    assert f"polar_motion at {outside.sum()} samples; NaN is recorded there" in shown.file.getvalue()
 
 
 def test_the_count_is_that_of_all_sessions(flipping: rigidsim.Run, tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_the_count_is_that_of_all_sessions(flipping: rigidsim.Run, tmp_path: Pat
     text = f"{FLIPPING}[limits]\nmax_steps = {2 * steps // 3}\n"
     cut = rigidsim.run(rigidsim.parse(text), out=tmp_path, tuning=IMPATIENT)
     assert cut.status == "stopped: max_steps"
-    assert 0 < cut.summary["undefined_samples"]["polar_motion"]
+    assert cut.summary["undefined_samples"]["polar_motion"] > 0
     done = rigidsim.resume(cut.folder.path)
     assert done.status == "finished"
     for key in ("undefined_samples", "warnings", "warning_codes"):

@@ -25,9 +25,6 @@ _STEPS_PER_UNIT = 200.0
 """A natural step is of the order of one internal unit of time. A lane that takes so many more is given up
 here, before it holds the others any longer, and run by itself."""
 
-DRIFT_FACTOR = 50.0
-"""As of ``rigidsim.accuracy.error_law``."""
-
 
 @dataclass(frozen=True)
 class BatchEvents:
@@ -140,7 +137,7 @@ class BatchRun:
             self._status(lanes, most),
             reached,
             steps,
-            self._drift_bound(steps),
+            self._traced.prepared.drift_bound(steps),
             self._turned(numbers, part),
             self._events(lanes, swept, numbers, part, units, begun),
             self.width,
@@ -173,9 +170,6 @@ class BatchRun:
             Status.FINISHED if there else (short if finite else Status.NON_FINITE)
             for there, finite in zip(lanes.arrived.tolist(), lanes.finite.tolist(), strict=True)
         ]
-
-    def _drift_bound(self, steps: np.ndarray) -> np.ndarray:
-        return DRIFT_FACTOR * self._traced.prepared.law_tolerance * np.sqrt(np.maximum(steps, 1))
 
     def _turned(self, numbers: Numbers, part: slice) -> np.ndarray:
         samples = self._traced.prepared.scene.samples
