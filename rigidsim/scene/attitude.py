@@ -48,7 +48,7 @@ def _beside(value: Any, terms: Sequence[Any]) -> Any:
     if context is None or context.prec < GUARD_BITS:
         return value
     size = rotations.from_left([abs(term) for term in terms])  # no comparison of terms: a guard of a batch
-    return value if abs(value) > negligible(context) * size else value * 0
+    return value * 0 if abs(value) < negligible(context) * size else value
 
 
 def _total(terms: Sequence[Any]) -> Any:
