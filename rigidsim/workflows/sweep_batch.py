@@ -166,7 +166,7 @@ def _lost(block: BatchBlock) -> np.ndarray:
     """Members of which a recorded variable isn't defined past a sample at which it is, (members,)."""
     found = np.zeros(len(block.members), dtype=bool)
     for values in block.values.values():
-        bad = np.isnan(values).reshape(*values.shape[:2], -1).any(axis=2)
+        bad = np.asarray(np.isnan(values).reshape(*values.shape[:2], -1).any(axis=2))
         if bad.any():
             taken = np.arange(len(bad))[:, None] < block.reached
             known = np.logical_or.accumulate(~bad & taken, axis=0)
