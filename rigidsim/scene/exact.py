@@ -54,6 +54,11 @@ class ExactNumber:
     pi_power: int = 0
     assumed: str = field(default="", compare=False)
 
+    @property
+    def swept(self) -> bool:
+        """Whether it stands for the numbers of all members of a sweep."""
+        return False
+
     def at(self, context: Any) -> Any:
         """The value as an ``mpf`` of the given mpmath context, correct to its precision."""
         value = rounded(self.rational, context)

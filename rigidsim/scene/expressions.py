@@ -13,7 +13,6 @@ from typing import Any
 
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.traced_exact import TracedExact, exactly
 
 # Past any value that means something, and still quick to take the sine of: 5000 decimal digits fit.
 _LARGEST_BITS = 20_000
@@ -97,7 +96,9 @@ class Expression:
 
 def _exact(operator: str, numbers: list[ExactNumber]) -> ExactNumber | None:
     """The exact result; None where it isn't a rational times a power of pi, or is too long."""
-    if any(isinstance(number, TracedExact) for number in numbers):
+    if any(number.swept for number in numbers):
+        from rigidsim.scene.traced_exact import exactly
+
         return exactly(operator, numbers)
     a, b = numbers[0], numbers[-1]
     x, y, pi_power = a.rational, b.rational, a.pi_power

@@ -28,6 +28,11 @@ class TracedExact(ExactNumber):
     node: int
     exact: ExactNumber
 
+    @property
+    def swept(self) -> bool:
+        """Yes."""
+        return True
+
     def at(self, context: Any) -> Any:
         """A traced number in the graph's context, the representative's value in any other."""
         return self._traced() if isinstance(context, TracingContext) else self.exact.at(context)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rigidsim.errors import VIEW, StoppedWritingError
-from rigidsim.look.thinning import KeptRows
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.schema import Output
 from rigidsim.session.attributes import of_complete
@@ -23,6 +23,9 @@ from rigidsim.store.recorded_rows import recorded_rows
 from rigidsim.store.segments import SegmentWriter
 from rigidsim.store.summary import Summary
 from rigidsim.store.variables import Extra
+
+if TYPE_CHECKING:
+    from rigidsim.look.thinning import KeptRows
 
 
 @dataclass

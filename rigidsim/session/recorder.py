@@ -5,10 +5,10 @@ from __future__ import annotations
 import copy
 import math
 import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.look.thinning import KeptRows
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.timings import Effort
 from rigidsim.session.variables import dates_of, drift_name, put_back_name
@@ -24,6 +24,9 @@ from rigidsim.solve.trail import Trail
 from rigidsim.store.memory import MemoryWriter
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.segments import SegmentWriter
+
+if TYPE_CHECKING:
+    from rigidsim.look.thinning import KeptRows
 
 Arrays = dict[str, np.ndarray]
 
@@ -62,7 +65,7 @@ class Recorder(SampleReceiver):
         self.trail = Trail(prepared.precision)
         output, count = prepared.scene.config.output, prepared.clock.count
         shown = output.timeline and isinstance(writer, SegmentWriter)
-        self.kept = KeptRows(count, output.timeline_rows) if shown else None
+        self.kept = _kept_rows(count, output.timeline_rows) if shown else None
 
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples, up to the first past the guard ``max_drift``."""
@@ -168,3 +171,10 @@ class Recorder(SampleReceiver):
         progress.integration_seconds = statistics.integration_seconds
         effort.wall_seconds, effort.cpu_seconds = statistics.wall_seconds, statistics.cpu_seconds
         effort.sessions = statistics.sessions + 1
+
+
+def _kept_rows(count: int, most: int) -> KeptRows:
+    """Rows that the timeline will show, so that it needn't read them again."""
+    from rigidsim.look.thinning import KeptRows
+
+    return KeptRows(count, most)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import heyoka as hy
 import numpy as np
@@ -16,7 +16,9 @@ from rigidsim.model.system import System
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.switching_stepper import SwitchingStepper
+
+if TYPE_CHECKING:
+    from rigidsim.solve.switching_stepper import SwitchingStepper
 
 NEIGHBOURS = 3
 TOLERANCE, TIGHT = 1e-8, 1e-14
@@ -223,6 +225,8 @@ class SwitchingLanes:
         self, system: System, start: float, end: float, steps: int, stepper: SwitchingStepper | None = None
     ) -> None:
         if stepper is None:
+            from rigidsim.solve.switching_stepper import SwitchingStepper
+
             precision = replace(precision_of("double"), compact=True)
             stepper = SwitchingStepper(system, precision, None, precision.scalar(start))
         self._stepper = stepper

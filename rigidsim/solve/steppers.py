@@ -6,7 +6,6 @@ from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.switching_stepper import SwitchingStepper
 
 
 def stepper_of(
@@ -23,5 +22,8 @@ def stepper_of(
         start: internal units.
         log: of events; without one none are looked for.
     """
-    kind = SwitchingStepper if system.switches else Stepper
-    return kind(system, precision, tolerance, start, log)
+    if not system.switches:
+        return Stepper(system, precision, tolerance, start, log)
+    from rigidsim.solve.switching_stepper import SwitchingStepper
+
+    return SwitchingStepper(system, precision, tolerance, start, log)

@@ -18,6 +18,7 @@ import time as clock_time
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import heyoka as hy
 import numpy as np
@@ -32,7 +33,9 @@ from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.switching_stepper import SwitchingStepper
+
+if TYPE_CHECKING:
+    from rigidsim.solve.switching_stepper import SwitchingStepper
 
 DENSE = 1.0
 """Angle (rad) by which a body turns at most between samples whose angles are joined to the nearest."""
@@ -239,6 +242,8 @@ class TurnCounter:
         start = math.ldexp(float(span.begin), -system.scaling.time)
         self._follower: _Plain | _Switching
         if system.switches:
+            from rigidsim.solve.switching_stepper import SwitchingStepper
+
             self._follower = _Switching(SwitchingStepper(system, double, _TOLERANCE, start))
         else:
             self._follower = _Plain(system, compact=compact)

@@ -16,7 +16,6 @@ from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.joined_segments import join_segments
 from rigidsim.store.seal import check_whole, read_seal
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.sweep_folder import is_sweep
 from rigidsim.store.validated_open import open_dataset
 from rigidsim.store.variables import SCHEMA_VERSION
 
@@ -188,6 +187,8 @@ def open_run(path: str | Path) -> SavedRun:
     Raises:
         RunFolderError: no run there, or a damaged summary.
     """
+    from rigidsim.store.sweep_folder import is_sweep
+
     if is_sweep(path):
         what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
         raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")

@@ -9,10 +9,9 @@ from typing import Any
 import rigidsim.model.loads
 import rigidsim.model.partial_invariants  # noqa: F401  (both enter what they define into rigidsim.scene.registry)
 from rigidsim.scene.config import Experiment, load, parse
-from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.schema import config_model
 
-__all__ = ["Experiment", "Given", "as_experiment", "config_model", "editor_schema", "load", "parse"]
+__all__ = ["Experiment", "Given", "as_experiment", "config_model", "load", "parse"]
 
 Given = Experiment | str | Path | Mapping[str, Any]
 """An experiment, the path of its config, or its tables as a dictionary."""

@@ -11,6 +11,7 @@ def schema() -> None:
     Example: rigidsim schema > rigidsim.schema.json; editors read the config's first line
     "#:schema rigidsim.schema.json"
     """
-    from rigidsim.workflows.read import editor_schema
+    import rigidsim.workflows.read  # noqa: F401  (every kind of load is in the schema)
+    from rigidsim.scene.editor_schema import editor_schema
 
     print(json.dumps(editor_schema(), indent=2))
