@@ -51,9 +51,9 @@ class SampleStatistics:
             first: index of the block's first sample.
             times: seconds, shape (samples,).
         """
-        bad = np.isnan(values).any(axis=1)
-        if not bad.any():
+        if not math.isnan(values.min()):  # the smallest of numbers among which one is NaN is NaN
             return
+        bad = np.isnan(values).any(axis=1)
         known = self.undefined.get(variable, Undefined())
         leading, since = known.leading, known.since
         start = 0
