@@ -51,7 +51,7 @@ class SampleStatistics:
             first: index of the block's first sample.
             times: seconds, shape (samples,).
         """
-        if not math.isnan(values.min()):  # the smallest of numbers among which one is NaN is NaN
+        if not values.size or not math.isnan(values.min()):  # NaN where one of them is
             return
         bad = np.isnan(values).any(axis=1)
         known = self.undefined.get(variable, Undefined())
