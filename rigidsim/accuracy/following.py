@@ -27,14 +27,13 @@ from rigidsim.solve.lanes import (
     Lanes,
     OwnLanes,
     SeriesErrors,
-    SwitchingLanes,
+    StepperLanes,
     borrowed,
 )
 from rigidsim.solve.neighbours import Neighbours, Pushes, Spread
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.switching_stepper import SwitchingStepper
 from rigidsim.solve.trail import Waypoint, Waypoints
 
 
@@ -127,7 +126,7 @@ def leading(spread: Spread, carried: bool) -> np.ndarray:
 
 def _affordable(course: Course, margins: Margins) -> float:
     """Steps that may be followed: so many whatever they cost, or for a small part of the run's cost."""
-    if course.prepared.system.switches:
+    if course.prepared.system.stepwise:
         return max(margins.switching_steps, margins.switching_share * course.steps)
     dearer = dict(margins.dearer).get(course.prepared.precision.name)
     if dearer is None:
@@ -190,7 +189,7 @@ def _waypoints(course: Course, part: float, margins: Margins) -> list[Waypoint]:
     """Where windows begin; none where the neighbours' states are others than the run's."""
     system = course.prepared.system
     own = course.own is not None and part * course.steps < margins.most_own_steps
-    if course.waypoints is None or system.switches or not (own or _same_states(course.prepared)):
+    if course.waypoints is None or system.stepwise or not (own or _same_states(course.prepared)):
         return []
     there = course.waypoints.between(part * course.steps, course.steps)
     count = int(part * course.steps * (1 - margins.beginning) / margins.window)
@@ -268,8 +267,8 @@ def _neighbours(course: Course, part: float, first: float, tolerance: float, mar
     series: SeriesErrors | None = None
     stand_in = False
     follows = tolerance > TIGHT or not loose(prepared)  # it is as loose as the run
-    if isinstance(own, SwitchingStepper):
-        lanes: Lanes = SwitchingLanes(system, course.start, course.end, course.steps, own)
+    if own is not None and own.careful:
+        lanes: Lanes = StepperLanes(system, course.start, course.end, course.steps, own)
     elif own is not None and follows and _by_itself(course, part, tolerance, margins):
         lanes = OwnLanes(system, own.integrator, loose=_same_states(prepared))
         series = (
@@ -279,11 +278,11 @@ def _neighbours(course: Course, part: float, first: float, tolerance: float, mar
         same = _same_states(prepared)
         system = system.rounded(precision_of("double").number) if same else double_twin(prepared)
         stand_in = not same and prepared.system.partner is None
-        if system.switches:
-            lanes = SwitchingLanes(system, course.start, course.end, course.steps)
+        if system.stepwise:
+            lanes = StepperLanes(system, course.start, course.end, course.steps)
         else:
             lanes = BatchLanes(system, steps, tolerance)
-        if loose(prepared) and not system.switches:
+        if loose(prepared) and not system.stepwise:
             series = SeriesErrors(system, prepared.effective_tolerance)
     rounded = np.array([precision.exact(precision.number(x)) != x for x in system.initial])
     pushes = _pushes(course, stand_in, margins)
@@ -313,7 +312,7 @@ def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
     """
     prepared = course.prepared
     plain, formulation = Pushes(), prepared.system.requirements.formulation
-    if prepared.system.switches and loose(prepared):
+    if prepared.system.stepwise and loose(prepared):
         plain = replace(
             plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
         )

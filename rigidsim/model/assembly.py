@@ -31,6 +31,7 @@ from rigidsim.model.tangents import GROWTH, tangent_block
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 RATES, VERTICAL = ["wx", "wy", "wz"], ["gx", "gy", "gz"]
 POSITION, VELOCITY = ["x", "y", "z"], ["vx", "vy", "vz"]
@@ -77,6 +78,7 @@ def assemble_states(
         number,
         plan.orbit_tags,
         plan.surfaces,
+        plan.tables,
         loads=list(plan.loads),
     )
     if canonical is not None:
@@ -184,6 +186,7 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
     """Orbits, each once for all the loads on it, and what other states loads bring."""
     blocks: list[StateBlock] = []
     placed: dict[KeplerOrbit, list[str]] = {}
+    carried: set[TabulatedOrbit] = set()
     for load in m.loads:
         if load.orbit is not None:
             placed.setdefault(load.orbit, []).append(load.title)
@@ -192,6 +195,10 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
             titles = ", ".join(dict.fromkeys(placed.pop(load.orbit)))
             block = m.orbit_block(load.orbit)
             blocks.append(replace(block, why=block.why or f"{titles}: where its source is"))
+        if load.table is not None and load.table not in carried:
+            carried.add(load.table)
+            block = m.table(load.table).block
+            blocks.append(replace(block, why=f'{load.title}: where its source is, by "{load.table.name}"'))
         own = load.extra_states(m)
         if own is not None:
             blocks.append(replace(own, why=own.why or f"{load.title}: where its source is"))

@@ -18,12 +18,14 @@ from rigidsim.model.orbit_states import OrbitStates, orbit_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.table_states import TablePlace, table_states
 from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.expressions import Node
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 from rigidsim.scene.traced import largest_of
 
 T = TypeVar("T")
@@ -41,6 +43,7 @@ class Kinematics:
         number: mpf to the working precision.
         orbit_tags: what makes the names of each prescribed orbit's states unique.
         surfaces: on whose sides expressions are smooth.
+        tables: where the states and parameters of orbits by a table are.
     """
 
     scene: Scene
@@ -54,7 +57,10 @@ class Kinematics:
     number: Rounder
     orbit_tags: Mapping[KeplerOrbit, str] = field(default_factory=dict)
     surfaces: Surfaces = field(default_factory=Surfaces)
-    _orbits: dict[KeplerOrbit, OrbitStates] = field(default_factory=dict, init=False, repr=False)
+    tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
+    _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @cached_property
     def sides(self) -> Mapping[Node, Symbolic]:
@@ -132,6 +138,14 @@ class Kinematics:
             unit = context.ldexp(context.one, self.scaling.time)
             tag = self.orbit_tags.get(orbit, "")
             self._orbits[orbit] = orbit_states(orbit, tag, unit, self.scene.start, context, self.number)
+        return self._orbits[orbit]
+
+    def table(self, orbit: TabulatedOrbit) -> OrbitStates:
+        """An orbit by a table, likewise."""
+        if orbit not in self._orbits:
+            place = self.tables.get(orbit) or TablePlace("", 0)
+            made = table_states(orbit, place, self.scaling.time, self.scene.start, self.number)
+            self._orbits[orbit] = made
         return self._orbits[orbit]
 
     def orbit_block(self, orbit: KeplerOrbit) -> StateBlock:

@@ -18,6 +18,7 @@ from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 Term = tuple[Vector, Symbolic]
 """A constant vector (mpf) times an expression."""
@@ -33,6 +34,7 @@ class Load(SceneLoad):
         wide: whether its expressions are too many to be unrolled (series of thousands of terms).
         about_vertical: whether it may have a torque about the direction of gravity.
         orbit: the prescribed orbit that its source moves on; all loads on one orbit share its states.
+        table: the orbit of its source, where a table gives it; loads on it share its states likewise.
         corotating_orbit: a circular orbit in a fixed plane in whose frame its potential rests: then there is
             Jacobi's constant.
         has_source: whether the direction to its source is known: nadir, roll and libration count from it.
@@ -45,6 +47,7 @@ class Load(SceneLoad):
     wide = False
     about_vertical = True
     orbit: KeplerOrbit | None = None
+    table: TabulatedOrbit | None = None
     corotating_orbit: KeplerOrbit | None = None
     has_source: bool = False
     attracting_point: Vector | None = None

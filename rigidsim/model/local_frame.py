@@ -80,6 +80,8 @@ def moves_slowly_in_orbit(m: Mechanics) -> bool:
     context, scene = m.scene.context, m.scene
     if load.orbit is not None:
         rate = abs(load.orbit.mean_motion)
+    elif load.table is not None:
+        rate = abs(load.table.mean_motion)
     elif load.attracting_point is not None and scene.position is not None and scene.velocity is not None:
         place = [x - a for x, a in zip(scene.position, load.attracting_point, strict=True)]
         rate = norm(context, cross(place, scene.velocity)) / sum(x * x for x in place)
@@ -94,6 +96,8 @@ def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbol
     to_body = transpose(m.matrix)
     if load.orbit is not None:
         return apply(to_body, m.orbit(load.orbit).normal), "normal of its orbit"
+    if load.table is not None:
+        return apply(to_body, m.table(load.table).normal), "normal of its orbit, by its table"
     if load.attracting_point is not None:
         return apply(to_body, flight_normal(m, load.attracting_point)), "normal of the osculating orbit"
     which, described = 2, "space Z, across the source's direction, as the normal"

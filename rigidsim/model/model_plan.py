@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
@@ -15,10 +16,12 @@ from rigidsim.model.parity import refuse_odd_loads
 from rigidsim.model.planar import Plane, asked_plane, gradient_plane
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
+from rigidsim.model.table_states import TablePlace, places_of
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces, surfaces_of
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class ModelPlan:
         paired: whether its equations are those of ``rigidsim.model.paired_products``.
         surfaces: on which the equations change.
         plane: that the motion stays in, where its formulation is planar.
+        tables: where the states and parameters of orbits by a table are.
     """
 
     scene: Scene
@@ -45,6 +49,7 @@ class ModelPlan:
     paired: bool
     surfaces: Surfaces
     plane: Plane | None = None
+    tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
 
     @property
     def wide(self) -> bool:
@@ -87,6 +92,13 @@ def plan_model(
     for number, load in enumerate(scene.loads, start=1):
         if getattr(load, "orbit", None) is not None:
             tags.setdefault(load.orbit, str(number))  # type: ignore[attr-defined]
+    surfaces, tables = surfaces_of(scene), _tables(scene)
+    if tables and surfaces.found:
+        what = (
+            f'given beside {surfaces.found[0].where}, whose "{surfaces.found[0].text}" has a kink or jump: '
+            "steps can't end at both; make the change smooth with tanh, or give the orbit by elements"
+        )
+        raise ConfigError(Problem("[[loads]] orbit.table", what))
     numbers = scaled_numbers(scene, scaling)
     orbit = corotating_orbit(scene, loads, requirements.formulation)
     return ModelPlan(
@@ -98,9 +110,15 @@ def plan_model(
         tags,
         orbit,
         pairs_products(scene, loads, orbit, scaling, numbers),
-        surfaces_of(scene),
+        surfaces,
         plane,
+        tables,
     )
+
+
+def _tables(scene: Scene) -> dict[TabulatedOrbit, TablePlace]:
+    tables = [(str(number), getattr(load, "table", None)) for number, load in enumerate(scene.loads, start=1)]
+    return places_of([(tag, table) for tag, table in tables if table is not None])
 
 
 def _planar(

@@ -98,6 +98,8 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
         if orbit.node_rate == 0:
             return fixed_plane(m, _normal_of(context, orbit.inclination, orbit.ascending_node), described)
         return _moving(m.orbit(orbit).normal, described + ", whose node moves")
+    if load.table is not None:
+        return _moving(m.table(load.table).normal, "plane of the source's orbit, by its table")
     if load.attracting_point is not None:
         return _moving(flight_normal(m, load.attracting_point), "osculating plane of the body's own orbit")
     return _moving(_ecliptic_of_date(m), "mean ecliptic of date (IAU 2006)")
@@ -113,6 +115,10 @@ def initial_normal(scene: Scene, loads: Sequence[Any]) -> Vector:
         orbit = load.orbit
         node = orbit.ascending_node + orbit.node_rate * scene.start
         return _normal_of(context, orbit.inclination, node)
+    if load.table is not None:
+        q, p = (load.table.at(scene.start)[name] for name in ("q", "p"))
+        chi = context.sqrt(1 - p * p - q * q)
+        return [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
     if load.attracting_point is not None and scene.position is not None and scene.velocity is not None:
         offset = [x - a for x, a in zip(scene.position, load.attracting_point, strict=True)]
         return cross(offset, scene.velocity)
@@ -126,6 +132,8 @@ def plane_drift(scene: Scene, loads: Sequence[Any]) -> Any | None:
     load = _source(scene, loads)
     if load.orbit is not None:
         return abs(load.orbit.node_rate)
+    if load.table is not None:
+        return load.table.normal_drift
     return None if load.attracting_point is not None else scene.context.mpf(_ECLIPTIC_DRIFT)
 
 
@@ -138,7 +146,8 @@ def _source(scene: Scene, loads: Sequence[Any]) -> Any:
     """The first load with a plane of its own."""
     for load in loads:
         ephemeris = getattr(load, "ephemeris", None)
-        if load.orbit is not None or load.attracting_point is not None or ephemeris == "sun":
+        placed = (load.orbit, load.table, load.attracting_point)
+        if any(x is not None for x in placed) or ephemeris == "sun":
             return load
     what = f'given "{ORBIT}", but no load of the scene has an orbit whose plane is known'
     if any(getattr(load, "ephemeris", None) == "moon" for load in loads):

@@ -25,6 +25,7 @@ from rigidsim.model.scaling import Scaling, largest_rates
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.state_names import carries_sign, plain_angles, state_names
 from rigidsim.model.state_selection import Requirements
+from rigidsim.model.table_states import Pieces
 from rigidsim.scene.expressions import ATTITUDE_NAMES, names_used
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
@@ -244,6 +245,20 @@ class System:
     def crossings(self) -> list[Crossing]:
         """Events to be found along the way."""
         return _crossings(self.mechanics)
+
+    # --- what changes at given times ------------------------------------------------------------------------
+
+    @cached_property
+    def pieces(self) -> Pieces | None:
+        """Parameters and states that are set at given times, where steps end; None where there are none."""
+        if not self.plan.tables:
+            return None
+        return Pieces(self.plan.tables, self.scaling.time, self.scene.start, self.number)
+
+    @property
+    def stepwise(self) -> bool:
+        """Whether its steps need care, so that it takes a stepper and not the bare engine to follow it."""
+        return self.switches or self.pieces is not None
 
     # --- what it switches on --------------------------------------------------------------------------------
 

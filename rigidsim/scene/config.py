@@ -19,6 +19,7 @@ from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
+from rigidsim.scene.table_files import table_sections
 from rigidsim.scene.toml_text import long_integers, parse_toml
 
 Overrides = Sequence[str] | Mapping[str, Any]
@@ -156,7 +157,7 @@ def validated(table: dict[str, Any], source: str) -> Config:
 
 
 def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
-    """Read a config file; see ``parse``.
+    """Read a config file, and with it the files of tables that it names; see ``parse``.
 
     Raises:
         ConfigError: no such file, not text, too large, or a bad config.
@@ -180,7 +181,20 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
         raise ConfigError(
             Problem("file", f"not UTF-8 text (byte {error.start}); save it as UTF-8"), str(path)
         ) from None
-    return parse(text, source=str(path), overrides=overrides)
+    return _with_tables(parse(text, source=str(path), overrides=overrides), path.parent)
+
+
+def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
+    """The same with the texts of the tables that it names, so that it depends on no other file."""
+    try:
+        added = table_sections(experiment.config, folder)
+    except ConfigError as error:
+        raise error.at(experiment.source) from None
+    if not added:
+        return experiment
+    text, given = (f"{x.rstrip()}\n{added}" for x in (experiment.text, experiment.given))
+    config = validated(parse_toml(text, experiment.source), experiment.source)
+    return exchanged(experiment, text=text, given=given, config=config)
 
 
 def parse_earlier(text: str, *, source: str, overrides: Overrides = ()) -> Experiment:

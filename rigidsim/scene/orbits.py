@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import Field
+from pydantic import Field, StrictStr
 
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
@@ -17,10 +17,15 @@ class Orbit(ConfigTable):
     """A Kepler orbit of the attracting body, whose node and periapsis may move uniformly.
 
     Angles are those at time zero of the scene, as classical elements in space axes. ``period`` replaces
-    the one of Kepler's third law.
+    the one of Kepler's third law. A ``table`` gives elements over time; those that it hasn't are constant.
     """
 
-    semi_major_axis: Metre = Field(description="of the ellipse", examples=["7000 km"])
+    table: StrictStr | None = Field(
+        default=None,
+        description="name of a CSV file beside the config, with elements over time",
+        examples=["mars_elements.csv"],
+    )
+    semi_major_axis: Metre | None = Field(default=None, description="of the ellipse", examples=["7000 km"])
     eccentricity: Dimensionless = Field(default=ZERO, description="0 to below 1")
     inclination: Angle = Field(default=ZERO, description="to the plane XY of space", examples=["51.6 deg"])
     ascending_node: Angle = Field(default=ZERO, description="its longitude from X, at time 0")
@@ -56,7 +61,7 @@ class KeplerOrbit:
 
     def eccentric_anomaly(self, context: Any, time: Any) -> Any:
         """Solution of Kepler's equation M = E - e sin E at a time, to the context's precision."""
-        return called(_kepler, context, self.mean_anomaly + self.mean_motion * time, self.eccentricity)
+        return eccentric_anomaly(context, self.mean_anomaly + self.mean_motion * time, self.eccentricity)
 
     @property
     def circular(self) -> bool:
@@ -85,6 +90,11 @@ class KeplerOrbit:
         return abs(self.mean_motion) * context.sqrt(1 - e * e) / (1 - e) ** 2
 
 
+def eccentric_anomaly(context: Any, mean: Any, eccentricity: Any) -> Any:
+    """Solution of Kepler's equation M = E - e sin E, to the context's precision."""
+    return called(_kepler, context, mean, eccentricity)
+
+
 def _kepler(context: Any, mean: Any, e: Any) -> Any:
     anomaly = mean + e * context.sin(mean)
     # Newton converges quadratically; the count covers any precision from a start that is good to e^2
@@ -106,6 +116,8 @@ def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> K
         ConfigError: no such orbit.
     """
     context = around.context
+    if table.semi_major_axis is None:
+        raise around.fault("orbit.semi_major_axis", "missing; it is needed")
     axis, eccentricity = table.semi_major_axis.at(context), table.eccentricity.at(context)
     if not axis > 0:
         raise around.fault(

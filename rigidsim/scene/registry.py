@@ -7,6 +7,7 @@ so that a config, a schema or a message never needs a second list of names.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import field
 from typing import Any, ClassVar, Protocol
 
 from rigidsim.errors import ConfigError, Problem
@@ -34,6 +35,8 @@ class Surroundings:
         free_flight: whether the body has a position.
         axes: what the space axes are, where the config says it.
         epoch: time 0 of the scene, where the config says it.
+        tables: texts of the tables that belong to the config, by name.
+        span: start and end of the run, s (mpf).
     """
 
     number: int
@@ -43,6 +46,8 @@ class Surroundings:
     free_flight: bool
     axes: str | None = None
     epoch: Epoch | None = None
+    tables: Mapping[str, str] = field(default_factory=dict)
+    span: tuple[Any, Any] | None = None
 
     def fault(self, key: str, text: str) -> ConfigError:
         """The error that names a key of this load."""

@@ -107,7 +107,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     try:
         inverse = inverse_inertia(context, body)
         position, velocity = _translation(config, body, context)
-        resolved = _resolve_loads(config, body, context, free_flight=position is not None)
+        resolved = _resolve_loads(config, body, context, free_flight=position is not None, span=(start, end))
         gravity = _gravity(resolved, context)
         for number, load in enumerate(resolved):
             load.check(number, position)
@@ -207,12 +207,13 @@ def _initial_rates(
 
 
 def _resolve_loads(
-    config: schema.Config, body: RigidBody, context: Any, *, free_flight: bool
+    config: schema.Config, body: RigidBody, context: Any, *, free_flight: bool, span: tuple[Any, Any]
 ) -> list[SceneLoad]:
     found = []
+    tables = {name: table.text for name, table in config.tables.items()}
     for number, fields in enumerate(config.loads):
         fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
-        around = Surroundings(number, context, *fixed)
+        around = Surroundings(number, context, *fixed, tables, span)
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
         found.append(kind.resolve(fields, around))
     return found

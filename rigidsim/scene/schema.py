@@ -306,6 +306,12 @@ class Limits(ConfigTable):
     )
 
 
+class TableText(ConfigTable):
+    """``[tables.NAME]``: a table that belongs to the config; files that it names are taken in like this."""
+
+    text: StrictStr = Field(description="of the CSV file")
+
+
 class Config(ConfigTable):
     """One experiment; ``config_model`` knows the kinds of loads beside."""
 
@@ -336,6 +342,11 @@ class Config(ConfigTable):
     output: Output = Field(default_factory=Output, description="what is kept and how it is shown")
     limits: Limits = Field(default_factory=Limits, description="guards that stop the run, resumable")
     sweep: SweepTable | None = Field(default=None, description="many members of one experiment")
+    tables: dict[StrictStr, TableText] = Field(
+        default_factory=dict,
+        description="texts of tables that loads name; files beside the config are taken in here",
+        examples=[{"elements.csv": {"text": "time [yr], eccentricity\n0, 0.01\n"}}],
+    )
 
     @field_validator("events")
     @classmethod

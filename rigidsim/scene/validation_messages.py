@@ -24,6 +24,7 @@ _TABLES = (
     "parameters",
     "events",
     "sweep",
+    "tables",
 )
 _ARRAYS_OF_TABLES = ("loads", "events")
 _MEANT = {

@@ -55,7 +55,7 @@ class CorrectedStepper:
         projection: puts invariants back, where asked for.
         stride: natural steps between corrections.
         whole_times: whether time is a single number at each stride's start. Not where events or switching
-            surfaces are looked for: a step back could cross one twice.
+            surfaces are looked for: a step back could cross one twice; nor where steps are cut short.
         charts: of a run in Euler angles; None without.
         collapsed: whether steps have become too small to ever arrive.
         waypoints: some of the boundaries after corrections.
@@ -80,7 +80,7 @@ class CorrectedStepper:
         self.stride = min(stride, STEPS_BETWEEN) if wrapping.positions else stride
         if projection is not None:
             self.stride = min(self.stride, projection_interval)
-        self.whole_times = not (stepper.has_events or stepper.single_steps)
+        self.whole_times = not (stepper.has_events or stepper.single_steps or stepper.cuts_steps)
         self._stuck = False
         self.waypoints = Waypoints()
         self.charts: Charts | None = None

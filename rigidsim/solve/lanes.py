@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import heyoka as hy
 import numpy as np
@@ -16,9 +16,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.stepper import Stepper
-
-if TYPE_CHECKING:
-    from rigidsim.solve.switching_stepper import SwitchingStepper
+from rigidsim.solve.steppers import stepper_of
 
 NEIGHBOURS = 3
 TOLERANCE, TIGHT = 1e-8, 1e-14
@@ -212,8 +210,8 @@ class OwnLanes:
         return result, steps, reached
 
 
-class SwitchingLanes:
-    """One after the other, by a stepper that ends its steps on switching surfaces.
+class StepperLanes:
+    """One after the other, by a stepper that ends its steps on switching surfaces, or at given times.
 
     Args:
         start, end: internal units.
@@ -222,13 +220,11 @@ class SwitchingLanes:
     """
 
     def __init__(
-        self, system: System, start: float, end: float, steps: int, stepper: SwitchingStepper | None = None
+        self, system: System, start: float, end: float, steps: int, stepper: Stepper | None = None
     ) -> None:
         if stepper is None:
-            from rigidsim.solve.switching_stepper import SwitchingStepper
-
             precision = replace(precision_of("double"), compact=True)
-            stepper = SwitchingStepper(system, precision, None, precision.scalar(start))
+            stepper = stepper_of(system, precision, None, precision.scalar(start))
         self._stepper = stepper
         self.tolerance = float(stepper.integrator.tol)
         self._begin = stepper.begun

@@ -131,6 +131,7 @@ def prepare_scene(
         check_start(scene)
         system = build_system(scene, precision.number, loads)
         _refuse_spectrum(system)
+        _refuse_spectrum_by_table(system)
         if loads:
             _refuse_non_finite_start(system, precision)
         closed = _closed_form(scene, system, driven=bool(loads))
@@ -238,6 +239,20 @@ def _refuse_spectrum(system: System) -> None:
         raise ConfigError(Problem("[output] lyapunov", what))
 
 
+def _refuse_spectrum_by_table(system: System) -> None:
+    """States of an orbit by a table are set at its rows, which variational equations don't know.
+
+    Raises:
+        ConfigError: Lyapunov exponents are asked for of such a motion.
+    """
+    if system.scene.config.output.lyapunov and system.pieces is not None:
+        what = (
+            "given true, but an orbit goes by a table, at whose rows its states are set and variational "
+            "equations end; set it to false, or give the orbit by elements"
+        )
+        raise ConfigError(Problem("[output] lyapunov", what))
+
+
 def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     """Evaluate the equations once: a load from Python may have no value at the start.
 
@@ -249,6 +264,8 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     if system.switches:  # whichever side it is on
         outputs.append(hy.par[system.parameters - 1])
         sides["pars"] = precision.array([mpmath.mpf(1)] * system.parameters)
+    elif system.pieces is not None:
+        sides["pars"] = np.array(system.pieces.parameters(0), dtype=precision.scalar)
     rhs = compiled_function(outputs, system.variables, compact_mode=True, **precision.options)
     start = precision.number(system.scene.context.ldexp(system.scene.start, -system.scaling.time))
     values = rhs(precision.array(system.initial), time=start, **sides)

@@ -75,6 +75,9 @@ class Stepper:
         has_events: whether the engine looks for any.
         smallest, largest: step sizes of the latest call, internal units.
         single_steps: whether all ways go step by step.
+        careful: whether neighbours of the motion are carried by it, too, and not by the bare engine.
+        begun: where it is careful, the boundary at which the motion begins.
+        cuts_steps: whether some steps are cut short to end at given times, which ``grid`` doesn't know.
         failure: why the latest step couldn't be taken, where its state is finite; empty otherwise.
         destination: time of the last sample, internal units; None where steps may become as small as they
             like.
@@ -83,6 +86,9 @@ class Stepper:
     """
 
     single_steps = False
+    careful = False
+    begun: Mark
+    cuts_steps = False
 
     def __init__(
         self,

@@ -15,13 +15,17 @@ def stepper_of(
     start: Scalar,
     log: EventLog | None = None,
 ) -> Stepper:
-    """The stepper of a system: a plain one, unless the system switches.
+    """The stepper of a system: a plain one, unless the system switches, or changes at given times.
 
     Args:
         tolerance: None for the precision's epsilon.
         start: internal units.
         log: of events; without one none are looked for.
     """
+    if system.pieces is not None:
+        from rigidsim.solve.table_stepper import TableStepper
+
+        return TableStepper(system, precision, tolerance, start, log)
     if not system.switches:
         return Stepper(system, precision, tolerance, start, log)
     from rigidsim.solve.switching_stepper import SwitchingStepper

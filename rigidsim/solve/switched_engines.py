@@ -33,7 +33,7 @@ Root = tuple[Any, int, int]
 class SwitchedEngines(Stepper):
     """What a stepper with surfaces has beside its steps: an engine for each way to go on, and a memory."""
 
-    single_steps = True
+    single_steps = careful = True
 
     def __init__(
         self,

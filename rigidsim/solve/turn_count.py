@@ -18,7 +18,6 @@ import time as clock_time
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import heyoka as hy
 import numpy as np
@@ -33,9 +32,8 @@ from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
-
-if TYPE_CHECKING:
-    from rigidsim.solve.switching_stepper import SwitchingStepper
+from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.steppers import stepper_of
 
 DENSE = 1.0
 """Angle (rad) by which a body turns at most between samples whose angles are joined to the nearest."""
@@ -135,10 +133,10 @@ class _Plain:
         return np.asarray(states) if outcome == hy.taylor_outcome.time_limit else None
 
 
-class _Switching:
-    """Follows a motion with switching surfaces, step by step."""
+class _Stepwise:
+    """Follows a motion with switching surfaces, or by a table, step by step."""
 
-    def __init__(self, stepper: SwitchingStepper) -> None:
+    def __init__(self, stepper: Stepper) -> None:
         self._stepper = stepper
 
     def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
@@ -220,7 +218,7 @@ class TurnCounter:
         double = precision_of("double")
         system = self._exact.rounded(double.number)
         m = system.mechanics
-        self._chunk = _CHUNK if not system.switches else _SWITCHING_CHUNK
+        self._chunk = _CHUNK if not system.stepwise else _SWITCHING_CHUNK
         names = [r.name for r in self._angles]
         found = [r for name in names for r in system.recorded if r.name == name]
         outputs = [system.outputs[r.first + i] for r in found for i in range(r.count)]
@@ -240,11 +238,9 @@ class TurnCounter:
         radians = rate * float(span.exact_last - span.begin)
         compact = system.wide or radians < _WORTH_BUILDING
         start = math.ldexp(float(span.begin), -system.scaling.time)
-        self._follower: _Plain | _Switching
-        if system.switches:
-            from rigidsim.solve.switching_stepper import SwitchingStepper
-
-            self._follower = _Switching(SwitchingStepper(system, double, _TOLERANCE, start))
+        self._follower: _Plain | _Stepwise
+        if system.stepwise:
+            self._follower = _Stepwise(stepper_of(system, double, _TOLERANCE, start))
         else:
             self._follower = _Plain(system, compact=compact)
         self._largest = math.ldexp(rate, system.scaling.time)

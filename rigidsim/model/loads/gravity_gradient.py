@@ -18,11 +18,13 @@ from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, para
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.orbit_of_table import resolve_tabulated_orbit
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 from rigidsim.scene.traced import largest_of, smallest_of
 
 
@@ -51,8 +53,8 @@ class GravityGradientFields(LoadFields):
 class GravityGradient(Load):
     """Torque (3 G M / R^3) c x (I c) of a distant body in direction c (MacCullagh).
 
-    Exactly one of ``orbit``, ``position`` (space axes, m) and ``ephemeris`` says where it is; for an
-    ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from the scene's
+    Exactly one of ``orbit``, ``table``, ``position`` (space axes, m) and ``ephemeris`` says where it is; for
+    an ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from the scene's
     epoch, by default J2000.
     """
 
@@ -62,6 +64,7 @@ class GravityGradient(Load):
     ephemeris: str | None = None
     axes: str | None = None
     epoch: Epoch | None = None
+    table: TabulatedOrbit | None = None
     Fields = GravityGradientFields
     title = "gravity_gradient"
     described = "a gravity-gradient load"
@@ -78,6 +81,8 @@ class GravityGradient(Load):
             raise around.fault(
                 "orbit", f"given {found}; exactly one of orbit, position and ephemeris is needed"
             )
+        if fields.orbit is not None and fields.orbit.table is not None:
+            return cls(strength, table=resolve_tabulated_orbit(fields.orbit, strength, around))
         if fields.orbit is not None:
             return cls(strength, orbit=resolve_orbit(fields.orbit, strength, around))
         if fields.position is None:
@@ -122,6 +127,8 @@ class GravityGradient(Load):
             return m.attitude.orbital.direction
         if self.orbit is not None:
             return apply(transpose(m.matrix), m.orbit(self.orbit).direction)
+        if self.table is not None:
+            return apply(transpose(m.matrix), m.table(self.table).direction)
         if self.ephemeris is not None:
             return apply(transpose(m.matrix), self._source(m).direction)
         assert self.position is not None
@@ -135,6 +142,8 @@ class GravityGradient(Load):
         factor = None
         if self.orbit is not None:
             factor, distance = m.orbit(self.orbit).inverse_distance ** 3, self.orbit.semi_major_axis
+        elif self.table is not None:
+            factor, distance = m.table(self.table).inverse_distance ** 3, self.table.semi_major_axis
         elif self.ephemeris is not None:
             factor = self._source(m).inverse_distance ** 3
             distance = context.mpf(MEAN_DISTANCE[self.ephemeris])
@@ -184,12 +193,16 @@ class GravityGradient(Load):
             distance = context.mpf(MEAN_DISTANCE[self.ephemeris])
         elif self.orbit is not None:
             distance = self.orbit.pericentre
+        elif self.table is not None:
+            distance = self.table.pericentre
         else:
             distance = norm(context, self.position or [])
         return tidal_range(scene, self.gravitational_parameter, distance)
 
     def fastest_rate(self, scene: Scene) -> Any:
         """At pericentre."""
+        if self.table is not None:
+            return self.table.fastest_rate()
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
     @property
@@ -197,6 +210,8 @@ class GravityGradient(Load):
         """See ``Load``."""
         if self.orbit is not None:
             where = "on a circular orbit" if self.orbit.circular else "on an eccentric orbit"
+        elif self.table is not None:
+            where = f"on an orbit {self.table.described}"
         else:
             where = "fixed in space" if self.ephemeris is None else f"at the {self.ephemeris.title()}'s place"
         return f"gravity_gradient: torque of a distant body {where}"

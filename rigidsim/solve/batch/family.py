@@ -40,6 +40,7 @@ class Alone(Enum):
     CHART = "Euler angles may have to change their sequence on the way"
     ANGLES = "full turns of recorded angles are counted along the motion"
     SWITCHING = "the equations change along the motion"
+    TABLE = "an orbit goes by a table"
     LYAPUNOV = "the Lyapunov spectrum has an integrator of its own"
     KEY = "what is swept is not a number of the body, the start, a load or a parameter"
     UNTRACEABLE = "the equations depend on what is swept in a way that can't be told beforehand"
@@ -127,6 +128,8 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
     system = traced.system
     if system.switches:
         return Alone.SWITCHING
+    if system.pieces is not None:
+        return Alone.TABLE
     planar = system.requirements.formulation == "planar"
     if system.partner is not None or (system.angle_states and not planar):
         return Alone.CHART

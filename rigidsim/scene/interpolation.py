@@ -1,0 +1,106 @@
+"""Smooth interpolation of tables: polynomials of fifth degree between neighbouring rows.
+
+Each has the rows' values and, at both ends, the first and second derivatives of the polynomial through the
+seven nearest rows (as many as there are, in shorter tables), so that the whole is twice differentiable. It is
+local: a piece depends on eight rows around it. Where the rows follow a smooth function, errors fall with the
+sixth power of their distance. (Differentiation matrices: Welfert 1997, SIAM J. Numer. Anal. 34, 1640.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+NEAREST = 7
+ORDER = 6
+"""By which power of the rows' distance errors fall."""
+
+
+class Interpolation:
+    """Between rows of numbers of any kind (floats, or mpf in an array of objects).
+
+    Args:
+        times: ascending, at least four.
+        values: (times, columns).
+    """
+
+    def __init__(self, times: Sequence[Any], values: np.ndarray) -> None:
+        self.times = times
+        self.values = values
+        self._count = min(NEAREST, len(times))
+        self._derivatives: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._weights: dict[tuple[Any, ...], tuple[np.ndarray, np.ndarray]] = {}
+
+    @property
+    def pieces(self) -> int:
+        """How many there are."""
+        return len(self.times) - 1
+
+    def piece(self, number: int) -> np.ndarray:
+        """Coefficients (6, columns) of the powers of (t - t_i) / (t_{i+1} - t_i)."""
+        length = self.times[number + 1] - self.times[number]
+        y0, y1 = self.values[number], self.values[number + 1]
+        (d0, s0), (d1, s1) = self._at(number), self._at(number + 1)
+        square = length * length / 2
+        a, b = d0 * length, s0 * square  # arrays first: mpmath would print one that it doesn't know
+        # what is left at the far end for the powers 3 to 5: value, derivative, and half the second derivative
+        u = y1 - (y0 + a + b)
+        v = d1 * length - (a + b * 2)
+        w = s1 * square - b
+        return np.array([y0, a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w])
+
+    def _at(self, row: int) -> tuple[np.ndarray, np.ndarray]:
+        """First and second derivatives (columns,) at a row."""
+        if row not in self._derivatives:
+            first = min(max(row - self._count // 2, 0), len(self.times) - self._count)
+            near = range(first, first + self._count)
+            one, two = self._differentiation(tuple(self.times[j] - self.times[row] for j in near))
+            rows = self.values[first : first + self._count]
+            self._derivatives[row] = one @ rows, two @ rows
+        return self._derivatives[row]
+
+    def _differentiation(self, offsets: tuple[Any, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Weights of the values at offsets from a row, for its first and second derivative."""
+        if offsets not in self._weights:
+            here = next(i for i, x in enumerate(offsets) if x == 0)
+            products = [_product([x - y for y in offsets if y != x]) for x in offsets]
+            one = [
+                products[here] / (p * (offsets[here] - x)) if i != here else x
+                for i, (x, p) in enumerate(zip(offsets, products, strict=True))
+            ]
+            one[here] = -sum(w for i, w in enumerate(one) if i != here)
+            two = [
+                2 * w * (one[here] - 1 / (offsets[here] - x)) if i != here else x
+                for i, (w, x) in enumerate(zip(one, offsets, strict=True))
+            ]
+            two[here] = -sum(w for i, w in enumerate(two) if i != here)
+            self._weights[offsets] = np.array(one), np.array(two)
+        return self._weights[offsets]
+
+
+def _product(factors: Sequence[Any]) -> Any:
+    found = factors[0]
+    for factor in factors[1:]:
+        found = found * factor
+    return found
+
+
+def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What interpolation makes of every other row when these are left out.
+
+    Args:
+        times: (n,) float64, ascending; values: (n, columns).
+
+    Returns:
+        Numbers of the rows that were left out, and their values as interpolated, (rows, columns).
+    """
+    kept = Interpolation(list(times[::2]), values[::2])
+    rows = np.arange(1, 2 * kept.pieces, 2)
+    found = []
+    for row in rows:
+        part = kept.piece(int(row) // 2)
+        x = (times[row] - times[row - 1]) / (times[row + 1] - times[row - 1])
+        found.append(((((part[5] * x + part[4]) * x + part[3]) * x + part[2]) * x + part[1]) * x + part[0])
+    return rows, np.array(found)

@@ -1,0 +1,150 @@
+"""A spin driven by a table of an orbit, held against the same orbit given directly."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from support import IMPATIENT, law, run_text, same_bits
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.solve.problem import prepare
+
+AU, SUN, DAY = 149597870700.0, 1.32712440018e20, 86400.0
+MOTION = math.sqrt(SUN / AU**3)
+NODE, PERIAPSIS = 1.5e-8, 6e-8  # rad/s: the periapsis turns by 12 degrees in 40 days
+KEPLER = (
+    '{semi_major_axis = "1 au", eccentricity = 0.1, inclination = "20 deg", ascending_node = 0.7, '
+    f"periapsis = 1.2, mean_anomaly = 0.3, node_rate = {NODE!r}, periapsis_rate = {PERIAPSIS!r}}}"
+)
+PLANET = """
+name = "planet"
+[body]
+principal_moments = [0.95, 0.96, 1]
+[initial]
+angular_velocity = [0, 0, "300 deg/day"]
+euler_angles = [0, "25 deg", 0]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = "1.32712440018e20 m^3/s^2"
+orbit = %s
+[frame]
+reference = "orbit"
+[time]
+start = "10 day"
+end = "210 day"
+every = "10 day"
+[output]
+record = ["quaternion", "momentum_axis", "obliquity", "node_longitude"]
+"""
+
+
+def table(every: float, anomaly: bool = True) -> str:
+    """Of the same orbit, with rows so many days apart."""
+    header = "time [day], semi_major_axis [au], eccentricity, inclination [deg], ascending_node, periapsis"
+    lines = [header + (", mean_anomaly [deg]" if anomaly else "")]
+    for day in np.arange(-60, 280, every):
+        t = float(day) * DAY
+        cells = [float(day), 1.0, 0.1, 20.0, (0.7 + NODE * t) % (2 * math.pi), 1.2 + PERIAPSIS * t]
+        if anomaly:
+            cells.append(math.degrees(0.3 + MOTION * t) % 360)
+        lines.append(", ".join(repr(float(x)) for x in cells))
+    return "\n".join(lines)
+
+
+def by_table(every: float, anomaly: bool = True) -> str:
+    text = PLANET % '{table = "orbit.csv"}'
+    return text + f"[tables.\"orbit.csv\"]\ntext = '''\n{table(every, anomaly)}\n'''\n"
+
+
+@pytest.fixture(scope="module")
+def direct() -> xarray.Dataset:
+    return run_text(PLANET % KEPLER).dataset
+
+
+def apart(one: xarray.Dataset, other: xarray.Dataset) -> float:
+    """Largest angle between the momenta, rad."""
+    return float(np.linalg.norm(one.momentum_axis.values - other.momentum_axis.values, axis=1).max())
+
+
+def test_a_table_of_an_orbit_drives_a_spin_as_the_orbit_does(direct: xarray.Dataset) -> None:
+    turned = float(np.arccos(np.clip(direct.momentum_axis[0] @ direct.momentum_axis[-1], -1, 1)))
+    path = 4 * turned  # the pole's path is longer than its chord: it nods twice a year
+    rounding = 4 * law(2.0**-52, 4000, math.radians(300) / DAY, 200 * DAY)
+    found = {}
+    for every in (4.0, 40.0):
+        (load,) = prepare(rigidsim.parse(by_table(every))).system.plan.loads
+        error = load.table.error  # type: ignore[union-attr]
+        # the torque is 3 (G M / r^3) c x I c: the direction's error counts twice, the distance's three times
+        bound = path * (2 * error.direction + 3 * error.distance)
+        run = run_text(by_table(every)).dataset
+        found[every] = apart(run, direct)
+        assert found[every] < bound + rounding
+        plane = np.abs(run.node_longitude.values - direct.node_longitude.values).max()
+        assert plane < 4 * error.direction + bound + rounding  # the plane itself is interpolated
+    assert bound > 100 * rounding  # so that it means something
+    assert found[40.0] > 10 * found[4.0]  # and rows 40 days apart are so few that it can be seen
+
+
+def test_without_an_anomaly_the_mean_longitude_advances_by_keplers_law(direct: xarray.Dataset) -> None:
+    """The orbit's phase then is that of elements whose mean longitude, not anomaly, goes at Kepler's rate."""
+    text = by_table(4.0, anomaly=False).replace('"orbit.csv"}', '"orbit.csv", mean_anomaly = 0.3}')
+    node = NODE + PERIAPSIS
+    start = 10 * DAY
+    # such an orbit has the anomaly l - pi, with l = 0.3 + pi(start) + n start at the start
+    anomaly = 0.3 + node * start
+    same = KEPLER.replace("mean_anomaly = 0.3", f"mean_anomaly = {anomaly!r}")
+    same = same[:-1] + f', period = "{2 * math.pi / (MOTION - node)!r} s"}}'
+    kepler = run_text(PLANET % same).dataset
+    assert apart(run_text(text).dataset, kepler) < 1e-10  # rows 4 days apart: interpolated to some 1e-11
+    assert apart(direct, kepler) > 1e-6  # and the phase matters
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
+    """A table beside its config, which is gone after the run; then prolonged in chunks of few steps."""
+    folder = tmp_path_factory.mktemp("table")
+    (folder / "orbit.csv").write_text(table(4.0), encoding="utf-8")
+    path = folder / "planet.toml"
+    path.write_text(PLANET % '{table = "orbit.csv"}', encoding="utf-8")
+    short = ["time.end='100 day'", "output.timeline=false", "output.estimate=false"]
+    run = rigidsim.run(rigidsim.load(path, overrides=short), out=folder)
+    (folder / "orbit.csv").unlink()
+    return rigidsim.resume(run.folder.path, until="210 day", tuning=IMPATIENT)
+
+
+def test_a_prolonged_run_is_the_run_in_one_go(saved: rigidsim.Run) -> None:
+    text = by_table(4.0)
+    same_bits(saved.dataset, run_text(text).dataset)
+    # and what lies in the table matters to the last bit
+    other = text.replace("0.0, 1.0, 0.1, 20.0", "0.0, 1.0, 0.1, 20.0000000000001")
+    with pytest.raises(AssertionError):
+        same_bits(saved.dataset, run_text(other).dataset)
+
+
+def test_a_run_is_verified_without_the_file(saved: rigidsim.Run) -> None:
+    assert rigidsim.verify(saved.folder.path).identical
+    assert "mean_anomaly [deg]" in saved.dataset.attrs["config_given"]
+
+
+def test_what_a_table_can_not_be_combined_with() -> None:
+    for more, says in {
+        "[output]\nlyapunov = true": "an orbit goes by a table",
+        '[[loads]]\nkind = "torque"\ncomponents = ["abs(wx)", 0, 0]': "has a kink or jump",
+    }.items():
+        text = by_table(40.0).split("[output]")[0] + more + "\n[tables" + by_table(40.0).split("[tables")[1]
+        with pytest.raises(ConfigError, match="table") as caught:
+            prepare(rigidsim.parse(text))
+        assert says in str(caught.value)
+
+
+def test_mars_with_a_table_of_its_orbit_has_the_obliquity_of_almanacs() -> None:
+    path = Path(__file__).parents[2] / "configs" / "tables" / "mars_with_table.toml"
+    short = ["time.end='60 day'", "output.timeline=false", "output.estimate=false"]
+    run = rigidsim.run(rigidsim.load(path, overrides=short), out=None)
+    # 25.19 deg in almanacs, of the orbit's plane and equator of date, both of J2000 here
+    assert np.degrees(run.dataset.obliquity.values) == pytest.approx(25.19, abs=0.005)

@@ -1,0 +1,152 @@
+"""Tables of elements: what is read, what is refused, and how well they are interpolated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene.config import load, parse
+from rigidsim.scene.element_table import TableError, read_table
+from rigidsim.scene.interpolation import ORDER, Interpolation
+from rigidsim.scene.scene import build_scene
+
+HEADER = "time [day], semi_major_axis [au], eccentricity, mean_anomaly [deg]"
+CONFIG = """
+name = "planet"
+[body]
+principal_moments = [1, 1.01, 1.02]
+[initial]
+angular_velocity = [0, 0, "1 deg/s"]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = "1.32712440018e20 m^3/s^2"
+orbit = {table = "elements.csv"%s}
+[time]
+end = "60 day"
+samples = 3
+"""
+
+
+def rows(count: int = 9, every: float = 10.0, header: str = HEADER, shift: float = 0.0) -> str:
+    """Of an orbit like the Earth's, 0.9856 deg a day, from the anomaly 350 deg on."""
+    lines = [
+        f"{every * i}, 1, 0.02, {(350 + 0.98560767 * every * i + shift * i) % 360}" for i in range(count)
+    ]
+    return "\n".join(["# made for a test", "", header, *lines])
+
+
+def with_table(text: str, more: str = "") -> str:
+    return CONFIG % more + f"[tables.\"elements.csv\"]\ntext = '''\n{text}\n'''\n"
+
+
+def test_numbers_units_and_order() -> None:
+    text = "# late rows first\ntime (yr), inclination [deg]\n" + "\n".join(f"{-i}, 0.1" for i in range(8))
+    table = read_table(text, 200)
+    assert table.times[0] == -7 * 31557600
+    assert table.times[-1] == 0
+    with mpmath.workprec(200):
+        tenth = mpmath.mpf(1) / 10 * mpmath.pi / 180
+        assert abs(table.columns["inclination"][3] - tenth) < mpmath.ldexp(1, -198)
+
+
+BAD = {
+    "empty": ("# nothing", "is empty"),
+    "no time": ("eccentricity\n1", "has no column time"),
+    "unknown": ("time, eccentricty\n", 'line 1: given the column "eccentricty"; did you mean "ecc'),
+    "twice": ("time, periapsis, periapsis\n", "is there twice"),
+    "both": ("time, mean_anomaly, mean_longitude\n", "has both mean_anomaly and mean_longitude"),
+    "unit": ("time [kg], eccentricity\n", "line 1: column time"),
+    "cells": ("time, eccentricity\n0, 0.1\n1, 0.1, 3", "line 3: has 3 cells; the header names 2 columns"),
+    "no number": ("time, eccentricity\n0, nan", 'line 2: given "nan" as eccentricity; a decimal number'),
+    "with unit": ("time, periapsis\n0, 3 deg", "without a unit (the header has it)"),
+    "few": ("time, periapsis\n0, 3\n1, 3", "has 2 rows; 8 or more are needed"),
+    "back": (
+        "time, periapsis\n" + "\n".join(f"{i % 7}, 1" for i in range(9)),
+        "line 9: its time doesn't go on",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("which", BAD)
+def test_a_bad_table_is_refused_with_its_line(which: str) -> None:
+    text, says = BAD[which]
+    with pytest.raises(TableError) as caught:
+        read_table(text, 100)
+    assert says in str(caught.value)
+
+
+# eccentricities that leap about from row to row: what is between them means nothing
+LEAPING = "time [day], semi_major_axis [au], eccentricity\n" + "\n".join(
+    f"{10 * i}, 1, {0.1 * (7 * i % 5)}" for i in range(12)
+)
+REFUSED = {
+    "no such table": (CONFIG % "", "was given as text, without files beside it"),
+    "a column twice": (with_table(rows(), ', semi_major_axis = "1 au"'), "given beside it, too"),
+    "no axis": (
+        with_table("time [day], eccentricity\n" + "\n".join(f"{10 * i}, 0.1" for i in range(9))),
+        "has no column semi_major_axis; add one, or give semi_major_axis beside table",
+    ),
+    "too short": (with_table(rows(every=7.0)), "but the run goes from 0.0 s to 5184000.0 s"),
+    "a rate": (with_table(rows(), ', node_rate = "1 deg/day"'), "whose columns say what moves"),
+    "coarse": (with_table(LEAPING), "its rows are too far apart"),
+    # anomalies that lose 95 degrees from row to row against Kepler's law
+    "turns": (with_table(rows(shift=-95.0)), "whole turns can't be told"),
+    "hyperbola": (with_table(rows().replace("0.02", "1.02")), "row 1: eccentricity is out of range"),
+}
+
+
+@pytest.mark.parametrize("which", REFUSED)
+def test_an_orbit_that_no_table_gives(which: str) -> None:
+    text, says = REFUSED[which]
+    with pytest.raises(ConfigError) as caught:
+        build_scene(parse(text))
+    assert "[[loads]] number 1 orbit." in str(caught.value)
+    assert says in str(caught.value)
+
+
+def test_a_file_becomes_part_of_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "planet.toml"
+    path.write_text(CONFIG % "", encoding="utf-8")
+    with pytest.raises(ConfigError, match="can't be read") as caught:
+        load(path)
+    assert str(tmp_path / "elements.csv") in str(caught.value)
+    (tmp_path / "elements.csv").write_bytes(rows().replace("\n", "\r\n").encode())
+    found = load(path, overrides=["time.samples=5"])
+    (tmp_path / "elements.csv").unlink()
+    again = parse(found.text)
+    assert again.config.tables["elements.csv"].text.strip() == rows()
+    assert "samples = 5" in found.text
+    assert "samples = 3" in found.given
+    assert rows() in found.given
+    (orbit,) = {load_.table for scene in (found, again) for load_ in build_scene(scene).loads}  # type: ignore[attr-defined]
+    assert len(orbit.table.times) == 9
+
+
+@pytest.mark.parametrize(("numbers", "tolerance"), [(float, 1e-12), (mpmath.mpf, 1e-40)])
+def test_a_polynomial_of_fifth_degree_is_interpolated_exactly(numbers: type, tolerance: float) -> None:
+    with mpmath.workprec(160):
+        times = [numbers(t) for t in (0, 1, 2.5, 3, 4.25, 6, 7, 8.5)]  # uneven rows
+        values = np.array([[1 - 2 * t + t**5 / 64, t**3] for t in times], dtype=object)
+        found = Interpolation(times, values)
+        for piece in range(found.pieces):
+            t = times[piece] + (times[piece + 1] - times[piece]) * numbers(0.375)
+            c = found.piece(piece)
+            got = sum(c[n] * numbers(0.375) ** n for n in range(6))
+            assert abs(got[0] - (1 - 2 * t + t**5 / 64)) < tolerance * (1 + t**5)
+            assert abs(got[1] - t**3) < tolerance * (1 + t**3)
+
+
+def test_errors_fall_with_the_sixth_power_of_the_rows_distance() -> None:
+    def largest(count: int) -> mpmath.mpf:
+        step = mpmath.mpf(4) / count  # the twelve rows at the start of so many
+        times = [step * i for i in range(12)]
+        found = Interpolation(times, np.array([[mpmath.exp(t)] for t in times], dtype=object))
+        piece = found.piece(5)  # of exp, whose every derivative is as large
+        return abs(sum(piece[n][0] / mpmath.mpf(2) ** n for n in range(6)) - mpmath.exp(times[5] + step / 2))
+
+    with mpmath.workprec(200):  # so that rounding is out of sight
+        assert mpmath.log(largest(1000) / largest(2000), 2) == pytest.approx(ORDER, abs=0.05)
