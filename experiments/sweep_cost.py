@@ -17,7 +17,8 @@ import heyoka as hy
 
 from rigidsim.scene.config import parse
 from rigidsim.scene.sweep import Sweep
-from rigidsim.solve.batch.family import Families, Family, Members, Numbers
+from rigidsim.solve.batch.family import Families, Family, Numbers
+from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.run import BatchRun
 
 MEMBERS, ROUNDS = 4096, 3

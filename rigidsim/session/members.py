@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import field
 from enum import Enum
 
@@ -71,9 +71,8 @@ class MemberResults:
         return cls(joined([part.kept for part in parts], counts), reasons, engines, why, unestimated)
 
 
-def status_codes(statuses: Sequence[str]) -> KeptVariable:
-    """How members ended, as numbers with their meanings."""
-    codes = np.array([OUTCOMES.index(status) for status in statuses], dtype=np.int64)
+def status_variable(codes: np.ndarray) -> KeptVariable:
+    """How members ended: their places in ``OUTCOMES``, with the meanings."""
     meanings = " ".join(re.sub(r"\W+", "_", outcome) for outcome in OUTCOMES)
     attributes = {
         "long_name": "how the member ended",
@@ -83,15 +82,19 @@ def status_codes(statuses: Sequence[str]) -> KeptVariable:
     return KeptVariable((), codes, attributes)
 
 
-def warning_bits(codes: Sequence[Sequence[str]]) -> KeptVariable:
-    """Warnings of each member, a bit for each kind."""
-    bits = [sum(1 << WARNINGS.index(code) for code in set(found)) for found in codes]
+def warning_bits(codes: Iterable[str]) -> int:
+    """Warnings of one member, a bit for each kind."""
+    return sum(1 << WARNINGS.index(code) for code in set(codes))
+
+
+def warnings_variable(bits: np.ndarray) -> KeptVariable:
+    """Warnings of members, each as of ``warning_bits``."""
     attributes = {
         "long_name": "warnings of the member, a bit each",
         "flag_masks": [1 << bit for bit in range(len(WARNINGS))],
         "flag_meanings": " ".join(WARNINGS),
     }
-    return KeptVariable((), np.array(bits, dtype=np.int64), attributes)
+    return KeptVariable((), bits, attributes)
 
 
 def plain_variables(
@@ -150,7 +153,7 @@ def run_alone(
     error_at_end = summary.accuracy.estimated_attitude_error
     if summary.accuracy.certified is not None:
         error_at_end = summary.accuracy.certified
-    kept |= {"status": status_codes([summary.status]), "warnings": warning_bits([summary.warning_codes])}
+    kept |= _ended(summary.status, summary.warning_codes)
     kept |= plain_variables(
         steps=np.array([summary.cost.steps]),
         reached=np.array([summary.time_reached]),
@@ -163,10 +166,18 @@ def run_alone(
     return MemberResults(kept, reasons, {"alone": 1})
 
 
+def _ended(status: str, warnings: Iterable[str]) -> Kept:
+    """Of a single member."""
+    return {
+        "status": status_variable(np.array([OUTCOMES.index(status)], dtype=np.int64)),
+        "warnings": warnings_variable(np.array([warning_bits(warnings)], dtype=np.int64)),
+    }
+
+
 def failed(outcome: Outcome, reason: str) -> MemberResults:
     """A member that gave no samples."""
     nothing = np.array([np.nan])
-    kept = {"status": status_codes([outcome.value]), "warnings": warning_bits([[]])}
+    kept = _ended(outcome.value, [])
     kept |= plain_variables(steps=np.array([0]), reached=nothing, bound=nothing, attitude_error=nothing)
     return MemberResults(kept, {0: reason}, {"alone": 1})
 

@@ -15,15 +15,18 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.session.kept import Kept, KeptVariable, Points, Series, kept_events, kept_of_series
 from rigidsim.session.members import (
     ENDED_WELL,
+    OUTCOMES,
     MemberResults,
     Outcome,
     failed,
     plain_variables,
-    status_codes,
+    status_variable,
     warning_bits,
+    warnings_variable,
 )
 from rigidsim.session.variables import dataset_variables
-from rigidsim.solve.batch.family import Families, Family, Members, batchable
+from rigidsim.solve.batch.family import Families, Family, batchable
+from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
@@ -74,12 +77,13 @@ class BatchTiles:
     def __init__(self, sweep: Sweep, hidden: Sequence[str]) -> None:
         self._sweep = sweep
         self._hidden = hidden
+        self._axes = AxisNumbers(sweep)
         self._known: list[Family] = []
         self._runs: dict[int, tuple[BatchRun, list[Variable]]] = {}
 
     def run(self, members: Sequence[int], keep: Sequence[str]) -> Batched:
         """Run as many members as can be run together."""
-        families = Families(Members.of(self._sweep, members))
+        families = Families(Members.of(self._sweep, members, self._axes))
         families.known = self._known
         found = families.sort()
         done = Batched([], [], sorted(found.alone), "")
@@ -108,7 +112,7 @@ class BatchTiles:
             What is wrong with each, and whether any member at all shares its equations with others: of those
             that don't nothing is known.
         """
-        families = Families(Members.of(self._sweep, members), most)
+        families = Families(Members.of(self._sweep, members, self._axes), most)
         families.known = self._known
         found = families.sort()
         return {int(members[place]): error for place, error in found.refused.items()}, bool(found.groups)
@@ -128,16 +132,17 @@ class BatchTiles:
     def _take(
         self, block: BatchBlock, variables: Sequence[Variable], keep: Sequence[str], done: Batched
     ) -> None:
-        gave_up = [place for place, status in enumerate(block.status) if status is None]
+        gave_up = np.array([status is None for status in block.status], dtype=bool)
         kept = _kept(block, variables, keep, self._sweep.table.most_events, self._hidden)
-        statuses = [(status or Status.NON_FINITE) for status in block.status]
-        kept["status"] = status_codes([status.value for status in statuses])
+        statuses = block.status.copy()
+        statuses[gave_up] = Status.NON_FINITE
+        kept["status"] = status_variable(_outcome_codes(statuses))
         drifts = [np.abs(values) for values in block.drifts.values()]
-        worst = np.max([np.nanmax(d, axis=0, initial=0) for d in drifts], axis=0) if drifts else 0
+        nothing = np.zeros(len(gave_up))
+        worst = np.max([np.nanmax(d, axis=0, initial=0) for d in drifts], axis=0) if drifts else nothing
         over = worst > block.drift_bound
-        reasons_to_warn = zip(over.tolist(), _lost(block).tolist(), strict=True)
-        drift, undefined = [WarningCode.DRIFT.value], [WarningCode.UNDEFINED.value]
-        kept["warnings"] = warning_bits([drift * bad + undefined * lost for bad, lost in reasons_to_warn])
+        drift, undefined = (warning_bits([code.value]) for code in (WarningCode.DRIFT, WarningCode.UNDEFINED))
+        kept["warnings"] = warnings_variable(np.where(over, drift, 0) | np.where(_lost(block), undefined, 0))
         rows = np.maximum(block.reached - 1, 0)
         reached = np.where(block.reached > 0, block.times[rows], np.nan)
         kept |= plain_variables(
@@ -146,16 +151,13 @@ class BatchTiles:
             bound=block.drift_bound,
             attitude_error=np.full(len(statuses), np.nan),
         )
-        reasons = {
-            place: status.message for place, status in enumerate(statuses) if status.value not in ENDED_WELL
-        }
-        chosen = np.array([p for p in range(len(statuses)) if p not in set(gave_up)], dtype=np.int64)
-        done.left += [int(block.members[place]) for place in gave_up]
-        if gave_up:
+        chosen = np.flatnonzero(~gave_up)
+        done.left += block.members[gave_up].tolist()
+        if len(chosen) < len(statuses):
             done.why = done.why or "gave_up"
-            order = {int(place): number for number, place in enumerate(chosen)}
-            reasons = {order[place]: why for place, why in reasons.items() if place in order}
-            kept = rows_of(kept, chosen)
+            kept, statuses = rows_of(kept, chosen), statuses[chosen]
+        badly = ~np.isin(kept["status"].values, [OUTCOMES.index(name) for name in ENDED_WELL])
+        reasons = {place: statuses[place].message for place in np.flatnonzero(badly).tolist()}
         if len(chosen):
             engines = {f"batch of {block.width}": len(chosen)}
             done.results.append(MemberResults(kept, reasons, engines))
@@ -172,6 +174,14 @@ def _lost(block: BatchBlock) -> np.ndarray:
             known = np.logical_or.accumulate(~bad & taken, axis=0)
             found |= (bad & taken & known).any(axis=0)
     return found
+
+
+def _outcome_codes(statuses: np.ndarray) -> np.ndarray:
+    codes = np.zeros(len(statuses), dtype=np.int64)
+    for status in Status:
+        if status.value in OUTCOMES:
+            codes[statuses == status] = OUTCOMES.index(status.value)
+    return codes
 
 
 def rows_of(kept: Kept, rows: np.ndarray) -> Kept:

@@ -18,12 +18,16 @@ import rigidsim
 from rigidsim.cli.app import app
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.sweep import Axis
+from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.store.sweep_folder import SweepFolder
 from rigidsim.store.sweep_generation import Work, ranges_of
 from rigidsim.store.sweep_run import open_sweep
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import resume_sweep, scanned
 from rigidsim.workflows.sweep import sweep as run_sweep
+from rigidsim.workflows.sweep_members import run_members, sweep_of
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -182,6 +186,71 @@ def test_indicators_come_from_a_tangent_vector_that_is_not_kept(tmp_path: Path) 
     assert dataset.lyapunov[0, 0] == pytest.approx(growth[-1] / 200, rel=1e-11)
     assert dataset.growth_time[0, 0] == 200
     assert abs(dataset.megno[0, 0] - 2) < 0.5  # a free body's motion is regular
+
+
+PLANAR_MAP = """\
+name = "planar_map"
+[body]
+principal_moments = [34021, 49096, 57125]
+[initial]
+euler_angles = [0, 0, 0]
+angular_velocity = [0, 0, 1]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 1
+orbit = {semi_major_axis = 1, eccentricity = 0.1}
+[time]
+end = 40
+samples = SAMPLES
+[integrator]
+formulation = "planar"
+tolerance = 1e-9
+[output]
+record = ["angular_velocity"]
+estimate = false
+[sweep]
+keep = ["final"]
+axes."initial.euler_angles[2]" = {linspace = [0, 3, 3], name = "angle"}
+axes."initial.angular_velocity[2]" = {linspace = [0, 3, 5], name = "rate"}
+"""
+
+
+@pytest.mark.parametrize("samples", [2, 21])
+def test_an_indicator_moves_no_bit_of_what_else_is_kept(samples: int) -> None:
+    config = PLANAR_MAP.replace("SAMPLES", str(samples))
+    found = {}
+    for keep in (("final",), ("final", "megno")):
+        sweep = sweep_of(config.replace('["final"]', json.dumps(keep)))
+        results = run_members(sweep, range(sweep.count), keep)
+        assert all(engine.startswith("batch") for engine in results.engines)
+        found[keep] = {name: variable.values for name, variable in results.kept.items()}
+    without, along = found.values()
+    assert set(along) - set(without) == {"megno", "growth_time"}
+    for name, values in without.items():
+        assert values.tobytes() == along[name].tobytes(), name
+    assert np.isfinite(without["angular_velocity_final"]).all()
+
+
+def test_values_of_an_axis_are_worked_out_once_however_many_members_have_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sweep = sweep_of(PLANAR_MAP.replace("SAMPLES", "2"))
+    asked: list[tuple[str, int]] = []
+    exact = Axis.exact
+
+    def counted(axis: Axis, index: int) -> tuple[ExactNumber, ...]:
+        asked.append((axis.name, index))
+        return exact(axis, index)
+
+    monkeypatch.setattr(Axis, "exact", counted)
+    axes = AxisNumbers(sweep)
+    for tile in (range(8), range(8, 15)):
+        members = Members.of(sweep, tile, axes)
+        for place, member in enumerate(tile):
+            values = [column.of(place) for column in members.numbers]
+            own = sweep.exact([member])
+            assert values == [column[0] for column in own]
+    assert len(asked) == 3 + 5 + 2 * sweep.count  # by both tiles together, and each member's own
 
 
 def test_ranges_of_members_and_their_places() -> None:

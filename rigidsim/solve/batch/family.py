@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -13,13 +13,12 @@ import numpy as np
 from rigidsim.errors import ConfigError
 from rigidsim.model.scaling import Drive
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import key_steps
-from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.trace_graph import Guard, Untraceable
 from rigidsim.scene.traced import Traced
 from rigidsim.scene.traced_whole import TracedWhole
-from rigidsim.solve.batch.replay import Replay, Swept
+from rigidsim.solve.batch.members import Members
+from rigidsim.solve.batch.replay import Replay
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.problem import prepare
 
@@ -46,52 +45,6 @@ class Alone(Enum):
     UNTRACEABLE = "the equations depend on what is swept in a way that can't be told beforehand"
     FAMILIES = f"the members need more than {MOST_FAMILIES} different systems of equations"
     RANGE = "a coefficient is outside the range of double precision"
-
-
-@dataclass(frozen=True)
-class Members:
-    """The members of a sweep, as the batch engine sees them.
-
-    Attributes:
-        base: the experiment that they are variations of.
-        keys: dotted keys of the numbers that become parameters, such as ``initial.angular_velocity[2]``.
-        numbers: for each key the members' exact numbers, SI; where the same object stands for several
-            members, it is worked out once.
-        experiment: from a member to its own experiment.
-        kinds: what else differs between members, such as a formulation or a time: members of different kinds
-            are of different families; None where nothing does.
-    """
-
-    base: Experiment
-    keys: Sequence[str]
-    numbers: Sequence[Sequence[ExactNumber]]
-    experiment: Callable[[int], Experiment]
-    count: int
-    kinds: Sequence[Any] | None = None
-
-    @classmethod
-    def of(cls, sweep: Sweep, members: Sequence[int] | None = None) -> Members:
-        """Members of a ``[sweep]``, all by default; they are counted from 0 here, in the order given."""
-        chosen = range(sweep.count) if members is None else members
-        rows = [sweep.indices(member) for member in chosen]
-        keys: list[str] = []
-        numbers: list[list[ExactNumber]] = []
-        kinds: list[list[str]] = []
-        for place, axis in enumerate(sweep.axes):
-            which = [row[place] for row in rows]
-            if not axis.numeric or key_steps(axis.key, "axes")[0] not in TRACED_TABLES:
-                texts = {index: axis.values.text(index) for index in set(which)}
-                kinds.append([texts[index] for index in which])
-                continue
-            values = {index: axis.exact(index) for index in set(which)}
-            keys += axis.columns
-            numbers += [[values[index][i] for index in which] for i in range(len(axis.columns))]
-
-        def experiment(member: int) -> Experiment:
-            return sweep.experiment_of(chosen[member])
-
-        found = list(zip(*kinds, strict=True)) if kinds else None
-        return cls(sweep.base, keys, numbers, experiment, len(rows), found)
 
 
 def reason_of_experiment(experiment: Experiment) -> Alone | None:
@@ -212,7 +165,7 @@ class Families:
     def __init__(self, members: Members, most_refused: int | None = None) -> None:
         self._members = members
         self._most_refused = most_refused
-        self._swept = [Swept(numbers) for numbers in members.numbers]
+        self._swept = members.numbers
         self.known: list[Family] = []
         self._hopeless: Alone | None = None
         self._failures = 0
@@ -281,17 +234,13 @@ class Families:
             return error
         except Untraceable:
             return Alone.UNTRACEABLE
-        return _reason_of_system(traced) or Family(traced, self._kind(member))
-
-    def _kind(self, member: int) -> Any:
-        return None if self._members.kinds is None else self._members.kinds[member]
+        return _reason_of_system(traced) or Family(traced, self._members.kind(member))
 
     def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
         """Put the members of a family into the result; those that are left."""
         candidates = waiting
         if self._members.kinds is not None:
-            same = np.array([self._kind(int(m)) == family.kind for m in waiting], dtype=bool)
-            candidates = waiting[same]
+            candidates = waiting[self._members.kinds[waiting] == family.kind]
         if not len(candidates):
             return waiting
         replay = self._replay(family, candidates)
@@ -309,7 +258,7 @@ class Families:
             numbers = _numbers_of(family, kept, self._replay(family, kept))
         if len(numbers.members):
             result.groups.append((family, numbers))
-        return waiting[~np.isin(waiting, taken)]
+        return waiting[:0] if len(taken) == len(waiting) else waiting[~np.isin(waiting, taken)]
 
     def _replay(self, family: Family, members: np.ndarray) -> Replay:
         return Replay(family.traced.graph, self._swept, members)

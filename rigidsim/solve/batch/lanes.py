@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
+from rigidsim.solve.batch.lane_results import Found, Lanes
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.stepper import LONGEST_STEP
@@ -24,62 +25,11 @@ _GRID = 1 << 16
 _IDLE = -1
 _FIRST_STEPS, _LEAST_STEPS = 64, 8
 """At once, while nothing is known of a lane's pace, and where one is about to arrive."""
+_SHORTLY = 48
+"""Steps that take about as long as what is done between two calls of the integrator."""
 _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
 
 _engines: Kept[Any] = Kept(16)
-
-
-@dataclass(frozen=True)
-class Found:
-    """One crossing: of which event, in which lane, when (internal units) and where."""
-
-    event: int
-    lane: int
-    time: float
-    state: np.ndarray
-
-
-@dataclass
-class Lanes:
-    """How members fared.
-
-    Attributes:
-        states: (samples, states, members) at the sample times; not numbers from where one ended.
-        finite: whether the state stayed so, (members,).
-        arrived: whether it got to the last sample.
-        steps: that it took.
-        found: crossings on the way, of members that have any.
-    """
-
-    states: np.ndarray
-    finite: np.ndarray
-    arrived: np.ndarray
-    steps: np.ndarray
-    found: dict[int, list[Found]] = field(default_factory=dict)
-
-    @classmethod
-    def empty(cls, samples: int, states: int, members: int) -> Lanes:
-        """Before anything ran."""
-        yes = np.ones(members, dtype=bool)
-        table = np.full((samples, states, members), np.nan)
-        return cls(table, yes, yes.copy(), np.zeros(members, dtype=np.int64))
-
-    def placed(self, order: np.ndarray) -> Lanes:
-        """With member k moved to place ``order[k]``."""
-        back = np.argsort(order)
-        found = {int(order[k]): crossings for k, crossings in self.found.items()}
-        parts = (self.finite[back], self.arrived[back], self.steps[back])
-        return Lanes(np.ascontiguousarray(self.states[:, :, back]), *parts, found)
-
-    def put(self, places: np.ndarray, others: Lanes) -> None:
-        """How some fared, in place of what was known of them."""
-        self.states[:, :, places] = others.states
-        for mine, theirs in (
-            (self.finite, others.finite),
-            (self.arrived, others.arrived),
-            (self.steps, others.steps),
-        ):
-            mine[places] = theirs
 
 
 @dataclass(frozen=True)
@@ -220,57 +170,71 @@ class BatchEngine:
         most_steps: int,
     ) -> None:
         """Run members whose end alone is asked for: whoever arrives makes room for the next in its lane."""
-        integrator = self._integrator
+        integrator, width = self._integrator, self.width
         waiting = deque(range(initial.shape[1]))
-        inside = [_IDLE] * self.width
-        taken = [0] * self.width
-        target, begun = np.zeros(self.width), np.zeros(self.width)
-        high, low = np.zeros(self.width), np.zeros(self.width)
+        inside, taken = [_IDLE] * width, [0] * width
+        target, begun = np.zeros(width), [0.0] * width
+        high, low = np.zeros(width), np.zeros(width)
 
-        def enter(lane: int) -> None:
-            """The next member, or nobody: a lane that has arrived already, with the state of some member."""
-            inside[lane] = waiting.popleft() if waiting else _IDLE
-            member = max(inside[lane], 0)
-            integrator.state[:, lane] = initial[:, member]
+        def enter(lanes: list[int]) -> None:
+            """The next members, or nobody: a lane that has arrived already, with the state of some member."""
+            members = [waiting.popleft() if waiting else _IDLE for _ in lanes]
+            somebody = [max(member, 0) for member in members]
+            integrator.state[:, lanes] = initial[:, somebody]
             if self._used:
-                integrator.pars[:, lane] = parameters[: self._used, member]
-            high[lane], low[lane], begun[lane] = start[member], 0.0, start[member]
-            target[lane] = start[member] if inside[lane] == _IDLE else end[member]
-            taken[lane] = 0
-
-        for lane in range(self.width):
-            enter(lane)
-        while any(member != _IDLE for member in inside):
+                integrator.pars[:, lanes] = parameters[: self._used, somebody]
+            for lane, member, there in zip(lanes, members, somebody, strict=True):
+                inside[lane], taken[lane] = member, 0
+                begun[lane] = high[lane] = start[there]
+                low[lane], target[lane] = 0.0, start[there] if member == _IDLE else end[there]
             integrator.set_dtime(high, low)
+
+        enter(list(range(width)))
+        moments, targets = high.tolist(), target.tolist()
+        while any(member != _IDLE for member in inside):
             self._log.clear()
-            most = _until_next(high, inside, target, begun, taken, most_steps)
+            most = _until_next(moments, inside, targets, begun, taken, most_steps)
             integrator.propagate_until(target, max_steps=most, max_delta_t=LONGEST_STEP)
             outcomes = integrator.propagate_res
             high, low = (np.array(part) for part in integrator.dtime)
+            moments = high.tolist()
             taken = [before + int(now[3]) for before, now in zip(taken, outcomes, strict=True)]
-            lost = any(now[0] == _LOST for now in outcomes)
             for crossing in self._log:
                 if inside[crossing.lane] != _IDLE:
                     result.found.setdefault(inside[crossing.lane], []).append(crossing)
-            for lane, member in enumerate(inside):
-                if member == _IDLE:
-                    continue
-                if lost and outcomes[lane][0] != _LOST:  # stopped by its neighbour, it begins again
-                    result.found.pop(member, None)
-                    waiting.appendleft(member)
-                    inside[lane] = _IDLE
-                elif lost or high[lane] == target[lane] or taken[lane] >= most_steps:
-                    result.steps[member] = taken[lane]
-                    result.finite[member] = not lost
-                    result.arrived[member] = high[lane] == target[lane] and not lost
-                    if result.arrived[member]:
-                        result.states[-1, :, member] = integrator.state[:, lane]
-                    inside[lane] = _IDLE
-                else:
-                    continue
-            for lane, member in enumerate(inside):
-                if member == _IDLE and (waiting or lost or target[lane] != begun[lane]):
-                    enter(lane)
+            if any(now[0] == _LOST for now in outcomes):
+                self._after_loss(result, inside, taken, outcomes, waiting)
+                lanes = list(range(width))
+            else:
+                lanes = [
+                    lane
+                    for lane, member in enumerate(inside)
+                    if member != _IDLE and (moments[lane] == targets[lane] or taken[lane] >= most_steps)
+                ]
+                members = [inside[lane] for lane in lanes]
+                there = [moments[lane] == targets[lane] for lane in lanes]
+                result.steps[members] = [taken[lane] for lane in lanes]
+                result.arrived[members] = there
+                # of one that didn't arrive nothing is known at the end
+                result.states[-1][:, members] = np.where(there, integrator.state[:, lanes], np.nan)
+            if lanes:
+                enter(lanes)
+                moments, targets = high.tolist(), target.tolist()
+
+    @staticmethod
+    def _after_loss(
+        result: Lanes, inside: list[int], taken: list[int], outcomes: Any, waiting: deque[int]
+    ) -> None:
+        """A state was lost, and all lanes have stopped: those beside it begin again."""
+        for member, steps, outcome in zip(inside, taken, outcomes, strict=True):
+            if member == _IDLE:
+                continue
+            if outcome[0] == _LOST:
+                result.steps[member] = steps
+                result.finite[member] = result.arrived[member] = False
+            else:
+                result.found.pop(member, None)
+                waiting.appendleft(member)
 
     def _together(
         self,
@@ -291,52 +255,55 @@ class BatchEngine:
         integrator.state[:] = initial
         if self._used:
             integrator.pars[:] = parameters[: self._used]
-        taken, first, begin, left = [0] * len(members), 0, start, most_steps
+        count = len(members)
+        consecutive = members[-1] - members[0] == count - 1
+        places: Any = slice(members[0], members[-1] + 1) if consecutive else members
+        taken = np.zeros(count, dtype=np.int64)
+        arrived, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
+        first, begin, left = 0, start, most_steps
         while True:
             part = times[first : first + _GRID]
             known = bool(first == 0 and (part[0] == start).all())
             if known and len(part) == 1:
-                found, outcomes = np.array(integrator.state)[None], []
+                found = np.array(integrator.state)[None]
             else:
                 grid = part if known else np.vstack([begin, part])
                 _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=LONGEST_STEP)
-                outcomes = integrator.propagate_res[: len(members)]
+                outcomes = integrator.propagate_res[:count]
+                taken += [now[3] for now in outcomes]
+                arrived[:] = [now[0] == _ARRIVED for now in outcomes]
+                lost[:] = [now[0] == _LOST for now in outcomes]
             skipped = 0 if known else 1
-            result.states[first : first + len(part), :, members] = found[skipped:, :, : len(members)]
-            taken = [before + int(now[3]) for before, now in zip(taken, outcomes, strict=False)] or taken
-            codes = [now[0] for now in outcomes]
-            first, begin, left = first + _GRID, part[-1], most_steps - max(taken)
-            if any(code != _ARRIVED for code in codes) or first >= len(times) or left <= 0:
+            result.states[first : first + len(part), :, places] = found[skipped:, :, :count]
+            first, begin, left = first + _GRID, part[-1], most_steps - int(taken.max())
+            if not arrived.all() or first >= len(times) or left <= 0:
                 break
-        lost = [m for m, code in zip(members, codes, strict=False) if code == _LOST]
-        arrived = [code == _ARRIVED for code in codes] or [True] * len(members)
-        for member, steps, there in zip(members, taken, arrived, strict=True):
-            result.steps[member] = steps
-            result.finite[member] = member not in lost
-            result.arrived[member] = there and first >= len(times)
+        result.steps[places], result.finite[places] = taken, ~lost
+        result.arrived[places] = arrived & (first >= len(times))
         if self._log:
             for place, member in enumerate(members):
                 result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
         elif self._system.events:
             for member in members:
                 result.found.pop(member, None)
-        return lost
+        return [member for member, gone in zip(members, lost.tolist(), strict=True) if gone]
 
 
 def _until_next(
-    moments: np.ndarray,
+    moments: list[float],
     inside: list[int],
-    target: np.ndarray,
-    begun: np.ndarray,
+    targets: list[float],
+    begun: list[float],
     taken: list[int],
     most_steps: int,
 ) -> int:
-    """Steps until about the first lane arrives, at its pace so far."""
-    found = most_steps
-    for lane, moment in enumerate(moments.tolist()):
-        if inside[lane] == _IDLE:
+    """Steps until about the first lane arrives at its pace so far, and those that arrive shortly after."""
+    expected = []
+    for lane, member in enumerate(inside):
+        if member == _IDLE:
             continue
-        gone, left = moment - begun[lane], target[lane] - moment
-        expected = _FIRST_STEPS if taken[lane] == 0 or gone <= 0 else int(left / gone * taken[lane]) + 2
-        found = min(found, max(expected, _LEAST_STEPS), most_steps - taken[lane])
-    return max(found, 1)
+        gone, left = moments[lane] - begun[lane], targets[lane] - moments[lane]
+        steps = _FIRST_STEPS if taken[lane] == 0 or gone <= 0 else int(left / gone * taken[lane]) + 2
+        expected.append(min(max(steps, _LEAST_STEPS), most_steps - taken[lane]))
+    first = min(expected)
+    return max(max(steps for steps in expected if steps <= first + _SHORTLY), 1)

@@ -15,7 +15,8 @@ import numpy as np
 
 from rigidsim.model.tangents import LARGEST, SMALL
 from rigidsim.solve.batch.events import EventExpressions
-from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem, Lanes
+from rigidsim.solve.batch.lane_results import Lanes
+from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
 
 _LARGEST = float(np.exp(LARGEST - SMALL * np.log(2.0)))
@@ -92,12 +93,13 @@ class BatchMotion:
         if not self._may_share:
             return plain(everybody), along.states
         tried = np.unique(np.linspace(0, len(everybody) - 1, self._width).astype(np.int64))
-        motion = replace(along, states=along.states[:, :moving].copy())
+        motion = replace(along, states=along.states[:, :moving])
         if not _same_bits(plain(tried), motion, tried):
             return plain(everybody), along.states
         large = ~(np.abs(along.states[:, moving:]) < _LARGEST).all(axis=(0, 1))
         again = np.flatnonzero(large | ~along.arrived | ~along.finite)
         if len(again):
+            motion = replace(motion, states=motion.states.copy())
             motion.put(again, plain(again))
         return motion, along.states
 

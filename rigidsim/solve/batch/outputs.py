@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
+import heyoka as hy
 import numpy as np
 
 from rigidsim.model.outputs import Recorded
@@ -12,7 +14,6 @@ from rigidsim.model.tangents import GROWTH
 from rigidsim.solve.batch.family import Numbers
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function
-from rigidsim.solve.engine import CompiledFunction
 
 _GROUP = 64  # a multiple of every SIMD width: padded to it, a column's bits don't depend on its place
 
@@ -31,9 +32,14 @@ class BatchOutputs:
         self._system = traced.system
         self._growth = {r.first for r in self._system.recorded if r.name == GROWTH}
 
-    def _compiled(self, expressions: list[Any], states: int) -> CompiledFunction:
+    def _compiled(self, expressions: list[Any], states: int) -> tuple[Any, list[int]]:
+        """A function of states, and which of these, and of the parameters after them, it takes."""
         variables = [*self._system.variables[:states], *self._traced.parameters.variables]
-        return compiled_function(expressions, variables, compact_mode=self._system.wide, fp_type=float)
+        names = set(hy.get_variables([hy.expression(x) for x in expressions]))
+        read = [n for n, variable in enumerate(variables) if str(variable) in names] or [0]
+        taken = [variables[n] for n in read]
+        wide = self._system.wide
+        return compiled_function(expressions, taken, compact_mode=wide, fp_type=float), read
 
     @cached_property
     def _parts(self) -> tuple[list[int], list[Any], list[Any]]:
@@ -76,7 +82,7 @@ class BatchOutputs:
             table[sorted(self._growth)] = self._evaluated(growth, along, swept, times)
         return table
 
-    def named(self, found: np.ndarray, numbers: Numbers, part: slice) -> tuple[Values, Values]:
+    def named(self, found: np.ndarray, numbers: Numbers, part: np.ndarray) -> tuple[Values, Values]:
         """Outputs at samples as recorded variables (samples, m, components), SI; drifts by invariants."""
         values: Values = {}
         for variable in self._system.recorded:
@@ -102,7 +108,7 @@ class BatchOutputs:
             variable.name: _at_events(variable, found, numbers, members) for variable in self._system.recorded
         }
 
-    def _join(self, values: Values, numbers: Numbers, part: slice) -> None:
+    def _join(self, values: Values, numbers: Numbers, part: np.ndarray) -> None:
         """Give each quaternion the sign nearest to the one before, as in a single run."""
         for variable in self._system.recorded:
             if variable.continuity != "nearest":
@@ -128,38 +134,32 @@ class BatchOutputs:
             states: (samples, states, m); times: (samples, m), internal units.
             begun: initial values of the invariants' components, (components, m).
         """
-        samples, _, m = states.shape
+        samples, count, m = states.shape
         if not expressions:
             return np.empty((0, samples, m))
-        function: Any = self._compiled(expressions, states.shape[1])
+        function, read = self._compiled(expressions, count)
         columns = samples * m
         padded = -(-columns // _GROUP) * _GROUP
 
-        def spread(table: np.ndarray) -> np.ndarray:
-            """From (k, m) to (k, padded), the same for all samples."""
-            return _padded(np.broadcast_to(table[:, None], (len(table), samples, m)), padded)
+        def spread(rows: Sequence[np.ndarray]) -> np.ndarray:
+            """Rows, each (samples, m) or (m,) for all samples alike, as (rows, padded)."""
+            table = np.empty((len(rows), padded))
+            for line, row in zip(table, rows, strict=True):
+                line[:columns].reshape(samples, m)[:] = row
+                line[columns:] = line[columns - 1]
+            return table
 
-        inputs = np.concatenate([_padded(states.transpose(1, 0, 2), padded), spread(swept)])
         arguments = {}
         if function.is_time_dependent:
-            arguments["time"] = _padded(times[None], padded)[0]
+            arguments["time"] = spread([times])[0]
         if function.nparams and begun is not None:
-            arguments["pars"] = spread(begun)
-        found = np.asarray(function(np.ascontiguousarray(inputs), **arguments))
+            arguments["pars"] = spread(list(begun))
+        rows = [states[:, n] if n < count else swept[n - count] for n in read]
+        found = np.asarray(function(spread(rows), **arguments))
         return found[:, :columns].reshape(len(expressions), samples, m)
 
 
-def _padded(table: np.ndarray, columns: int) -> np.ndarray:
-    """From (k, samples, m) to (k, columns), the last column repeated."""
-    if not len(table):
-        return np.empty((0, columns))
-    flat = table.reshape(len(table), -1)
-    if flat.shape[1] == columns:
-        return flat
-    return np.concatenate([flat, np.repeat(flat[:, -1:], columns - flat.shape[1], axis=1)], axis=1)
-
-
-def _to_si(values: np.ndarray, numbers: Numbers, exponent: Any, part: slice) -> np.ndarray:
+def _to_si(values: np.ndarray, numbers: Numbers, exponent: Any, part: np.ndarray) -> np.ndarray:
     if isinstance(exponent, int):
         return np.ldexp(values, exponent) if exponent else values
     return np.ldexp(values, numbers.whole_numbers(exponent)[part])

@@ -8,6 +8,7 @@ scene's own arithmetic, so that the result is that of the member's own build, al
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -33,24 +34,33 @@ _BINARY: dict[str, Callable[[Doubled, Doubled], Doubled]] = {
 }
 
 
-class Swept:
-    """One swept number of all members: the different values, and which of them each member has."""
+class Distinct:
+    """The values that one swept number takes."""
 
     def __init__(self, values: Sequence[ExactNumber]) -> None:
-        places: dict[int, int] = {}
-        index = [places.setdefault(id(value), len(places)) for value in values]
-        self.index = np.array(index, dtype=np.int64)
-        first: dict[int, ExactNumber] = {id(value): value for value in values}
-        self.different = [first[key] for key in places]
+        self.values = values
 
     @cached_property
     def doubled(self) -> Doubled:
-        """The different values."""
-        return _of_exact(self.different)
+        """All of them in two doubles."""
+        return _of_exact(self.values)
+
+
+@dataclass(frozen=True)
+class Swept:
+    """One swept number of all members.
+
+    Attributes:
+        distinct: the values that it takes.
+        index: which of them each member has, (members,).
+    """
+
+    distinct: Distinct
+    index: np.ndarray
 
     def of(self, member: int) -> ExactNumber:
         """The number of one."""
-        return self.different[self.index[member]]
+        return self.distinct.values[self.index[member]]
 
 
 class Replay:
@@ -64,10 +74,10 @@ class Replay:
     def __init__(self, graph: Graph, swept: Sequence[Swept], members: np.ndarray) -> None:
         self._graph, self._swept, self._count = graph, swept, len(members)
         self._members = members
-        count = self._count
         self._numbers: dict[int, Doubled] = {}
         self._wholes: dict[int, np.ndarray] = {}
-        self._exact: list[dict[int, Any]] = [{} for _ in range(count)]
+        self._doubles: dict[int, np.ndarray] = {}
+        self._exact: dict[tuple[int, int], Any] = {}
         self._double = precision_of("double")
 
     def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
@@ -81,6 +91,11 @@ class Replay:
 
     def doubles(self, node: int) -> np.ndarray:
         """A number rounded once, shape (members,); not a number where it is outside a double's range."""
+        if node not in self._doubles:
+            self._doubles[node] = self._rounded(node)
+        return self._doubles[node]
+
+    def _rounded(self, node: int) -> np.ndarray:
         with np.errstate(all="ignore"):
             high, certain = dd.nearest_double(self._number(node))
         values = np.array(np.broadcast_to(high, self._count))
@@ -126,7 +141,7 @@ class Replay:
             return _doubled(arguments[0])
         if operation == "column":
             column = self._swept[arguments[0]]
-            index, found = column.index[self._members], column.doubled
+            index, found = column.index[self._members], column.distinct.doubled
             return Doubled(found.high[index], found.low[index], found.error[index])
         if operation == "power_of_two":
             return Doubled(np.ldexp(1.0, self._whole(arguments[0])), 0.0, 0.0)
@@ -165,7 +180,7 @@ class Replay:
         codes = np.zeros(self._count, dtype=np.int64)
         for column in columns:
             swept = self._swept[column]
-            codes = codes * len(swept.different) + swept.index[self._members]
+            codes = codes * len(swept.distinct.values) + swept.index[self._members]
             _, codes = np.unique(codes, return_inverse=True)
         _, first = np.unique(codes, return_index=True)
         parts = []
@@ -218,11 +233,10 @@ class Replay:
 
     def _exactly(self, node: int, member: int) -> Any:
         """A member's number as its own build has it (mpf)."""
-        known = self._exact[member]
-        if node not in known:
+        if (node, member) not in self._exact:
             operation, arguments = self._graph.nodes[node]
-            known[node] = self._exact_result(operation, arguments, member)
-        return known[node]
+            self._exact[node, member] = self._exact_result(operation, arguments, member)
+        return self._exact[node, member]
 
     def _exact_result(self, operation: str, arguments: tuple[Any, ...], member: int) -> Any:
         context = self._graph.context

@@ -11,7 +11,8 @@ import numpy as np
 
 from rigidsim.solve.batch.events import EventExpressions
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.lanes import Lanes, recommended_width
+from rigidsim.solve.batch.lane_results import Lanes
+from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.solve.batch.motion import BatchMotion
 from rigidsim.solve.batch.outputs import BatchOutputs, Values
 from rigidsim.solve.precision import precision_of
@@ -51,7 +52,7 @@ class BatchBlock:
         times: seconds, (samples,).
         values: of the recorded variables, (samples, m, components), SI; NaN from where a member ended.
         drifts: by the names of the invariants, (samples, m).
-        status: how each ended; None where a lane gave up and the member is to be run by itself.
+        status: how each ended, (m,) objects; None where a lane gave up and the member is to be run by itself.
         reached: samples that each got to, (m,).
         steps: (m,).
         drift_bound: relative drift that rounding alone explains, (m,).
@@ -64,7 +65,7 @@ class BatchBlock:
     times: np.ndarray
     values: Values
     drifts: Values
-    status: list[Status | None]
+    status: np.ndarray
     reached: np.ndarray
     steps: np.ndarray
     drift_bound: np.ndarray
@@ -100,12 +101,14 @@ class BatchRun:
         samples = self._traced.prepared.clock.count
         each = samples * (len(self._system.states) + len(self._system.outputs))
         most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
-        for first in range(0, len(numbers.members), most):
-            yield self._block(numbers, slice(first, first + most))
+        # those that take about as many steps side by side: none waits for long
+        order = np.argsort(numbers.doubles(self._system.rate_bound), kind="stable")
+        for first in range(0, len(order), most):
+            yield self._block(numbers, order[first : first + most])
 
     # --- one block ------------------------------------------------------------------------------------------
 
-    def _block(self, numbers: Numbers, part: slice) -> BatchBlock:
+    def _block(self, numbers: Numbers, part: np.ndarray) -> BatchBlock:
         members, initial = numbers.members[part], numbers.initial[:, part]
         swept = numbers.parameters[:, part]
         units = numbers.whole_numbers(self._system.scaling.time)[part]
@@ -115,29 +118,19 @@ class BatchRun:
             [swept[self._traced.in_equations], self._crossings.values(moving, swept, start, times[-1])]
         )
         most = self._most_steps(start, times)
-        # those that take about as many steps side by side: none waits for long
-        order = np.argsort(numbers.doubles(self._system.rate_bound)[part], kind="stable")
-        lanes, along = self._motion.run(
-            initial[:, order], parameters[:, order], start[order], times[:, order], most
-        )
-        lanes = lanes.placed(order)
-        if along is not None:
-            along = np.ascontiguousarray(along[:, :, np.argsort(order)])
-        states, steps = lanes.states, lanes.steps
+        lanes, along = self._motion.run(initial, parameters, start, times, most)
         begun = self._outputs.begun(moving, swept, start)
-        values_of = self._outputs.at(states, swept, times, begun, along)
+        values_of = self._outputs.at(lanes.states, swept, times, begun, along)
         values, drifts = self._outputs.named(values_of, numbers, part)
-        finite = np.isfinite(states).all(axis=1)
-        reached = np.where(finite.all(axis=0), len(times), np.argmin(finite, axis=0))
         block = BatchBlock(
             members,
             self._traced.prepared.clock.labels(0, len(times)),
             values,
             drifts,
             self._status(lanes, most),
-            reached,
-            steps,
-            self._traced.prepared.drift_bound(steps),
+            _reached(lanes),
+            lanes.steps,
+            self._traced.prepared.drift_bound(lanes.steps),
             self._turned(numbers, part),
             self._events(lanes, swept, numbers, part, units, begun),
             self.width,
@@ -163,15 +156,15 @@ class BatchRun:
         given_up = _MOST_STEPS + int(min(_STEPS_PER_UNIT * longest, 1e12))
         return given_up if asked is None else min(int(asked), given_up)
 
-    def _status(self, lanes: Lanes, most: int) -> list[Status | None]:
+    def _status(self, lanes: Lanes, most: int) -> np.ndarray:
         asked = self._traced.prepared.scene.config.limits.max_steps
         short = Status.MAX_STEPS if asked is not None and most == int(asked) else None
-        return [
-            Status.FINISHED if there else (short if finite else Status.NON_FINITE)
-            for there, finite in zip(lanes.arrived.tolist(), lanes.finite.tolist(), strict=True)
-        ]
+        found = np.full(len(lanes.arrived), Status.FINISHED, dtype=object)
+        found[~lanes.arrived] = short
+        found[~lanes.arrived & ~lanes.finite] = Status.NON_FINITE
+        return found
 
-    def _turned(self, numbers: Numbers, part: slice) -> np.ndarray:
+    def _turned(self, numbers: Numbers, part: np.ndarray) -> np.ndarray:
         samples = self._traced.prepared.scene.samples
         spacing = samples.step
         if samples.times is not None:
@@ -186,7 +179,7 @@ class BatchRun:
         lanes: Lanes,
         swept: np.ndarray,
         numbers: Numbers,
-        part: slice,
+        part: np.ndarray,
         units: np.ndarray,
         begun: np.ndarray,
     ) -> list[BatchEvents]:
@@ -200,7 +193,7 @@ class BatchRun:
             if rows:
                 states = np.array([f.state for _, f in rows]).T[None]
                 at = self._outputs.at(states, swept[:, place], times[None], begun[:, place])
-                values = self._outputs.named_at_events(at, numbers, part.start + place)
+                values = self._outputs.named_at_events(at, numbers, part[place])
             seconds = np.ldexp(times, units[place]) if rows else times
             events.append(BatchEvents(crossing.name, place, seconds, values))
         return events
@@ -231,6 +224,15 @@ class BatchRun:
         for m in np.flatnonzero(beyond.any(axis=0)).tolist():
             block.status[m] = Status.MAX_DRIFT
             _end(block, m, int(np.argmax(beyond[:, m])) + 1)
+
+
+def _reached(lanes: Lanes) -> np.ndarray:
+    """Samples that each member got to, (members,)."""
+    found = np.full(len(lanes.arrived), len(lanes.states))
+    short = np.flatnonzero(~lanes.arrived)
+    finite = np.isfinite(lanes.states[:, :, short]).all(axis=1)
+    found[short] = np.where(finite.all(axis=0), len(finite), np.argmin(finite, axis=0))
+    return found
 
 
 def _end(block: BatchBlock, member: int, samples: int) -> None:

@@ -13,7 +13,8 @@ from rigidsim.scene.config import parse
 from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.traced import Traced
 from rigidsim.scene.traced_whole import TracedWhole
-from rigidsim.solve.batch.family import Alone, Families, Members, batchable
+from rigidsim.solve.batch.family import Alone, Families, batchable
+from rigidsim.solve.batch.members import Members
 from rigidsim.solve.problem import prepare
 
 FREE = """
