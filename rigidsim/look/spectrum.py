@@ -38,14 +38,13 @@ def spectrum_figure(analysis: xarray.Dataset) -> Figure:
         A figure on the Agg canvas.
     """
     from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+
+    from rigidsim.look.figures.shown import ShownFigure
 
     analysis = analysis.isel(signal=np.isfinite(analysis["amplitude"].values).any(axis=1))
     count = min(analysis.sizes["signal"], _MOST_SIGNALS)
     with rc_context(STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(11, 3.6 * max(count, 0.5) + 0.5), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = ShownFigure(figsize=(11, 3.6 * max(count, 0.5) + 0.5), layout="constrained")
         if not count:
             figure.text(0.5, 0.5, "no line stands out of what is left", ha="center", color="#555555")
         for number in range(count):

@@ -1,4 +1,4 @@
-"""Loads given from Python: the example of README.md, and how such runs are marked."""
+"""Loads given from Python: the example of the documentation, and how such runs are marked."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ timeline = false
 
 def example() -> str:
     (code,) = re.findall(
-        r"<!-- test: own load -->\n```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S
+        r"<!-- test: own load -->\n```python\n(.*?)```", (ROOT / "docs/howto/own_load.md").read_text(), re.S
     )
     return str(code)
 
@@ -46,7 +46,7 @@ def names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     found: dict[str, Any] = {}
     printed = StringIO()
     with redirect_stdout(printed):
-        exec(compile(example(), "README.md", "exec"), found)
+        exec(compile(example(), "own_load.md", "exec"), found)
     return found | {"printed": printed.getvalue()}
 
 

@@ -1,4 +1,4 @@
-"""An observable of one's own: the README's example is recorded by its name like those of rigidsim."""
+"""An observable of one's own: the documentation's example is recorded by its name like those of rigidsim."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[rigidsim.Run]:
-    """What the README's example leaves behind, run in an empty folder; the observable is gone afterwards."""
+    """What the example leaves behind, run in an empty folder; the observable is gone afterwards."""
     (code,) = re.findall(
-        r"<!-- test: own observable -->\n```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S
+        r"<!-- test: own observable -->\n```python\n(.*?)```",
+        (ROOT / "docs/howto/own_observable.md").read_text(),
+        re.S,
     )
     (tmp_path / "configs").symlink_to(ROOT / "configs")
     monkeypatch.chdir(tmp_path)
     known = dict(OBSERVABLES)
     with redirect_stdout(StringIO()):
-        exec(compile(code, "README.md", "exec"), {})
+        exec(compile(code, "own_observable.md", "exec"), {})
     yield rigidsim.open_run("runs/asymmetric_top")
     OBSERVABLES.clear()
     OBSERVABLES.update(known)

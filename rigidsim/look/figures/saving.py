@@ -17,7 +17,7 @@ _DOTS = 160  # per inch
 
 
 def save_figure(
-    dataset: xarray.Dataset, path: Path, what: str = OVERVIEW, *, file_format: str | None = None
+    dataset: xarray.Dataset, path: str | Path, what: str = OVERVIEW, *, file_format: str | None = None
 ) -> Path:
     """Draw a figure of a run to a file.
 
@@ -33,6 +33,7 @@ def save_figure(
     Raises:
         ValueError: another suffix, or as `figure`.
     """
+    path = Path(path)
     file_format = file_format or figure_format(path)
     from matplotlib import rc_context
 

@@ -77,9 +77,9 @@ def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
         height: of what stands below the heading, inches.
     """
     # The object-oriented interface: no pyplot, no state that outlives the call.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    from rigidsim.look.figures.shown import ShownFigure
 
     description = " ".join(str(read_config(dataset).get("description", "")).split())
     title = title_of(dataset)
@@ -88,8 +88,7 @@ def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
     top = _HEADING[0] + (_HEADING[1] if description else 0.0) + 0.08
     whole = height + top
     engine = ConstrainedLayoutEngine(h_pad=0.09, w_pad=0.09, rect=(0.0, 0.0, 1.0, 1.0 - top / whole))
-    figure = Figure(figsize=(width, whole), layout=engine)
-    FigureCanvasAgg(figure)
+    figure = ShownFigure(figsize=(width, whole), layout=engine)
     left = 0.14 / width
     first = figure.text(
         left, 1 - 0.12 / whole, title, va="top", fontsize=13.5, fontweight="bold", color=INK, gid="heading"

@@ -1,0 +1,130 @@
+"""Gathers the pages of the site: those of docs/, the guide to the studies, the changelog, the notebooks.
+
+Pages link each other by paths within the repository, so that they read as well there. Here each link is
+followed: to a page or a picture it becomes the place of that in the site, to a file that the site has no page
+for a download; a folder or a module is named without a link, and what isn't there is an error.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+ELSEWHERE = {
+    ROOT / "README.md": "index.md",
+    ROOT / "CHANGELOG.md": "changelog.md",
+    ROOT / "experiments" / "README.md": "experiments/index.md",
+}
+"""Pages outside docs/, by their place in the site."""
+_LINK = re.compile(r"(?<!`)(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
+_FENCE = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
+_ENTRY = re.compile(r"^- \[[^\]]+\]\(([\w/.-]+)\)|^- `(reference/[\w.]+\.md)`", re.MULTILINE)
+
+
+class DeadLinkError(Exception):
+    """A page links what isn't there."""
+
+
+def gather(folder: Path) -> list[Path]:
+    """Write all pages, with what they show, into a folder.
+
+    Returns:
+        The pages, without those that are generated.
+
+    Raises:
+        DeadLinkError: with all dead links of all pages.
+    """
+    pages = {page: place_of(page) for page in [*sorted(DOCS.rglob("*.md")), *_notebooks(), *ELSEWHERE]}
+    del pages[ROOT / "README.md"]  # the site begins with docs/index.md
+    dead: list[str] = []
+    for page, place in pages.items():
+        text = _notebook_text(page) if page.suffix == ".ipynb" else page.read_text(encoding="utf-8")
+        target = folder / place
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(_linked(text, page, place, folder, dead), encoding="utf-8")
+    if dead:
+        raise DeadLinkError("\n".join(dead))
+    return [folder / place for place in pages.values()]
+
+
+def place_of(path: Path) -> str | None:
+    """Where a file of the repository lies in the site; None for what has no place of its own."""
+    if path in ELSEWHERE:
+        return ELSEWHERE[path]
+    if path.is_relative_to(DOCS):
+        return str(path.relative_to(DOCS).with_suffix(".md" if path.suffix == ".ipynb" else path.suffix))
+    if path.suffix in (".png", ".toml", ".gif"):
+        return str(path.relative_to(ROOT))
+    return None
+
+
+def add_contents(folder: Path) -> None:
+    """Give the first page a table of contents, section by section as it lists the pages; pages that it
+    doesn't name come last.
+    """
+    index = folder / "index.md"
+    text = index.read_text(encoding="utf-8")
+    listed: set[str] = {"index.md"}
+    made = []
+    for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
+        names = [link or generated for link, generated in _ENTRY.findall(section)]
+        names = [name for name in dict.fromkeys(names) if name not in listed]
+        listed |= set(names)
+        if names:
+            made.append(_toctree(section.partition("\n")[0], names))
+    rest = sorted(str(page.relative_to(folder)) for page in folder.rglob("*.md"))
+    rest = [name for name in rest if name not in listed]
+    text = re.sub(r"^- `(reference/[\w.]+)\.md`", r"- [\1](\1.md)", text, flags=re.MULTILINE)
+    made += [_toctree("More", rest)] if rest else []
+    index.write_text("\n\n".join([text.rstrip(), *made]) + "\n", encoding="utf-8")
+
+
+def _toctree(caption: str, names: list[str]) -> str:
+    entries = "\n".join(name.removesuffix(".md") for name in names)
+    return f"```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{entries}\n```"
+
+
+def _notebooks() -> list[Path]:
+    return sorted(DOCS.rglob("*.ipynb"))
+
+
+def _notebook_text(page: Path) -> str:
+    """A notebook as a page: its texts and its code."""
+    parts = [f"The same as a notebook: [{page.name}]({page.name})."]
+    for cell in json.loads(page.read_text(encoding="utf-8"))["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+    parts[0], parts[1] = parts[1], parts[0]  # the title comes first
+    return "\n\n".join(parts) + "\n"
+
+
+def _linked(text: str, page: Path, place: str, folder: Path, dead: list[str]) -> str:
+    """The text with its links as they are in the site; code is left as it is."""
+
+    def replaced(found: re.Match[str]) -> str:
+        picture, words, target = found.groups()
+        name, hash_, anchor = target.partition("#")
+        if "://" in target or target.startswith("mailto:") or not name:
+            return found[0]
+        path = Path(os.path.normpath(page.parent / name))
+        if not path.exists():
+            dead.append(f"{page.relative_to(ROOT)}: [{words}]({target}) leads nowhere")
+            return found[0]
+        there = place_of(path)
+        if path.suffix == ".ipynb" and page == path:
+            there = str(path.relative_to(DOCS))
+        if there is None or path.is_dir():
+            return words if "`" in words else f"`{words}`"
+        if path.suffix not in (".md", ".ipynb") or page == path:
+            (folder / there).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, folder / there)
+        way = os.path.relpath(there, Path(place).parent)
+        return f"{picture}[{words}]({way}{hash_}{anchor})"
+
+    parts = _FENCE.split(text)
+    return "".join(part if n % 2 else _LINK.sub(replaced, part) for n, part in enumerate(parts))

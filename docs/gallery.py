@@ -1,0 +1,156 @@
+"""The gallery: every ready config with its picture, what to look for in it, and its numbers.
+
+``python -m docs.gallery [NAME...]`` runs the configs, draws what ``rigidsim plot`` draws of each (or of those
+named) into docs/figures/gallery, and writes docs/gallery.md. ``--table`` prints the table of numbers alone,
+which the tests compare with the one on the page.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+import rigidsim
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "gallery.md"
+PICTURES = ROOT / "docs" / "figures" / "gallery"
+CONFIGS = sorted((ROOT / "configs").glob("*.toml"))
+_DOTS_PER_INCH = 64
+_COLOURS = 64  # of a picture's palette
+_COLUMNS = (
+    "config",
+    "states",
+    "precision",
+    "steps",
+    "samples",
+    "attitude uncertain by, rad",
+    "largest drift",
+    "of what rounding explains",
+)
+STUDIES = {
+    "earth_free_nutation": ("", "Euler's free nutation of the Earth, and why it isn't Chandler's"),
+    "toutatis": ("", "Toutatis tumbles in 5.41 and 7.35 days: closed form, spectral lines"),
+    "heavy_top_regimes": ("", "heavy tops: nutation, fast and regular precession, sleeping tops"),
+    "luni_solar_precession": ("luni_solar_precession", "25,772 years of the Earth, every rotation resolved"),
+    "precession_and_nutation": ("precession_and_nutation", "lines of the Earth's nutation against IAU 2000B"),
+    "spectral_lines": ("spectral_lines", "lines of free bodies and tops against elliptic integrals"),
+    "hyperion": ("hyperion", "Hyperion's chaos: stability, section, Lyapunov rates"),
+    "long_horizon": ("long_horizon", "how errors grow over 1e7 rad, plain and with held invariants"),
+    "precision_tradeoff": ("precision_tradeoff", "what accuracy costs, five scenes, all settings"),
+    "peer_comparison": ("peer_comparison", "against other integrators"),
+    "accuracy_certificates": ("accuracy_certificates", "whether certified errors are true"),
+}
+"""Studies by name: their figure in experiments/figures, and what they ask."""
+
+
+def numbers(run: rigidsim.Run) -> list[str]:
+    """The row of a run."""
+    summary = run.summary
+    drifts = [(row["largest_drift"] or 0.0, row["bound"]) for row in summary["invariants"].values()]
+    largest, bound = max(drifts, default=(0.0, 1.0))
+    error = summary["accuracy"]["estimated_attitude_error"]
+    return [
+        f"`{summary['name']}`",
+        str(len(summary["states"])),
+        summary["precision"],
+        str(summary["cost"]["steps"]),
+        str(summary["samples"]),
+        "no attitude" if error is None else f"{error:.1e}",
+        f"{largest:.1e}",
+        f"{largest / bound:.1e}",
+    ]
+
+
+def table(rows: list[list[str]]) -> str:
+    """All rows below their columns."""
+    lines = [_COLUMNS, ["---"] * len(_COLUMNS), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def told(config: Path) -> tuple[str, str]:
+    """Description of a config, and what to look for, from its own comments."""
+    text = config.read_text(encoding="utf-8")
+    comment = re.match(r"(?:#[^\n]*\n)+", text)
+    words = " ".join((line.lstrip("#").strip() for line in comment[0].splitlines()) if comment else ())
+    look = words.partition("What to look for: ")[2] or words
+    return tomllib.loads(text).get("description", ""), (look[:1].upper() + look[1:]).replace("|", "\\|")
+
+
+def picture(run: rigidsim.Run, name: str) -> None:
+    """The page that suits the scene, small."""
+    from matplotlib import pyplot
+    from PIL import Image
+
+    figure = run.plot()
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=_DOTS_PER_INCH)
+    pyplot.close(figure)
+    data.seek(0)
+    image = Image.open(data).convert("RGB").quantize(_COLOURS)
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    image.save(PICTURES / f"{name}.png", optimize=True)
+
+
+def page(rows: list[list[str]]) -> str:
+    """docs/gallery.md."""
+    parts = [
+        "<!-- blocks: slow -->\n# Gallery",
+        "Every config of `configs/`, as it is run and drawn by two commands (`python -m docs.gallery` makes "
+        "this page):",
+        "```sh\nrigidsim run configs/heavy_top_nutating.toml\nrigidsim plot runs/heavy_top_nutating\n```",
+        "## Their numbers",
+        "Announced error of the attitude at the end, and the largest drift of any invariant over what "
+        "rounding explains (50 tolerance sqrt(steps)). A large error with a tiny drift is a motion that "
+        "amplifies errors: it flips, or falls.",
+        "<!-- slow output: python -m docs.gallery --table -->\n" + table(rows),
+    ]
+    for config in CONFIGS:
+        description, look = told(config)
+        parts.append(f"## {config.stem}")
+        parts.append(f"*{description}.* [{config.name}](../configs/{config.name})")
+        parts.append(look)
+        parts.append(f"![What rigidsim plot draws of it](figures/gallery/{config.stem}.png)")
+    parts.append("## Sweeps")
+    for config in sorted((ROOT / "configs" / "sweeps").glob("*.toml")):
+        description, _ = told(config)
+        parts.append(
+            f"*{description}.* [{config.name}](../configs/sweeps/{config.name}), by `rigidsim sweep`."
+        )
+    parts.append("![MEGNO over angle and rate](figures/hyperion_map.png)")
+    parts.append("## Studies")
+    parts.append(
+        "Questions with an answer, each one command, `python -m experiments.NAME`; "
+        "[all of them with their tables](../experiments/README.md)."
+    )
+    for name, (figure, what) in STUDIES.items():
+        parts.append(f"**`{name}`**: {what}.")
+        if figure:
+            parts.append(f"![{what}](../experiments/figures/{figure}.png)")
+    return "\n\n".join(parts) + "\n"
+
+
+def main(given: list[str]) -> None:
+    """Run, draw and write; or print the table alone."""
+    alone = "--table" in given
+    named = {name for name in given if not name.startswith("-")}
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for config in CONFIGS:
+            print(config.stem, file=sys.stderr, flush=True)
+            run = rigidsim.run(config, out=folder, changes={"output.timeline": False})
+            rows.append(numbers(run))
+            if not alone and (not named or config.stem in named):
+                picture(run, config.stem)
+    if alone:
+        print(table(rows))
+    else:
+        PAGE.write_text(page(rows), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
