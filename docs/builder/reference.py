@@ -40,7 +40,8 @@ def code(value: str) -> str:
 
 def config_page() -> str:
     """Every key of every table."""
-    from rigidsim.workflows.read import editor_schema
+    import rigidsim.workflows.read  # noqa: F401  (every kind of load is registered)
+    from rigidsim.scene.editor_schema import editor_schema
 
     schema = editor_schema()
     parts = [
