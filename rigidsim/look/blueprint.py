@@ -1,4 +1,4 @@
-"""The page that the viewer opens with: the body beside its plots and the summary.
+"""The page that the viewer opens with: the scene, what its colours mean, its own plots, and the summary.
 
 Imports rerun when it is loaded, so load it only where a timeline is written.
 """
@@ -6,47 +6,90 @@ Imports rerun when it is loaded, so load it only where a timeline is written.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.components import LinkAxis
 
 from rigidsim.look.clock import Clock
-from rigidsim.look.drawing import plot_path, trail_path
+from rigidsim.look.drawing import OLDER, fades, trail_path, trail_stride
 from rigidsim.look.plots import Plot
-from rigidsim.look.stage import Stage, camera
+from rigidsim.look.plotting import LEGEND_LINE, legend_lines, plane_path, plane_reach, plot_path
+from rigidsim.look.stages.bodies import Subject, camera
+from rigidsim.look.stages.parts import Color, Plane, Stage
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
 TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
 TRAIL_ROWS = 1500  # at most in a sliding trail, and never more than a fifth of the run
+RECENT = 0.3  # of a sliding trail: its bright part
+_PIXELS = 800.0  # about the height of the page
+_DARK = (18, 20, 26)
 
 
 def build_blueprint(
-    stages: Sequence[Stage], plots: Sequence[Plot], clock: Clock, turns: float
+    stages: Sequence[Stage],
+    plots: Sequence[Plot],
+    clock: Clock,
+    turns: float,
+    *,
+    planes: Sequence[Plane] = (),
+    subject: Subject | None = None,
+    legend: Sequence[tuple[str, Color]] = (),
+    states: bool = False,
+    pages: Sequence[str] = ("Summary",),
+    following: bool = False,
 ) -> rrb.Blueprint:
     """The layout for stages and plots.
 
     Args:
         stages: the first is the body's.
         plots: as from `plots.plan_plots`.
-        clock: timeline that the page opens on, at its end, so that every curve is complete.
+        clock: timeline that the page opens on, at its start, and plays.
         turns: how often the body turns during the run, for the playback speed.
+        planes: figures beside the stages.
+        subject: the body, for the eye's place.
+        states: whether there are lanes of states.
+        pages: of text, by name.
+        following: keep to the end, of a run that goes on.
     """
-    spaces = [_space_view(stage, clock, narrow=len(stages) > 1) for stage in stages]
-    space = spaces[0] if len(spaces) == 1 else rrb.Horizontal(*spaces)
-    by_place = {
-        place: [_plot_view(plot) for plot in plots if plot.place == place]
-        for place in ("drift", "rates", "attitude", "more")
-    }
-    page = rrb.TextDocumentView(origin="/summary", name="Summary")
-    right = [_tabs(views) for place in ("rates", "attitude", "drift") if (views := by_place[place])]
-    left = rrb.Vertical(space, _tabs([page, *by_place["more"]]), row_shares=[2, 1])
-    content = rrb.Horizontal(left, rrb.Vertical(*right), column_shares=[5, 4]) if right else left
+    narrow = len(stages) > 1
+    spaces: list[rrb.View | rrb.Container] = [
+        _space_view(stage, clock, narrow=narrow, subject=subject) for stage in stages
+    ]
+    figures = [_plane_view(plane) for plane in planes]
+    beside = [_tabs(figures)] if figures else []
+    shares = [3.0] * len(spaces) + [1.6] * len(beside)
+    scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
+    texts: list[rrb.View] = [rrb.TextDocumentView(origin=f"/{page.lower()}", name=page) for page in pages]
+    more = [_plot_view(plot) for plot in plots if plot.place == "more"]
+    height = 30.0 + 24.0 * legend_lines(legend)
+    left = rrb.Vertical(
+        scene,
+        _legend_view(legend),
+        _tabs(texts),
+        row_shares=[_PIXELS * 0.7 - height, height, _PIXELS * 0.3],
+    )
+    right: list[rrb.View | rrb.Container] = [_plot_view(plot) for plot in plots if plot.place == "leading"]
+    heights = [3.0] * len(right)
+    small = [_plot_view(plot) for plot in plots if plot.place == "drift"]
+    if small or more:
+        right.append(_tabs([*small, *more]))
+        heights.append(1.8)
+    if states:
+        right.append(rrb.StateTimelineView(origin="/states", name="Events"))
+        heights.append(1.2)
+    content = (
+        rrb.Horizontal(left, rrb.Vertical(*right, row_shares=heights), column_shares=[5, 3.4])
+        if right
+        else left
+    )
     return rrb.Blueprint(
         content,
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        _time_panel(clock, turns),
+        _time_panel(clock, turns, following=following),
     )
 
 
@@ -54,7 +97,7 @@ def _tabs(views: Sequence[rrb.View]) -> rrb.View | rrb.Container:
     return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
 
 
-def _time_panel(clock: Clock, turns: float) -> rrb.TimePanel:
+def _time_panel(clock: Clock, turns: float, *, following: bool) -> rrb.TimePanel:
     span = float(abs(clock.ticks[-1] - clock.ticks[0])) or 1.0
     screen = min(max(TURN_SECONDS * turns, 10.0), SCREEN_SECONDS)
     return rrb.TimePanel(
@@ -63,38 +106,73 @@ def _time_panel(clock: Clock, turns: float) -> rrb.TimePanel:
         # A duration plays in its seconds per second, a sequence in ticks per second.
         playback_speed=span * clock.seconds_per_tick / screen if clock.duration else 1.0,
         fps=None if clock.duration else span / screen,
-        play_state="following",
+        play_state="following" if following else "playing",
+        loop_mode="off" if following else "all",
     )
 
 
-def _space_view(stage: Stage, clock: Clock, *, narrow: bool) -> rrb.Spatial3DView:
-    eye, target, up = camera(stage, narrow=narrow)
+def _space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | None) -> rrb.Spatial3DView:
+    eye = camera(stage, narrow=narrow, subject=subject)
     count = len(clock.ticks)
     rows = max(min(TRAIL_ROWS, count // 5), 2)
-    ticks = int(abs(clock.ticks[-1] - clock.ticks[0]) * (rows / max(count - 1, 1)))
-    recent = [
-        rr.VisibleTimeRange(
-            clock.name,
-            start=rr.TimeRangeBoundary.cursor_relative(seq=-ticks),
-            end=rr.TimeRangeBoundary.cursor_relative(),
-        ),
-        rr.VisibleTimeRange(
-            "step",
-            start=rr.TimeRangeBoundary.cursor_relative(seq=-rows),
-            end=rr.TimeRangeBoundary.cursor_relative(),
-        ),
-    ]
+    overrides: dict[Any, Any] = {}
+    for trail in stage.trails:
+        path = trail_path(stage, trail)
+        # A piece of the older part ends where its row is: it must not stand out over the bright one.
+        stride = trail_stride(trail) if trail.line else 1
+        fading = fades(trail, stride)
+        shown = round(RECENT * rows) if fading else rows
+        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown, 0))
+        if fading:
+            piece = OLDER * stride
+            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, max(rows, 2 * piece), 0))
+    origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(
-        origin=f"/{stage.root}",
+        origin=origin,
+        contents=f"/{stage.root}/**",
         name=stage.title,
-        background=(18, 20, 26),
+        background=_DARK,
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=eye, look_target=target, eye_up=up
+            kind=rrb.Eye3DKind.Orbital, position=eye.position, look_target=eye.target, eye_up=eye.up
         ),
-        overrides={
-            trail_path(stage, trail) + "/recent": rrb.VisibleTimeRanges(recent) for trail in stage.trails
-        },
+        overrides=overrides,
+    )
+
+
+def _window(clock: Clock, rows: int, until: int) -> list[rr.VisibleTimeRange]:
+    """From so many rows before the cursor to so many before it."""
+    per_row = float(abs(clock.ticks[-1] - clock.ticks[0])) / max(len(clock.ticks) - 1, 1)
+    return [
+        rr.VisibleTimeRange(
+            name,
+            start=rr.TimeRangeBoundary.cursor_relative(seq=-round(rows * size)),
+            end=rr.TimeRangeBoundary.cursor_relative(seq=-round(until * size)),
+        )
+        for name, size in ((clock.name, per_row), ("step", 1.0))
+    ]
+
+
+def _plane_view(plane: Plane) -> rrb.Spatial2DView:
+    size = 1.35 * plane_reach(plane)
+    middle = np.zeros(2)
+    return rrb.Spatial2DView(
+        origin=plane_path(plane),
+        name=plane.title,
+        background=_DARK,
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=(middle[0] - size, middle[0] + size), y_range=(middle[1] - size, middle[1] + size)
+        ),
+    )
+
+
+def _legend_view(legend: Sequence[tuple[str, Color]]) -> rrb.Spatial2DView:
+    lines = legend_lines(legend)
+    return rrb.Spatial2DView(
+        origin="/legend",
+        name="What is shown",
+        background=_DARK,
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 30.0), y_range=(0.0, LEGEND_LINE * lines)),
     )
 
 

@@ -16,6 +16,7 @@ from rigidsim.scene.records import dataclass
 
 _LARGEST = 2.0**62  # int64 with room for differences and for the viewer's own sentinels
 _LARGEST_NANOSECONDS = 9.2e18  # 291.5 years, just below 2**63 ns
+_UNITS = {0: "s", -3: "ms", -6: "µs", -9: "ns", -12: "ps", -15: "fs", -18: "as"}
 _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be at most
 
 
@@ -65,7 +66,7 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
         exponent += 3
     # Powers of ten to 22 are exact in float64, their reciprocals aren't: multiply or divide.
     scaled = times * 10.0**-exponent if exponent < 0 else times / 10.0**exponent
-    name = "time [s]" if exponent == 0 else f"time [1e{exponent} s]"
+    name = f"time [{_UNITS.get(exponent, f'1e{exponent} s')}]"
     return Clock(name, np.rint(scaled).astype(np.int64), 10.0**exponent, False)
 
 

@@ -1,11 +1,12 @@
 """Stages to rerun entities: what never changes, and the columns of what does.
 
-Imports rerun when it is loaded, so load it only where a timeline is written.
+Imports rerun when it is loaded, so load it only where a timeline is written. Meshes are given no normals:
+the viewer then shows their own colours from all sides, and edges tell the faces apart.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,18 +14,20 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from rigidsim.look.plots import Plot
-from rigidsim.look.stage import Color, Stage, Trail
+from rigidsim.look.solids import Mesh, ball
+from rigidsim.look.stages.parts import BODY, Arrow, Color, Shell, Stage, Trail
+from rigidsim.look.symbols import graticule, sharp_edges
 
-PIXELS = 500  # about the width of a plot
-LABEL_REACH = 1.07  # of a label, in lengths of its arrow
+Columns = Iterable[rr.ComponentColumn]
+
+OLDER = 16
+"""Rows in one piece of the older part of a trail."""
+SCENE_ROWS = 20_000
+"""Rows of arrows and trails, from which on those are thinned whose motion allows it."""
+_STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
+_EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
-
-
-def plot_path(plot: Plot, name: str) -> str:
-    """Entity of one variable in one plot."""
-    folder = "/plots/drift/" if plot.place == "drift" else "/plots/"
-    return folder + rr.escape_entity_path_part(name)
+_FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
 
 
 def trail_path(stage: Stage, trail: Trail) -> str:
@@ -39,120 +42,161 @@ def draw_static(recording: rr.RecordingStream, stages: Sequence[Stage]) -> None:
         root = f"/{stage.root}"
         recording.log(root, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for number, mesh in enumerate(stage.meshes):
-            recording.log(
-                f"{root}/body/solids/{number}",
-                rr.Mesh3D(
-                    vertex_positions=mesh.vertices.astype(np.float32),
-                    triangle_indices=mesh.triangles,
-                    vertex_normals=mesh.normals.astype(np.float32),
-                    vertex_colors=mesh.colors,
-                ),
-                static=True,
-            )
+            _draw_mesh(recording, f"{root}/body/solids/{number}", mesh)
         if len(stage.points):
             sticks = np.stack([np.zeros_like(stage.points), stage.points], axis=1)
+            width = 0.014 * (float(np.abs(stage.points).max()) or 1.0)
             recording.log(
                 f"{root}/body/sticks",
-                rr.LineStrips3D(sticks, colors=[(190, 190, 190)], radii=0.012 * stage.axis_length),
+                rr.LineStrips3D(sticks, colors=[(190, 190, 190)], radii=width),
                 static=True,
             )
-        recording.log(
-            f"{root}/body/axes",
-            rr.Arrows3D(
-                vectors=np.eye(3) * stage.axis_length,
-                colors=_AXIS_COLORS,
-                radii=0.011 * stage.axis_length,
-            ),
-            static=True,
-        )
-        if stage.arrows:
-            # Labels of arrows sit at their middle, inside the body: invisible points carry them.
-            recording.log(
-                f"{root}/body/axes/labels",
-                rr.Points3D(
-                    np.eye(3) * stage.axis_length * LABEL_REACH,
-                    colors=_AXIS_COLORS,
-                    labels=["x", "y", "z"],
-                    show_labels=True,
-                    radii=0.0,
-                ),
-                static=True,
-            )
+        if stage.axis_length:
+            _draw_axes(recording, stage)
         for arrow in stage.arrows:
-            path = _arrow_path(stage, arrow.name, arrow.in_body)
-            recording.log(path, rr.Arrows3D.from_fields(colors=[arrow.color], radii=[0.024]), static=True)
-            label = rr.Points3D.from_fields(
-                colors=[arrow.color], labels=[arrow.label], show_labels=True, radii=[0.0]
-            )
-            recording.log(f"{path}/label", label, static=True)
+            path = _arrow_path(stage, arrow)
+            style = rr.Arrows3D.from_fields(colors=[arrow.color], radii=[arrow.radius])
+            recording.log(path, style, static=True)
+            if arrow.label:
+                label = rr.Points3D.from_fields(
+                    colors=[arrow.color], labels=[arrow.label], show_labels=True, radii=[0.0]
+                )
+                recording.log(f"{path}/label", label, static=True)
         for trail in stage.trails:
             _draw_trail_static(recording, trail_path(stage, trail), trail)
-        if stage.origin:
-            recording.log(
-                f"{root}/origin",
-                rr.Points3D(
-                    [(0.0, 0.0, 0.0)],
-                    colors=[(230, 230, 230)],
-                    radii=rr.Radius.ui_points(5.0),
-                    labels=["origin"],
-                ),
-                static=True,
-            )
+        _draw_surroundings(recording, stage)
 
 
-def draw_rows(
-    recording: rr.RecordingStream,
-    stages: Sequence[Stage],
-    plots: Sequence[Plot],
-    times: list[rr.TimeColumn],
-    rows: slice,
+def _draw_mesh(recording: rr.RecordingStream, path: str, mesh: Mesh, edges: bool = True) -> None:
+    recording.log(
+        path,
+        rr.Mesh3D(
+            vertex_positions=mesh.vertices.astype(np.float32),
+            triangle_indices=mesh.triangles,
+            vertex_colors=mesh.colors,
+        ),
+        static=True,
+    )
+    sharp = sharp_edges(mesh) if edges else np.empty((0, 2, 3))
+    if len(sharp):
+        strips = rr.LineStrips3D(sharp.astype(np.float32), colors=[_EDGE], radii=rr.Radius.ui_points(0.9))
+        recording.log(f"{path}/edges", strips, static=True)
+
+
+def _draw_axes(recording: rr.RecordingStream, stage: Stage) -> None:
+    length = stage.axis_length
+    axes = rr.Arrows3D(vectors=np.eye(3) * length, colors=_AXIS_COLORS, radii=0.011 * length)
+    recording.log(f"/{stage.root}/body/axes", axes, static=True)
+    if stage.arrows or stage.frames:
+        # Labels of arrows sit at their middle, inside the body: invisible points carry them.
+        labels = rr.Points3D(
+            np.eye(3) * length * 1.07,
+            colors=_AXIS_COLORS,
+            labels=["x", "y", "z"],
+            show_labels=True,
+            radii=0.0,
+        )
+        recording.log(f"/{stage.root}/body/axes/labels", labels, static=True)
+
+
+def _draw_surroundings(recording: rr.RecordingStream, stage: Stage) -> None:
+    root = f"/{stage.root}"
+
+    def at(place: str, name: str) -> str:
+        return f"{root}/{place}/around/{name}" if place else f"{root}/around/{name}"
+
+    for solid in stage.solids:
+        _draw_mesh(recording, at(solid.place, solid.name), solid.mesh, edges=False)
+    for line in stage.lines:
+        strips = rr.LineStrips3D(
+            [line.points.astype(np.float32)],
+            colors=[(*line.color, round(255 * line.strength))],
+            radii=rr.Radius.ui_points(line.width / 2),
+        )
+        recording.log(at(line.place, line.name), strips, static=True)
+    for vector in stage.vectors:
+        path = at(vector.place, vector.name)
+        arrow = rr.Arrows3D(
+            vectors=[vector.along], origins=[vector.start], colors=[vector.color], radii=vector.radius
+        )
+        recording.log(path, arrow, static=True)
+        tip = vector.start + 1.07 * vector.along
+        _draw_label(recording, f"{path}/label", vector.label, vector.color, tip)
+    for spot in stage.spots:
+        _draw_label(recording, at(spot.place, spot.name), spot.label, spot.color, spot.position, spot.size)
+    for shell in stage.shells:
+        _draw_shell(recording, at(shell.place, shell.name), shell)
+    if stage.origin:
+        _draw_label(recording, f"{root}/origin", "origin", (230, 230, 230), np.zeros(3), 5.0)
+
+
+def _draw_shell(recording: rr.RecordingStream, path: str, shell: Shell) -> None:
+    """An ellipsoid one can look through, with its meridians and parallels."""
+    if shell.quaternion is not None:
+        turn = rr.Transform3D(quaternion=rr.Quaternion(xyzw=shell.quaternion))
+        recording.log(path, turn, static=True)
+    surface = ball(*shell.half_sizes)
+    mesh = rr.Mesh3D(
+        vertex_positions=surface.vertices.astype(np.float32),
+        triangle_indices=surface.triangles,
+        vertex_normals=surface.normals.astype(np.float32),
+        albedo_factor=(*shell.color, 70),
+    )
+    recording.log(f"{path}/surface", mesh, static=True)
+    rings = [line.astype(np.float32) for line in graticule(shell.half_sizes, lift=1.0)]
+    lines = rr.LineStrips3D(rings, colors=[(*shell.color, 130)], radii=rr.Radius.ui_points(0.5))
+    recording.log(f"{path}/lines", lines, static=True)
+
+
+def _draw_label(
+    recording: rr.RecordingStream, path: str, label: str, color: Color, place: Any, size: float = 0.0
 ) -> None:
-    """Everything that changes, for the rows of one chunk."""
-    for stage in stages:
-        for path, columns in _stage_columns(stage, rows):
-            recording.send_columns(path, indexes=times, columns=columns)
-    for plot in plots:
-        for series in plot.series:
-            recording.send_columns(
-                plot_path(plot, series.name),
-                indexes=times,
-                columns=rr.Scalars.columns(scalars=series.values[rows]),
-            )
+    radius = rr.Radius.ui_points(size) if size else 0.0
+    point = rr.Points3D([place], colors=[color], labels=[label], show_labels=True, radii=radius)
+    recording.log(path, point, static=True)
 
 
-def draw_plot_styles(recording: rr.RecordingStream, plots: Sequence[Plot]) -> None:
-    """Names and colours of the curves."""
-    for plot in plots:
-        for series in plot.series:
-            recording.log(
-                plot_path(plot, series.name),
-                rr.SeriesLines(
-                    names=series.labels,
-                    colors=series.colors,
-                    widths=[1.5] * len(series.labels),
-                    aggregation_policy=_aggregation(plot, series.values),
-                ),
-                static=True,
-            )
+def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -> None:
+    dark, faded = (_dimmed(trail.color, part) for part in (_DIM, _FADED))
+    if len(trail.whole) > 1:
+        whole = (
+            rr.LineStrips3D([trail.whole], colors=[dark], radii=rr.Radius.ui_points(0.8))
+            if trail.whole_line
+            else rr.Points3D(trail.whole, colors=[dark], radii=rr.Radius.ui_points(1.0))
+        )
+        recording.log(f"{path}/whole", whole, static=True)
+    if trail.line:
+        older = rr.LineStrips3D.from_fields(colors=[faded], radii=rr.Radius.ui_points(1.2))
+        recording.log(f"{path}/older", older, static=True)
+        recent = rr.LineStrips3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(1.8))
+        recording.log(f"{path}/recent", recent, static=True)
+    else:
+        points = rr.Points3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(2.0))
+        recording.log(f"{path}/recent", points, static=True)
+    if trail.head:
+        head = rr.Points3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(4.5))
+        recording.log(f"{path}/head", head, static=True)
 
 
-def _aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.AggregationPolicy:
-    """What the viewer draws of the rows that fall into one pixel.
+def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
+    red, green, blue = (round(part * x + (1 - part) * 20) for x in color)
+    return red, green, blue
 
-    Its default is their average, which is smooth, but shows a fast rotation with a vanishing
-    amplitude: then the extremes are drawn. Of a drift only the largest is of interest.
+
+def strides_of(stage: Stage) -> dict[str, int]:
+    """Rows from one that is drawn to the next, of each arrow and each trail that is a line, by entity."""
+    found = {_arrow_path(stage, arrow): still_stride(arrow.vectors) for arrow in stage.arrows}
+    return found | {trail_path(stage, trail): trail_stride(trail) for trail in stage.trails if trail.line}
+
+
+def stage_columns(
+    stage: Stage, rows: slice, strides: Mapping[str, int]
+) -> Iterable[tuple[str, slice, Columns]]:
+    """Entities of a stage with their rows (of the run) and columns, for the rows of one chunk.
+
+    Args:
+        strides: as of ``strides_of``.
     """
-    if plot.place == "drift":
-        return rr.components.AggregationPolicy.Max
-    step = max(len(values) // PIXELS, 1)
-    change = np.abs(values[step:] - values[:-step]) if len(values) > step else np.zeros(1)
-    range_ = np.nanmax(values) - np.nanmin(values) if np.isfinite(values).any() else 0.0
-    smooth = not np.isfinite(change).any() or np.nanmax(change) <= 0.1 * range_
-    policies = rr.components.AggregationPolicy
-    return policies.Average if smooth else policies.MinMax
-
-
-def _stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, Iterable[rr.ComponentColumn]]]:
     root = f"/{stage.root}"
     # Translation and rotation in one call: apart, the viewer would see states that never were.
     transform: dict[str, Any] = {}
@@ -160,57 +204,100 @@ def _stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, Iterable[rr
         transform["translation"] = stage.translation[rows].astype(np.float32)
         centre = rr.Transform3D.columns(translation=transform["translation"])
         if any(trail.with_centre for trail in stage.trails) or stage.arrows:
-            yield f"{root}/centre", centre
+            yield f"{root}/centre", rows, centre
     if stage.quaternion is not None:
         transform["quaternion"] = stage.quaternion[rows]
     if transform:
-        yield f"{root}/body", rr.Transform3D.columns(**transform)
+        yield f"{root}/body", rows, rr.Transform3D.columns(**transform)
+    for frame in stage.frames:
+        moved: dict[str, Any] = {}
+        if frame.translation is not None:
+            moved["translation"] = frame.translation[rows].astype(np.float32)
+        if frame.quaternion is not None:
+            moved["quaternion"] = frame.quaternion[rows]
+        yield f"{root}/{frame.name}", rows, rr.Transform3D.columns(**moved)
     for arrow in stage.arrows:
-        path = _arrow_path(stage, arrow.name, arrow.in_body)
-        vectors = arrow.vectors[rows].astype(np.float32)
-        yield path, rr.Arrows3D.columns(vectors=vectors)
-        tips = vectors * np.float32(LABEL_REACH)
-        yield f"{path}/label", rr.Points3D.columns(positions=tips)
+        path = _arrow_path(stage, arrow)
+        picked = _every(rows, strides[path])
+        vectors = arrow.vectors[picked].astype(np.float32)
+        if len(vectors):
+            yield path, picked, rr.Arrows3D.columns(vectors=vectors)
+            if arrow.label:
+                tips = vectors * np.float32(arrow.label_at)
+                yield f"{path}/label", picked, rr.Points3D.columns(positions=tips)
     for trail in stage.trails:
-        path = trail_path(stage, trail) + "/recent"
-        if trail.line:
-            yield path, rr.LineStrips3D.columns(strips=_segments(trail.points, rows))
-        else:
-            points = trail.points[rows].astype(np.float32)
-            yield path, rr.Points3D.columns(positions=points)
+        path = trail_path(stage, trail)
+        yield from _trail_columns(path, trail, rows, strides.get(path, 1))
 
 
-def _segments(points: NDArray[np.float64], rows: slice) -> pa.Array:
-    """One strip of two points per row, from the row before; made in Arrow, not row by row."""
-    stop = points[rows]
-    start = (
-        points[max(rows.start - 1, 0) : rows.stop - 1]
-        if rows.start
-        else np.vstack([points[:1], points[: rows.stop - 1]])
-    )
-    flat = np.stack([start, stop], axis=1).astype(np.float32).ravel()
+def _trail_columns(path: str, trail: Trail, rows: slice, stride: int) -> Iterable[tuple[str, slice, Columns]]:
+    if trail.line:
+        picked = _every(rows, stride)
+        if picked.start < rows.stop:
+            strips = _pieces(trail.points, picked, stride, 1)
+            yield f"{path}/recent", picked, rr.LineStrips3D.columns(strips=strips)
+        older = _every(rows, OLDER * stride)
+        if fades(trail, stride) and older.start < rows.stop:
+            strips = _pieces(trail.points, older, stride, OLDER)
+            yield f"{path}/older", older, rr.LineStrips3D.columns(strips=strips)
+    else:
+        yield f"{path}/recent", rows, rr.Points3D.columns(positions=trail.points[rows].astype(np.float32))
+    if trail.head:
+        yield f"{path}/head", rows, rr.Points3D.columns(positions=trail.points[rows].astype(np.float32))
+
+
+def still_stride(vectors: NDArray[np.float64]) -> int:
+    """Rows from one to the next that has to be drawn, so that an arrow is never seen behind its motion."""
+    count = len(vectors)
+    if count <= SCENE_ROWS:
+        return 1
+    size = float(np.nanmax(np.abs(vectors))) if np.isfinite(vectors).any() else 0.0
+    for stride in (64, 16, 4):
+        # a stretch of rows at a time: the motion within it is what is left out
+        part = vectors[: count // stride * stride].reshape(-1, stride, 3)
+        apart = np.abs(part[:, [stride // 2, -1]] - part[:, :1]).max(initial=0.0)
+        if not apart <= _STILL * size:  # seen at once in most motions
+            continue
+        if np.isfinite(part).all() and float(np.abs(part - part[:, :1]).max()) <= _STILL * size:
+            return stride
+    return 1
+
+
+def trail_stride(trail: Trail) -> int:
+    """Rows from one end of a trail's pieces to the next: several where the curve stays smooth with it."""
+    count = len(trail.points)
+    if count <= SCENE_ROWS:
+        return 1
+    middle = trail.points - np.nanmean(trail.points, axis=0)
+    radius = float(np.nanmax(np.abs(middle))) if np.isfinite(middle).any() else 0.0
+    for stride in (16, 8, 4, 2):
+        chords = np.abs(trail.points[stride::stride] - trail.points[:-stride:stride]).max(axis=1)
+        if np.isfinite(chords).all() and float(np.percentile(chords, 99)) <= 0.03 * radius:
+            return stride
+    return 1
+
+
+def fades(trail: Trail, stride: int) -> bool:
+    """Whether a trail has an older part that is darker: a long one of a fast motion is heavy as it is."""
+    return trail.line and (stride > 1 or len(trail.points) <= SCENE_ROWS)
+
+
+def _every(rows: slice, stride: int) -> slice:
+    first = -(-rows.start // stride) * stride
+    return slice(first, rows.stop, stride)
+
+
+def _pieces(points: NDArray[np.float64], rows: slice, stride: int, length: int) -> pa.Array:
+    """A strip of `length` + 1 points per row, up to that row, `stride` rows apart; made at once in Arrow."""
+    ends = np.arange(rows.start, rows.stop, rows.step or 1)
+    back = stride * np.arange(length, -1, -1)
+    places = np.maximum(ends[:, None] - back[None, :], 0)
+    flat = points[places].astype(np.float32).ravel()
     kind = rr.components.LineStrip3DBatch._ARROW_DATATYPE
-    offsets = pa.array(np.arange(len(stop) + 1, dtype=np.int32) * 2)
+    offsets = pa.array(np.arange(len(ends) + 1, dtype=np.int32) * (length + 1))
     inner = pa.FixedSizeListArray.from_arrays(pa.array(flat), type=kind.value_type)
     return pa.ListArray.from_arrays(offsets, inner, type=kind)
 
 
-def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -> None:
-    dark: Color = tuple(int(0.42 * part) for part in trail.color)  # type: ignore[assignment]
-    if len(trail.whole) > 1:
-        whole = (
-            rr.LineStrips3D([trail.whole], colors=[dark], radii=rr.Radius.ui_points(1.0))
-            if trail.whole_line
-            else rr.Points3D(trail.whole, colors=[dark], radii=rr.Radius.ui_points(1.2))
-        )
-        recording.log(f"{path}/whole", whole, static=True)
-    style = (
-        rr.LineStrips3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(2.2))
-        if trail.line
-        else rr.Points3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(2.0))
-    )
-    recording.log(f"{path}/recent", style, static=True)
-
-
-def _arrow_path(stage: Stage, name: str, in_body: bool) -> str:
-    return f"/{stage.root}/{'body' if in_body else 'centre'}/{name}"
+def _arrow_path(stage: Stage, arrow: Arrow) -> str:
+    return f"/{stage.root}/{BODY if arrow.in_body else 'centre'}/{arrow.name}"

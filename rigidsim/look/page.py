@@ -28,39 +28,73 @@ def title_of(dataset: Table) -> str:
     return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
 
 
-def summary_page(dataset: Table, thinned: Table, notes: list[str]) -> str:
-    """Markdown: what was run, what was conserved, how the picture is scaled, the config.
+def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
+    """Markdown, short enough to be seen whole: what was run, and what was conserved.
 
     Args:
         dataset: the whole dataset (only its attributes and sizes are read).
         thinned: its rows as shown, in memory.
-        notes: lines about the picture, such as scales.
+        kind: of scene that the picture shows.
     """
     config = read_config(dataset)
     integrator = config.get("integrator", {})
-    lines = [f"# {title_of(dataset)}", ""]
-    if config.get("description"):
-        lines += [str(config["description"]).strip(), ""]
+    attributes = dataset.attrs
+    said = str(config.get("description") or "").strip().replace("\n", " ")
+    heading = f"**{title_of(dataset)}**" + (f": {said}" if said else "")
+    ended = str(attributes.get("status") or "")
+    status = ended.replace("_", " ")
+    if ended not in ("", "finished") and attributes.get("status_message"):
+        status = str(attributes["status_message"])
     facts = [
-        ("name", config.get("name")),
-        ("formulation", dataset.attrs.get("formulation") or integrator.get("formulation")),
-        ("precision", dataset.attrs.get("precision") or integrator.get("precision")),
-        ("status", dataset.attrs.get("status")),
         ("span", _span(dataset, thinned)),
         ("samples", _samples(dataset, thinned)),
-        ("steps", dataset.attrs.get("steps")),
+        ("steps", attributes.get("steps")),
+        ("precision", attributes.get("precision") or integrator.get("precision")),
+        ("formulation", attributes.get("formulation") or integrator.get("formulation")),
+        ("status", status),
     ]
-    lines += _table(("run", ""), [(k, str(v)) for k, v in facts if v not in (None, "")])
+    if "attitude_error" in attributes:
+        facts.append(("attitude uncertain by", f"{float(attributes['attitude_error']):.2g} rad"))
+    facts = [(name, value) for name, value in facts if value not in (None, "")]
+    lines = [heading, "", *_table(tuple(name for name, _ in facts), [tuple(str(v) for _, v in facts)])]
     invariants = _invariants(thinned)
     if invariants:
         complete = dataset.sizes["time"] == thinned.sizes["time"]
         drift = "largest drift" if complete else "largest drift of the rows shown"
-        lines += _table(("invariant", "initial", drift), invariants)
-    lines += ["## Picture", "", *(f"- {note}" for note in notes), ""]
+        # across, not down: a page that must be scrolled isn't read
+        names, initial, largest = zip(*invariants, strict=True)
+        rows = [("initial", *initial), (drift, *largest)]
+        lines += _table(("invariant", *names), rows)
+    return legible("\n".join(lines))
+
+
+def notes_page(kind: str, notes: list[str]) -> str:
+    """Markdown: what the picture shows, and how it is scaled."""
+    return legible("\n".join([f"**Picture: {kind}**", "", *(f"- {note}" for note in notes), ""]))
+
+
+def config_page(dataset: Table) -> str:
+    """Markdown: the config that was run; empty where there is none."""
     text = str(dataset.attrs.get("config", "")).strip()
-    if text:
-        lines += ["## Config", "", "```toml", text, "```", ""]
-    return "\n".join(lines)
+    return legible("\n".join(["```toml", text, "```", ""])) if text else ""
+
+
+def legible(text: str) -> str:
+    """A text of characters that the viewer has glyphs for: over others it ends itself (0.41, Inter alone)."""
+    return "".join(c if _has_glyph(ord(c)) else "?" for c in text)
+
+
+# What Inter has of the blocks that texts about motion use; what lies outside is written as a question mark.
+_GLYPHS = (
+    (0x20, 0x7E), (0xA0, 0x148), (0x14A, 0x1C3), (0x1C5, 0x31E), (0x384, 0x38A), (0x38E, 0x3A1),
+    (0x3A3, 0x3E1), (0x3F0, 0x49D), (0x4A0, 0x4FF), (0x1E00, 0x1EFF), (0x2000, 0x200A), (0x2010, 0x2027),
+    (0x2030, 0x205E), (0x2074, 0x208E), (0x2090, 0x209C), (0x20A0, 0x20BF), (0x2190, 0x2199),
+)  # fmt: skip
+_SINGLE = frozenset(map(ord, "\n\t²³−√∞≈≠≤≥∂∆∏∑∫■▲▼◆●○◊"))
+
+
+def _has_glyph(code: int) -> bool:
+    return code in _SINGLE or any(low <= code <= high for low, high in _GLYPHS)
 
 
 def largest_drift(variable: Variable) -> float:

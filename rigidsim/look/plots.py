@@ -7,13 +7,14 @@ the scalars that share its unit.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import field
+from collections.abc import Iterator, Sequence
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look.angle_units import angle_unit
 from rigidsim.look.roles import drift_of, put_back_of
 from rigidsim.scene.records import dataclass
 
@@ -49,19 +50,21 @@ class Series:
         labels: names of its curves, one per component.
         colors: one per component.
         values: (rows, components) float64.
+        error: (rows,) how uncertain they are, to both sides; None where that isn't known or can't be seen.
     """
 
     name: str
     labels: list[str]
     colors: list[Color]
     values: NDArray[np.float64]
+    error: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
 class Plot:
     """One plot: a title with the unit, a place on the page and its variables.
 
-    `place` is one of "drift", "rates", "attitude", "more".
+    `place` is one of "leading", "more", "drift".
     """
 
     key: str
@@ -70,32 +73,67 @@ class Plot:
     series: list[Series] = field(default_factory=list)
 
 
-def plan_plots(dataset: Table) -> list[Plot]:
+def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
     """Plots for every numeric variable along time, in the order in which they are shown.
 
-    Drifts become log10 of their magnitude in a common plot. Scalars of the same unit share a
-    plot; a vector has its own.
+    Drifts become log10 of their magnitude in a common plot. Scalars of the same unit share a plot; a vector
+    has its own, and so has what leads. Angles are in the unit in which they read best.
+
+    Args:
+        leading: variables that the scene is about, first of all.
     """
     plots: dict[str, Plot] = {}
     variables = list(_variables(dataset))
+    present = [str(v.name) for v in variables]
+    first = [name for name in leading if name in present] or [name for name in _USUAL if name in present]
+    first = first[:MOST_LEADING]
     floor = drift_floor([_columns(v) for v in variables if drift_of(v)])
     for variable in variables:
         name = str(variable.name)
         unit = str(variable.attrs.get("units", ""))
-        vector = variable.ndim > 1
+        factor, shown_unit = _reading(variable, unit)
         if drift_of(variable) or put_back_of(variable):
             key, title, place = "drift", "Drift of invariants, log10", "drift"
-        elif vector:
+        elif variable.ndim > 1 or name in first:
             # The name, not the long name: it is short, and what the user meets in the dataset.
-            key, place = name, _place(name)
+            key, place = name, "leading" if name in first else "more"
             lost = "angle" in variable.attrs and "angles_wrapped_from" in dataset.attrs
-            title = _with_unit(name.replace("_", " ") + (" within one turn" if lost else ""), unit)
+            title = _with_unit(name.replace("_", " ") + (" within one turn" if lost else ""), shown_unit)
         else:
-            key, place = f"scalars {unit}", "more"
-            title = _with_unit(name.replace("_", " "), unit)
+            key, place = f"scalars {shown_unit}", "more"
+            title = _with_unit(name.replace("_", " "), shown_unit)
         plot = plots.setdefault(key, Plot(key, title[:1].upper() + title[1:], place))
-        plot.series.append(_series(variable, len(plot.series), floor))
-    return sorted(plots.values(), key=lambda plot: _ORDER.index(plot.place))
+        series = _series(variable, len(plot.series), floor)
+        if factor != 1.0:
+            series = replace(series, values=series.values * factor)
+        if place == "leading" and unit == "rad":
+            series = replace(series, error=_uncertainty(dataset, series.values, factor))
+        plot.series.append(series)
+    order = {name: number for number, name in enumerate(first)}
+    return sorted(
+        plots.values(), key=lambda plot: (_ORDER.index(plot.place), order.get(plot.key, len(order)))
+    )
+
+
+def _reading(variable: Variable, unit: str) -> tuple[float, str]:
+    """Factor to, and symbol of, the unit that suits a variable."""
+    if unit != "rad":
+        return 1.0, unit
+    values = _columns(variable)
+    values = values[np.isfinite(values)]
+    found = angle_unit(float(np.abs(values).max(initial=0.0)))
+    return found.per_radian, found.symbol
+
+
+def _uncertainty(dataset: Table, values: NDArray[np.float64], factor: float) -> NDArray[np.float64] | None:
+    """The announced error of the attitude, growing like t^1.5 to that at the end, where it can be seen."""
+    error = dataset.attrs.get("attitude_error")
+    finite = values[np.isfinite(values)]
+    if error is None or not len(finite) or not float(error) * factor > _SEEN * float(np.ptp(finite)):
+        return None
+    seconds = np.asarray(dataset["time"].values, dtype=np.float64)
+    share = np.abs(seconds - seconds[0]) / (abs(seconds[-1] - seconds[0]) or 1.0)
+    return np.asarray(float(error) * factor * share**1.5)
 
 
 def drift_floor(drifts: list[NDArray[np.float64]]) -> float:
@@ -109,13 +147,11 @@ def drift_floor(drifts: list[NDArray[np.float64]]) -> float:
     return max(float(np.percentile(nonzero, 2)) / 10, 1e-300) if len(nonzero) else 1e-20
 
 
-_ORDER = ("drift", "rates", "attitude", "more")
-
-
-def _place(name: str) -> str:
-    if name == "angular_velocity":
-        return "rates"
-    return "attitude" if name in ("euler_angles", "quaternion") else "more"
+_ORDER = ("leading", "more", "drift")
+_USUAL = ("angular_velocity", "euler_angles", "quaternion")
+MOST_LEADING = 3
+_SIGNS = ("°", "″")
+_SEEN = 2e-3  # of a curve's range: a narrower band is no wider than the line
 
 
 def pretty_unit(unit: str) -> str:
@@ -137,6 +173,8 @@ _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _with_unit(text: str, unit: str) -> str:
+    if unit in _SIGNS:
+        return f"{text} [{unit}]"
     return f"{text} [{pretty_unit(unit)}]" if pretty_unit(unit) else text
 
 

@@ -158,6 +158,14 @@ class TimeWords:
         """A time of the scene to six digits, as ``304.2 d``."""
         return span_text(seconds, 6, self.unit)
 
+    def coarse(self, seconds: float) -> str:
+        """A time of the scene to a thousandth of its span: ``3.50 s``, and with an epoch the date alone."""
+        if self.epoch is not None:
+            return instant_text(self.epoch, seconds, self.span)
+        step = 1e-3 * self.span / self.unit.seconds * _CLOSE
+        decimals = min(max(math.ceil(-math.log10(step)), 0), 9) if step > 0 else 3
+        return f"{seconds / self.unit.seconds:.{decimals}f} {self.unit.symbol}"
+
     def moment(self, seconds: float, digits: int = 9) -> str:
         """A time of the scene: ``304.2 d``, and with an epoch ``304.2 d (2029-04-13 TDB)``."""
         text = span_text(seconds, digits, self.unit)

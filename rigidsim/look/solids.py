@@ -118,10 +118,9 @@ def _mesh(outline: Outline) -> Mesh:
         case Box(x, y, z):
             return _box(x, y, z)
         case Ellipsoid(x, y, z):
-            return _ball(x, y, z)
+            return ball(x, y, z)
         case Revolved(pieces):
-            profile, normals = zip(*map(_profile, pieces), strict=True)
-            return _revolve(np.concatenate(profile), np.concatenate(normals))
+            return revolved(pieces)
 
 
 def body_meshes(drawing: str | None) -> list[Mesh]:
@@ -157,7 +156,7 @@ def body_meshes(drawing: str | None) -> list[Mesh]:
         if mesh is None:
             fraction = float(entry.get("dimensions", {}).get("mass_fraction", 1.0))
             radius = reach * max(np.cbrt(np.clip(fraction, 0.0, 1.0)) / 6, 0.03)
-            mesh = _ball(radius, radius, radius, segments=32, rings=16).moved(*place)
+            mesh = ball(radius, radius, radius, segments=32, rings=16).moved(*place)
         meshes.append(mesh)
     return meshes
 
@@ -231,7 +230,13 @@ def _box(a: float, b: float, c: float) -> Mesh:
     return _soup(np.array(corners), np.array(normals), np.array(colors))
 
 
-def _revolve(profile: Array, normals: Array, segments: int = SEGMENTS) -> Mesh:
+def revolved(pieces: Sequence[Line | Arc], *, middle: float = 0.0) -> Mesh:
+    """Mesh of a solid of revolution about z from its outline, metres; its colours change at z = `middle`."""
+    profile, normals = zip(*map(_profile, pieces), strict=True)
+    return _revolve(np.concatenate(profile), np.concatenate(normals), middle=middle)
+
+
+def _revolve(profile: Array, normals: Array, segments: int = SEGMENTS, *, middle: float = 0.0) -> Mesh:
     """Surface of revolution about z.
 
     `profile` and `normals` are (P, 2, 2): P straight pieces from one (radius, z) to the next, run
@@ -256,7 +261,7 @@ def _revolve(profile: Array, normals: Array, segments: int = SEGMENTS) -> Mesh:
 
     corners = split(*quads(profile))
     sector = (np.arange(segments) * 8 // segments) % 2
-    upper = profile[..., 1].mean(axis=1) > 1e-9 * np.abs(profile).max()
+    upper = profile[..., 1].mean(axis=1) - middle > 1e-9 * np.abs(profile).max()
     hue = np.where(upper[:, None], np.array(_UPPER), np.array(_LOWER))
     colors = np.where(sector[None, :, None] == 0, hue[:, None], np.array(_LIGHT)[None, None])
     colors = np.tile(colors.reshape(-1, 3), (2, 1)).astype(np.uint8)
@@ -278,7 +283,8 @@ def _profile(piece: Line | Arc, rings: int = MINOR_SEGMENTS) -> tuple[Array, Arr
     return np.stack([nodes[:-1], nodes[1:]], axis=1), np.stack([normals[:-1], normals[1:]], axis=1)
 
 
-def _ball(a: float, b: float, c: float, segments: int = SEGMENTS, rings: int = MINOR_SEGMENTS) -> Mesh:
+def ball(a: float, b: float, c: float, segments: int = SEGMENTS, rings: int = MINOR_SEGMENTS) -> Mesh:
+    """Mesh of an ellipsoid with these semi-axes along x, y and z, metres."""
     unit = _revolve(*_profile(Arc((0.0, 0.0), 1.0, -np.pi / 2, np.pi / 2), rings), segments)
     axes = np.array([a, b, c])
     normals = unit.normals / axes

@@ -114,7 +114,7 @@ def _from_tensor(table: body_table.Body, source: str, context: Any) -> RigidBody
         mass = parse_number(preset.mass, "kg").at(context)
         described = f"preset {table.preset} ({preset.source})"
         axes = [float(parse_number(a, "m").at(context)) for a in preset.semi_axes]
-        drawing = [drawn("ellipsoid", {"semi_axes": axes}, center)]
+        drawing = [{**drawn("ellipsoid", {"semi_axes": axes}, center), "name": str(table.preset)}]
     elif source == "principal_moments":
         assert table.principal_moments is not None
         inertia = diagonal([x.at(context) for x in table.principal_moments])
@@ -202,6 +202,7 @@ def _equivalent_cuboid(
     drawing = drawn("cuboid", {"size": visible}, center)
     q = attitude.quaternion_from_matrix(context, transpose(axes))
     drawing["quaternion"] = [float(x) for x in q]
+    drawing["equivalent"] = True  # its shape isn't known, only its moments
     return drawing
 
 

@@ -99,6 +99,10 @@ class SceneLoad:
             ConfigError: says what to do instead.
         """
 
+    def pictured(self) -> dict[str, Any] | None:
+        """What a picture shows of it, as plain JSON values (see ``rigidsim.look.surroundings``)."""
+        return None
+
     def formulas(self) -> Iterator[tuple[str, Expression]]:
         """Where its expressions stand in the config, and the expressions, to be tried at the start."""
         yield from ()

@@ -66,6 +66,9 @@ def root_attributes(
         inertia_tensor=json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
         body_source=scene.body.source,
         drawing=json.dumps(scene.body.drawing),
+        center_of_mass=json.dumps([float(x) for x in scene.body.center_of_mass]),
+        mass=None if scene.body.mass is None else float(scene.body.mass),
+        surroundings=json.dumps(_surroundings(prepared)),
         axes=scene.axes,
         epoch=None if scene.epoch is None else str(scene.epoch),
         time_unit=scene.config.time.unit,
@@ -76,6 +79,15 @@ def root_attributes(
         **platform,
         mixed_provenance=mixed or None,
     )
+
+
+def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
+    """Gravity, and what every load shows of itself."""
+    scene = prepared.scene
+    shown = [load.pictured() for load in (*scene.loads, *prepared.python_loads)]
+    if scene.gravity is not None:
+        shown.append({"what": "gravity", "acceleration": [float(g) for g in scene.gravity]})
+    return [one for one in shown if one is not None]
 
 
 def of_complete(
@@ -96,5 +108,6 @@ def of_complete(
         cpu_seconds=effort.cpu,
         finished_at=provenance.now(),
         put_back=json.dumps(put_back) if summary.hold_invariants else None,
+        attitude_error=summary.accuracy.estimated_attitude_error,
         angles_wrapped_from=None if math.isnan(angles_wrapped_from) else angles_wrapped_from,
     )

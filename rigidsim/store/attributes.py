@@ -35,6 +35,10 @@ class RootAttributes(BaseModel):
         tolerance: effective.
         unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back: JSON.
         principal_moments, inertia_tensor: kg m^2.
+        center_of_mass: of the body from its reference point, body axes, m: JSON.
+        mass: of the body, kg, where it is known.
+        surroundings: what stands around the body, for pictures (see ``rigidsim.look.surroundings``): JSON.
+        attitude_error: announced for the end of the run, rad, where it was estimated.
         recorded: names of what is recorded along time, drifts and residuals apart: where the config names
             none, a later version may record more by default.
         python_loads: names of classes.
@@ -82,6 +86,9 @@ class RootAttributes(BaseModel):
     inertia_tensor: str
     body_source: str
     drawing: str
+    center_of_mass: str | None = None
+    mass: float | None = None
+    surroundings: str | None = None
     axes: str | None = None
     epoch: str | None = None
     time_unit: str | None = None
@@ -109,6 +116,7 @@ class RootAttributes(BaseModel):
     cpu_seconds: float | None = None
     finished_at: str | None = None
     put_back: str | None = None
+    attitude_error: float | None = None
     angles_wrapped_from: float | None = None
 
     def having(self, **known: Any) -> Self:

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Text
 
-from rigidsim.look import figures
-from rigidsim.look.figures import composing, drift, fits, polhode, scales, signals, timelines
+from rigidsim.look import figures, signals
+from rigidsim.look.figures import composing, drift, fits, polhode, scales, timelines
 from rigidsim.look.plots import pretty_unit
 from rigidsim.solve.problem import DRIFT_FACTOR
 

@@ -12,8 +12,9 @@ import xarray
 pytest.importorskip("rerun")
 
 import rigidsim
+from rigidsim.look.drawing import OLDER
 from rigidsim.look.rows import Column, Rows
-from rigidsim.look.stage import plane_view
+from rigidsim.look.stages.bodies import plane_view
 from rigidsim.look.thinning import KeptRows, thin
 from rigidsim.look.timeline import CHUNK, write_timeline
 
@@ -27,13 +28,13 @@ def entities(path: Path) -> set[str]:
     return {chunk.entity_path for chunk in RrdReader(path).stream()}
 
 
-def page(path: Path) -> str:
+def page(path: Path, name: str = "summary") -> str:
     from rerun.chunk import RrdReader
 
     for chunk in RrdReader(path).stream():
-        if chunk.entity_path == "/summary":
+        if chunk.entity_path == f"/{name}":
             return str(chunk.to_record_batch().column("TextDocument:text").to_pylist()[0][0])
-    raise AssertionError("no summary")
+    raise AssertionError(f"no {name}")
 
 
 def as_rows(dataset: xarray.Dataset) -> Rows:
@@ -175,7 +176,7 @@ def test_only_the_rows_shown_are_read_from_a_file(symmetric_top: Build, tmp_path
 def test_chunk_borders_lose_and_double_nothing(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
     count = 2 * CHUNK + 1
     write_timeline(symmetric_top(count=count), tmp_path / "t.rrd")
-    for entity in ("/scene/body", "/plots/energy", "/scene/body/polhode/recent"):
+    for entity in ("/scene/body", "/plots/energy", "/poinsot/body/polhode/recent"):
         steps = read_back(tmp_path / "t.rrd", entity)["step"]
         np.testing.assert_array_equal(steps, np.arange(count))
 
@@ -186,12 +187,17 @@ def test_trail_joins_each_row_to_the_one_before(
     count = CHUNK + 10
     dataset = symmetric_top(count=count)
     write_timeline(dataset, tmp_path / "t.rrd")
-    rows = read_back(tmp_path / "t.rrd", "/scene/body/polhode/recent")
+    rows = read_back(tmp_path / "t.rrd", "/poinsot/body/polhode/recent")
     strips = rows["LineStrips3D:strips"].reshape(count, 2, 3)
     np.testing.assert_array_equal(strips[1:, 0], strips[:-1, 1])
     rates = dataset["angular_velocity"].values
-    factor = 1.6 / np.linalg.norm(rates, axis=1).max()
+    # in units of the largest semi-axis of the ellipsoid of energy, sqrt(2 T / A), with A = 1
+    factor = 1 / np.sqrt(np.mean(rates**2 @ [1, 1, 2]))
     np.testing.assert_allclose(strips[:, 1], rates * factor, atol=1e-6)
+    older = read_back(tmp_path / "t.rrd", "/poinsot/body/polhode/older")
+    pieces = older["LineStrips3D:strips"].reshape(-1, OLDER + 1, 3)
+    np.testing.assert_array_equal(older["step"], np.arange(0, count, OLDER))
+    np.testing.assert_array_equal(pieces[5, 1:], strips[4 * OLDER + 1 : 5 * OLDER + 1, 1])
 
 
 def test_arrows_are_in_space_axes_and_longer_than_the_body(
@@ -207,7 +213,7 @@ def test_arrows_are_in_space_axes_and_longer_than_the_body(
     np.testing.assert_allclose(velocity[:, 2], velocity[0, 2], rtol=1e-6)
 
 
-@pytest.mark.parametrize(("scale", "name"), [(1e-13 / 0.02, "time [1e-18 s]"), (1e14 / 20.0, "time [1e6 s]")])
+@pytest.mark.parametrize(("scale", "name"), [(1e-13 / 0.02, "time [as]"), (1e14 / 20.0, "time [1e6 s]")])
 def test_extreme_times_get_a_sequence_with_physical_seconds(
     symmetric_top: Build, read_back: Read, tmp_path: Path, scale: float, name: str
 ) -> None:
@@ -215,10 +221,10 @@ def test_extreme_times_get_a_sequence_with_physical_seconds(
     write_timeline(dataset, tmp_path / "t.rrd")
     rows = read_back(tmp_path / "t.rrd", "/plots/time_seconds")
     np.testing.assert_array_equal(rows["Scalars:scalars"], dataset["time"].values)
-    unit = float(name.split("[")[1].split(" ")[0])
+    unit = {"time [as]": 1e-18, "time [1e6 s]": 1e6}[name]
     np.testing.assert_allclose(rows[name] * unit, dataset["time"].values, rtol=1e-15, atol=unit / 2)
     assert (np.diff(rows[name]) > 0).all()
-    assert name in page(tmp_path / "t.rrd")
+    assert name in page(tmp_path / "t.rrd", "picture")
 
 
 def test_rates_only_run_shows_the_body_in_its_own_axes(
@@ -233,7 +239,7 @@ def test_rates_only_run_shows_the_body_in_its_own_axes(
     vectors = read_back(tmp_path / "t.rrd", "/scene/body/angular_velocity")["Arrows3D:vectors"]
     rates = dataset["angular_velocity"].values
     np.testing.assert_allclose(vectors, rates * (1.6 / np.linalg.norm(rates, axis=1).max()), atol=1e-6)
-    assert "no attitude was recorded" in page(tmp_path / "t.rrd")
+    assert "no attitude was recorded" in page(tmp_path / "t.rrd", "picture")
 
 
 @pytest.mark.parametrize("size", [1e-10, 1.0, 1e7])
@@ -248,7 +254,7 @@ def test_bodies_of_any_size_are_drawn_in_units_of_order_one(
             column = chunk.to_record_batch().column("Mesh3D:vertex_positions")
             vertices = np.array(column.flatten().flatten()).reshape(-1, 3)
             assert np.linalg.norm(vertices, axis=1).max() == pytest.approx(1, rel=1e-6)
-    note = page(tmp_path / "t.rrd").split("reach: 1 unit = ")[1]
+    note = page(tmp_path / "t.rrd", "picture").split("reach: 1 unit = ")[1]
     assert float(note.split()[0]) == pytest.approx(size, rel=1e-3)
 
 
@@ -266,7 +272,7 @@ def test_body_that_moves_a_little_carries_its_arrows_along(
     assert len(body["Transform3D:quaternion"]) == len(body["Transform3D:translation"]) == 1001
     centre = read_back(tmp_path / "t.rrd", "/scene/centre")["Transform3D:translation"]
     np.testing.assert_array_equal(centre, body["Transform3D:translation"])
-    reach = float(page(tmp_path / "t.rrd").split("reach: 1 unit = ")[1].split()[0])
+    reach = float(page(tmp_path / "t.rrd", "picture").split("reach: 1 unit = ")[1].split()[0])
     np.testing.assert_allclose(centre * reach, position, atol=1e-5)
 
 
@@ -280,7 +286,7 @@ def test_orbit_gets_a_track_view_with_the_body_enlarged(
     np.testing.assert_allclose(path["Transform3D:translation"], orbit / 7e6, atol=1e-6)
     assert "Transform3D:translation" not in read_back(tmp_path / "t.rrd", "/scene/body")
     assert "/path/origin" in entities(tmp_path / "t.rrd")
-    assert "times too large" in page(tmp_path / "t.rrd")
+    assert "times too large" in page(tmp_path / "t.rrd", "picture")
 
 
 def test_a_variable_nobody_foresaw_gets_a_plot(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
@@ -344,9 +350,11 @@ def test_run_that_ended_in_nan_is_still_shown(symmetric_top: Build, tmp_path: Pa
 def test_page_states_the_config_and_the_largest_drift(symmetric_top: Build, tmp_path: Path) -> None:
     write_timeline(symmetric_top(), tmp_path / "t.rrd")
     text = page(tmp_path / "t.rrd")
-    assert text.startswith("# Free symmetric top")
-    assert 'name = "top"' in text
-    assert "| energy | 0.4 J | 1.00e-13 |" in text
+    assert text.startswith("**Free symmetric top**: a free top")
+    assert 'name = "top"' in page(tmp_path / "t.rrd", "config")
+    assert "| invariant | energy |" in text
+    assert "| initial | 0.4 J |" in text
+    assert "| largest drift | 1.00e-13 |" in text
     assert "of the rows shown" not in text
     write_timeline(symmetric_top(), tmp_path / "t.rrd", rows=100)
     assert "largest drift of the rows shown" in page(tmp_path / "t.rrd")

@@ -14,7 +14,6 @@ Importing this package loads no matplotlib; drawing does.
 | `flight` | the path of the centre of mass |
 | `drift` | drifts against what rounding explains |
 | `eye` | bodies in three dimensions on plain axes |
-| `signals` | what the panels show, recorded or worked out |
 | `fits` | secular parts, periods and ellipses for labels |
 | `scales` | units in which axes read well |
 | `style` | colours, fonts, the page's heading, keys |

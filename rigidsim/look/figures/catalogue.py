@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import drift, flight, poles, polhode, signals, timelines
+from rigidsim.look.figures import drift, flight, poles, polhode, timelines
 from rigidsim.look.figures.composing import Panel, compose, has, shown_rows
 from rigidsim.look.roles import drifts
 from rigidsim.scene.records import dataclass

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidsim.look.figures import signals, timelines
+from rigidsim.look import signals
+from rigidsim.look.figures import timelines
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
 from rigidsim.look.page import largest_drift, read_config
 from rigidsim.look.readable_time import unit_for

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.figures import signals
+from rigidsim.look import signals
 from rigidsim.look.figures.style import GREY, PALETTE, key, note
 from rigidsim.look.figures.timelines import clock
 from rigidsim.look.roles import drifts, put_backs

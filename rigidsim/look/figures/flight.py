@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look import signals
 from rigidsim.look.figures import eye as eyes
-from rigidsim.look.figures import signals
 from rigidsim.look.figures.scales import number, si_scale
 from rigidsim.look.figures.style import INK, PALE, X, Y, Z, curve, square, titled
 from rigidsim.look.readable_time import span_text

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.figures import fits, signals, timelines
+from rigidsim.look import signals
+from rigidsim.look.figures import fits, timelines
 from rigidsim.look.figures.scales import angle_scale, angle_text, si_scale
 from rigidsim.look.figures.style import (
     BLUE,

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look import signals
 from rigidsim.look.figures import eye as eyes
-from rigidsim.look.figures import signals
 from rigidsim.look.figures.scales import number, si_scale
 from rigidsim.look.figures.style import GREY, INK, PALE, PINK, X, Y, Z, joined, key, square, titled, trace
 from rigidsim.look.solids import rotation_matrix

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.figures import signals
+from rigidsim.look import signals
 from rigidsim.look.figures.fits import secular
 from rigidsim.look.figures.scales import angle_scale, angle_text, number, si_scale
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key, titled

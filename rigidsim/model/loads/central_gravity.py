@@ -59,6 +59,12 @@ class CentralGravity(Load):
         strength = positive_strength(fields.gravitational_parameter, around)
         return cls(strength, [x.at(around.context) for x in fields.position])
 
+    def pictured(self) -> dict[str, Any]:
+        """The attracting point."""
+        place = [float(x) for x in self.position]
+        strength = float(self.gravitational_parameter)
+        return {"what": "attractor", "gravitational_parameter": strength, "position": place}
+
     def check(self, number: int, position: Vector | None) -> None:
         """The body must have a position, and not start where the point is."""
         where = f"[[loads]] number {number + 1} kind"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, Literal
 
 import heyoka as hy
@@ -96,6 +97,19 @@ class GravityGradient(Load):
         if all(x == 0 for x in position):
             raise around.fault("position", "given the origin, where the body is; another point is allowed")
         return cls(strength, position=position)
+
+    def pictured(self) -> dict[str, Any]:
+        """A source, and where it is."""
+        strength = float(self.gravitational_parameter)
+        shown: dict[str, Any] = {"what": "source", "gravitational_parameter": strength}
+        if self.orbit is not None:
+            names = [field.name for field in dataclasses.fields(self.orbit)]
+            shown["orbit"] = {name: float(getattr(self.orbit, name)) for name in names}
+        if self.position is not None:
+            shown["position"] = [float(x) for x in self.position]
+        if self.ephemeris is not None:
+            shown["ephemeris"] = self.ephemeris
+        return shown
 
     @property
     def conservative(self) -> bool:  # type: ignore[override]

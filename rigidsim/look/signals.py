@@ -1,4 +1,4 @@
-"""What figures show of a dataset: recorded by name, else worked out from attitude and rates.
+"""What pictures show of a dataset: recorded by name, else worked out from attitude and rates.
 
 All take a dataset in memory and give float64 arrays over its rows, or None where it can't be told.
 """
@@ -15,7 +15,7 @@ from rigidsim.look.page import read_config
 from rigidsim.look.solids import rotation_matrix
 
 if TYPE_CHECKING:
-    import xarray
+    from rigidsim.look.rows import Table
 
 Array = NDArray[np.float64]
 
@@ -25,37 +25,37 @@ _ALIKE = 1e-9  # moments nearer than this are one
 _STEADY = 1e-6  # a momentum that turns by less is fixed
 
 
-def values(dataset: xarray.Dataset, name: str) -> Array | None:
+def values(dataset: Table, name: str) -> Array | None:
     """A variable along time, time first; None where it wasn't recorded."""
     if name not in dataset or "time" not in dataset[name].dims:
         return None
     return np.asarray(dataset[name].transpose("time", ...).values, dtype=np.float64)
 
 
-def seconds(dataset: xarray.Dataset) -> Array:
+def seconds(dataset: Table) -> Array:
     """Sample times (rows,), s."""
     return np.asarray(dataset["time"].values, dtype=np.float64)
 
 
-def moments(dataset: xarray.Dataset) -> Array | None:
+def moments(dataset: Table) -> Array | None:
     """Principal moments (3,), kg m^2."""
-    found = _attribute(dataset, "principal_moments")
+    found = attribute(dataset, "principal_moments")
     return found if found is not None and found.shape == (3,) and (found > 0).all() else None
 
 
-def principal_axes(dataset: xarray.Dataset) -> Array:
+def principal_axes(dataset: Table) -> Array:
     """Principal axes as rows (3, 3), in body axes, in the order of the moments; right-handed."""
-    found = _attribute(dataset, "principal_axes")
+    found = attribute(dataset, "principal_axes")
     return found if found is not None and found.shape == (3, 3) else np.eye(3)
 
 
-def principal_rates(dataset: xarray.Dataset) -> Array | None:
+def principal_rates(dataset: Table) -> Array | None:
     """Angular velocity (rows, 3) along the principal axes, rad/s."""
     rates = values(dataset, "angular_velocity")
     return None if rates is None else rates @ principal_axes(dataset).T
 
 
-def axis_names(dataset: xarray.Dataset) -> list[str]:
+def axis_names(dataset: Table) -> list[str]:
     """The principal axes as body axes are called, or 1, 2, 3 where they aren't body axes."""
     axes = principal_axes(dataset)
     order = np.abs(axes).argmax(axis=1)
@@ -63,7 +63,7 @@ def axis_names(dataset: xarray.Dataset) -> list[str]:
     return ["xyz"[k] for k in order] if along.all() else ["1", "2", "3"]
 
 
-def polar_motion(dataset: xarray.Dataset) -> Array | None:
+def polar_motion(dataset: Table) -> Array | None:
     """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None where the spin leaves it.
 
     Recorded ones as they are. Else components of the rates across the principal axis about which the body
@@ -87,7 +87,7 @@ def polar_motion(dataset: xarray.Dataset) -> Array | None:
     return across / full[:, [k]]
 
 
-def near_axis(dataset: xarray.Dataset) -> bool:
+def near_axis(dataset: Table) -> bool:
     """Whether the body spins about its figure axis but for a little, so that polar motion is what is seen."""
     motion = polar_motion(dataset)
     if motion is None:
@@ -96,7 +96,7 @@ def near_axis(dataset: xarray.Dataset) -> bool:
     return bool(0 < np.nanmax(size) < NEAR_AXIS)
 
 
-def figure_direction(dataset: xarray.Dataset) -> Array:
+def figure_direction(dataset: Table) -> Array:
     """Unit vector (3,) of the figure axis in body axes: as asked, else of symmetry or the largest moment."""
     frame: Any = read_config(dataset).get("frame", {})
     asked = frame.get("figure_axis") if isinstance(frame, dict) else None
@@ -118,13 +118,13 @@ def figure_index(found: Array) -> int:
     return int(found.argmax())
 
 
-def body_direction(dataset: xarray.Dataset, direction: Array) -> Array | None:
+def body_direction(dataset: Table, direction: Array) -> Array | None:
     """A direction fixed to the body, (rows, 3) in space."""
     quaternion = values(dataset, "quaternion")
     return None if quaternion is None else np.asarray(rotation_matrix(quaternion) @ direction)
 
 
-def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
+def pole(dataset: Table, axis: str) -> Array | None:
     """Unit vectors (rows, 3), space axes, of the axis named figure, spin or momentum."""
     recorded = values(dataset, f"{axis}_axis")
     if recorded is not None:
@@ -140,7 +140,7 @@ def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
     return _unit(np.einsum("tij,tj->ti", rotation_matrix(quaternion), rates))
 
 
-def steady_momentum(dataset: xarray.Dataset) -> Array | None:
+def steady_momentum(dataset: Table) -> Array | None:
     """Direction (3,) of the momentum where it stays put in space, else None."""
     directions = pole(dataset, "momentum")
     if directions is None:
@@ -151,17 +151,19 @@ def steady_momentum(dataset: xarray.Dataset) -> Array | None:
     return np.asarray(directions.mean(axis=0) / np.linalg.norm(directions.mean(axis=0)))
 
 
-def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | None:
+def orientation(dataset: Table, axis: str) -> tuple[Array, Array] | None:
     """Obliquity and node longitude (rows,) each, rad, of the axis named figure, spin or momentum.
 
     As recorded; else against the XY plane of space, the longitude of the ascending node made continuous.
     """
-    obliquity, node = dataset.get("obliquity"), dataset.get("node_longitude")
-    if obliquity is not None and node is not None and "axis" in obliquity.coords:
-        if axis not in obliquity["axis"].values:
+    if "obliquity" in dataset and "node_longitude" in dataset and "axis" in dataset["obliquity"].coords:
+        names = [str(label) for label in dataset["obliquity"].coords["axis"].values]
+        if axis not in names:
             return None
-        pair = [np.asarray(v.sel(axis=axis).values, dtype=np.float64) for v in (obliquity, node)]
-        return pair[0], pair[1]
+        obliquity, node = values(dataset, "obliquity"), values(dataset, "node_longitude")
+        assert obliquity is not None
+        assert node is not None
+        return obliquity[:, names.index(axis)], node[:, names.index(axis)]
     directions = pole(dataset, axis)
     if directions is None:
         return None
@@ -173,13 +175,13 @@ def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | Non
     return tilt, longitude
 
 
-def load_kinds(dataset: xarray.Dataset) -> list[str]:
+def load_kinds(dataset: Table) -> list[str]:
     """The kinds of the scene's loads, from the embedded config."""
     loads: Any = read_config(dataset).get("loads", [])
     return [str(load.get("kind")) for load in loads if isinstance(load, dict)]
 
 
-def vertical(dataset: xarray.Dataset) -> Array:
+def vertical(dataset: Table) -> Array:
     """Unit vector (3,) against a uniform gravity; Z where the config names no other direction in numbers."""
     for load in read_config(dataset).get("loads", []):
         if isinstance(load, dict) and load.get("kind") == "uniform_gravity" and "acceleration" in load:
@@ -196,7 +198,8 @@ def _unit(vectors: Array) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
-def _attribute(dataset: xarray.Dataset, name: str) -> Array | None:
+def attribute(dataset: Table, name: str) -> Array | None:
+    """An attribute that is a JSON list of numbers, as an array; None where it is missing or none."""
     try:
         return np.array(json.loads(str(dataset.attrs[name])), dtype=float)
     except (KeyError, ValueError, TypeError):

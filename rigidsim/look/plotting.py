@@ -1,0 +1,236 @@
+"""Plots, plane figures, states, the legend and the clock as rerun entities.
+
+Imports rerun when it is loaded, so load it only where a timeline is written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from rigidsim.look.plots import Plot, Series
+from rigidsim.look.stages.parts import Arrow, Color, Line, Plane, Stage, Trail, Vector
+from rigidsim.look.states import States
+
+PIXELS = 500  # about the width of a plot
+CLOCK_ROWS = 2000
+"""At most, of the clock on the screen."""
+_INK: Color = (205, 210, 218)
+_FAINT: Color = (90, 96, 108)
+LEGEND_COLUMNS = 3
+LEGEND_LINE = 0.78
+"""Height of a line of the legend, which is 30 units wide: about 24 of 950 points of the screen."""
+
+
+def plot_path(plot: Plot, name: str) -> str:
+    """Entity of one variable in one plot."""
+    folder = "/plots/drift/" if plot.place == "drift" else "/plots/"
+    return folder + rr.escape_entity_path_part(name)
+
+
+def plane_path(plane: Plane) -> str:
+    """Entity of a plane figure."""
+    return f"/planes/{plane.key}"
+
+
+def draw_plot_styles(recording: rr.RecordingStream, plots: Sequence[Plot]) -> None:
+    """Names and colours of the curves."""
+    for plot in plots:
+        for series in plot.series:
+            if series.error is not None:
+                style = rr.Measurements.from_fields(
+                    names=series.labels, colors=series.colors, widths=[1.5] * len(series.labels)
+                )
+                recording.log(plot_path(plot, series.name), style, static=True)
+            else:
+                recording.log(
+                    plot_path(plot, series.name),
+                    rr.SeriesLines(
+                        names=series.labels,
+                        colors=series.colors,
+                        widths=[1.5] * len(series.labels),
+                        aggregation_policy=aggregation(plot, series.values),
+                    ),
+                    static=True,
+                )
+
+
+def draw_plot_rows(
+    recording: rr.RecordingStream, plots: Sequence[Plot], times: list[rr.TimeColumn], rows: slice
+) -> None:
+    """The curves, for the rows of one chunk."""
+    for plot in plots:
+        for series in plot.series:
+            path = plot_path(plot, series.name)
+            if series.error is None:
+                columns = rr.Scalars.columns(scalars=series.values[rows])
+            else:
+                columns = _measured(series, rows)
+            recording.send_columns(path, indexes=times, columns=columns)
+
+
+def _measured(series: Series, rows: slice) -> rr.ComponentColumnList:
+    """Values with a band of their uncertainty to both sides (the viewer draws the root of a variance)."""
+    assert series.error is not None
+    values = series.values[rows]
+    count = values.shape[1]
+    return rr.Measurements.columns(
+        values=values.ravel(), variances=np.repeat(series.error[rows] ** 2, count)
+    ).partition([count] * len(values))
+
+
+def aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.AggregationPolicy:
+    """What the viewer draws of the rows that fall into one pixel.
+
+    Its default is their average, which is smooth, but shows a fast rotation with a vanishing
+    amplitude: then the extremes are drawn. Of a drift only the largest is of interest.
+    """
+    if plot.place == "drift":
+        return rr.components.AggregationPolicy.Max
+    step = max(len(values) // PIXELS, 1)
+    change = np.abs(values[step:] - values[:-step]) if len(values) > step else np.zeros(1)
+    range_ = np.nanmax(values) - np.nanmin(values) if np.isfinite(values).any() else 0.0
+    smooth = not np.isfinite(change).any() or np.nanmax(change) <= 0.1 * range_
+    policies = rr.components.AggregationPolicy
+    return policies.Average if smooth else policies.MinMax
+
+
+def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
+    """Plane figures as far as they don't change: the whole path, circles, axes."""
+    for plane in planes:
+        path = plane_path(plane)
+        points = flipped(plane.points)
+        finite = points[np.isfinite(points).all(axis=1)]
+        whole = finite[:: max(len(finite) // 4000, 1)]
+        dim: Color = tuple(round(0.5 * x) for x in plane.color)  # type: ignore[assignment]
+        if len(whole) > 1 and plane.moves and _dense(whole):
+            curve: rr.LineStrips2D | rr.Points2D = rr.LineStrips2D(
+                [whole], colors=[dim], radii=rr.Radius.ui_points(0.9), draw_order=1.0
+            )
+        else:
+            curve = rr.Points2D(
+                whole, colors=[dim if plane.moves else plane.color], radii=rr.Radius.ui_points(1.6)
+            )
+        recording.log(f"{path}/whole", curve, static=True)
+        size = plane_reach(plane)
+        low, high = np.min(whole, axis=0, initial=0.0), np.max(whole, axis=0, initial=0.0)
+        cross = [[(low[0] - size * 0.1, 0), (high[0] + size * 0.1, 0)],
+                 [(0, low[1] - size * 0.1), (0, high[1] + size * 0.1)]]  # fmt: skip
+        recording.log(
+            f"{path}/axes",
+            rr.LineStrips2D(cross, colors=[_FAINT], radii=rr.Radius.ui_points(0.5), draw_order=-1.0),
+            static=True,
+        )
+        if any(plane.names):
+            ends = [(high[0] + size * 0.1, 0), (0, low[1] - size * 0.1)]
+            labels = rr.Points2D(ends, labels=list(plane.names), colors=[_INK], radii=0.0, show_labels=True)
+            recording.log(f"{path}/axes/names", labels, static=True)
+        angle = np.linspace(0, 2 * np.pi, 121)
+        for number, (radius, label) in enumerate(plane.rings):
+            ring = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            recording.log(
+                f"{path}/rings/{number}",
+                rr.LineStrips2D([ring], colors=[_FAINT], radii=rr.Radius.ui_points(0.5), draw_order=-1.0),
+                static=True,
+            )
+            place = [(radius * np.cos(0.9), radius * np.sin(0.9))]
+            text = rr.Points2D(place, labels=[label], colors=[_INK], radii=0.0, show_labels=True)
+            recording.log(f"{path}/rings/{number}/label", text, static=True)
+        if plane.moves:
+            head = rr.Points2D.from_fields(
+                colors=[plane.color], radii=rr.Radius.ui_points(5.0), draw_order=3.0
+            )
+            recording.log(f"{path}/now", head, static=True)
+
+
+def draw_plane_rows(
+    recording: rr.RecordingStream, planes: Sequence[Plane], times: list[rr.TimeColumn], rows: slice
+) -> None:
+    """The moving points of plane figures."""
+    for plane in planes:
+        if plane.moves:
+            places = flipped(plane.points[rows]).astype(np.float32)
+            recording.send_columns(
+                f"{plane_path(plane)}/now", indexes=times, columns=rr.Points2D.columns(positions=places)
+            )
+
+
+def plane_reach(plane: Plane) -> float:
+    """Of what is drawn of a plane figure, from its origin."""
+    finite = plane.points[np.isfinite(plane.points).all(axis=1)]
+    size = float(np.abs(finite).max(initial=0.0))
+    return size or 1.0
+
+
+def flipped(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Plane points as the viewer has them, whose second axis points down."""
+    return points * np.array([1.0, -1.0])
+
+
+def _dense(points: NDArray[np.float64]) -> bool:
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    radius = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
+    return float(np.percentile(chords, 95)) <= 0.35 * max(radius, 1e-300)
+
+
+def legend_of(stages: Sequence[Stage]) -> list[tuple[str, Color]]:
+    """What colours mean, each once."""
+    found: dict[str, Color] = {}
+    for stage in stages:
+        parts: list[Arrow | Vector | Trail | Line] = [
+            *stage.arrows,
+            *stage.vectors,
+            *stage.trails,
+            *stage.lines,
+        ]
+        for part in parts:
+            if part.words:
+                found.setdefault(part.words, part.color)
+    return list(found.items())
+
+
+def legend_lines(entries: Sequence[tuple[str, Color]]) -> int:
+    """Of the legend on the screen, with the clock's."""
+    return -(-(1 + len(entries)) // LEGEND_COLUMNS)
+
+
+def draw_legend(recording: rr.RecordingStream, entries: Sequence[tuple[str, Color]]) -> None:
+    """The legend as a plane figure, 30 units wide and one for each line; the clock stands first."""
+    if entries:
+        words = [f"■ {words}" for words, _ in entries]
+        places = [_legend_place(number + 1) for number in range(len(entries))]
+        colors = [color for _, color in entries]
+        text = rr.Points2D(places, labels=words, colors=colors, radii=0.0, show_labels=True)
+        recording.log("/legend/words", text, static=True)
+    clock = rr.Points2D.from_fields(colors=[_INK], radii=[0.0], show_labels=True)
+    recording.log("/legend/clock", clock, static=True)
+
+
+def _legend_place(number: int) -> tuple[float, float]:
+    width = 30.0 / LEGEND_COLUMNS
+    return width * (number % LEGEND_COLUMNS + 0.5), LEGEND_LINE * (number // LEGEND_COLUMNS + 0.06)
+
+
+def draw_clock(recording: rr.RecordingStream, words: list[str], times: list[rr.TimeColumn]) -> None:
+    """The time of the scene in words, some of the rows."""
+    places = [_legend_place(0)] * len(words)
+    columns = rr.Points2D.columns(positions=places, labels=words)
+    recording.send_columns("/legend/clock", indexes=times, columns=columns)
+
+
+def draw_states(
+    recording: rr.RecordingStream, states: Sequence[States], times: list[list[rr.TimeColumn]]
+) -> None:
+    """Lanes of what happened when."""
+    for lane, indexes in zip(states, times, strict=True):
+        path = f"/states/{rr.escape_entity_path_part(lane.name)}"
+        values = sorted(set(lane.values))
+        recording.log(
+            path,
+            rr.StateConfiguration(values=values, labels=values, colors=[lane.colors[v] for v in values]),
+            static=True,
+        )
+        recording.send_columns(path, indexes=indexes, columns=rr.StateChange.columns(state=lane.values))

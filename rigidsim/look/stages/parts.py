@@ -1,0 +1,316 @@
+"""The parts that a stage is made of, as numbers: what is drawn, where, in which unit.
+
+The viewer works in float32, so everything is brought to units of order one here, in float64: lengths in units
+of the body's reach (largest distance of a drawn point from the reference point) or of an orbit, arrows by one
+constant factor each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.solids import Mesh
+from rigidsim.look.thinning import thinned_indices
+from rigidsim.scene.records import dataclass
+
+Array = NDArray[np.float64]
+Color = tuple[int, int, int]
+
+SPACE, BODY, CENTRE = "", "body", "centre"
+"""Where a part is attached: to space, to the body, to its reference point. Frames add names of their own."""
+
+ARROW_REACH = 1.6  # length of the longest arrow, in units of the body's reach
+AXIS_REACH = 1.15  # of the body axes
+CURVE_POINTS = 4000  # of a whole polhode or track
+
+MOMENTUM: Color = (255, 196, 40)
+VELOCITY: Color = (90, 215, 235)
+POLHODE: Color = (240, 100, 175)
+TRACK: Color = (150, 205, 110)
+PULL: Color = (255, 120, 70)
+SOURCE: Color = (255, 214, 110)
+FAINT: Color = (120, 128, 142)
+PALE: Color = (205, 210, 218)
+FIGURE: Color = (120, 165, 255)
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A vector along time: (rows, 3) in stage units, from the reference point, fixed to space or the body.
+
+    Attributes:
+        label: at its tip; none where the legend says enough.
+        words: what it is, for the legend; none where it isn't listed.
+        label_at: of the label, in lengths of the arrow.
+    """
+
+    name: str
+    label: str
+    color: Color
+    vectors: Array
+    in_body: bool
+    words: str = ""
+    label_at: float = 1.07
+    radius: float = 0.024
+
+
+@dataclass(frozen=True)
+class Trail:
+    """A moving point along time: (rows, 3) in stage units; `whole` (points, 3) is it, thinned.
+
+    Attributes:
+        line, whole_line: whether neighbours are close enough to be joined.
+        stride: rows from one that is drawn to the next; 1 where the motion needs every one.
+        words: what it is, for the legend.
+        head: whether the point itself is marked.
+    """
+
+    name: str
+    color: Color
+    points: Array
+    line: bool
+    whole: Array
+    whole_line: bool
+    in_body: bool = False
+    with_centre: bool = False
+    words: str = ""
+    head: bool = False
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve (points, 3) that doesn't change, in units of the stage, `width` points of the screen wide."""
+
+    name: str
+    color: Color
+    points: Array
+    place: str = SPACE
+    width: float = 1.2
+    strength: float = 1.0
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A labelled point (3,) that doesn't change; `size` points of the screen, 0 for the label alone."""
+
+    name: str
+    label: str
+    color: Color
+    position: Array
+    place: str = SPACE
+    size: float = 0.0
+
+
+@dataclass(frozen=True)
+class Vector:
+    """An arrow that doesn't change, from `start` (3,) along `along` (3,), in units of the stage."""
+
+    name: str
+    label: str
+    color: Color
+    start: Array
+    along: Array
+    place: str = SPACE
+    words: str = ""
+    radius: float = 0.018
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A mesh that stands somewhere, in units of the stage."""
+
+    name: str
+    mesh: Mesh
+    place: str = SPACE
+
+
+@dataclass(frozen=True)
+class Shell:
+    """An ellipsoid one can look through, with axes along those of its place."""
+
+    name: str
+    half_sizes: Array
+    color: Color
+    place: str = BODY
+    quaternion: Array | None = None  # x y z w, within the place
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame that moves in space: parts may be attached to it, and a view may look from it.
+
+    Attributes:
+        quaternion: (rows, 4) float32 x y z w, or None: it keeps its axes.
+        translation: (rows, 3), or None: it stays at the origin.
+    """
+
+    name: str
+    quaternion: NDArray[np.float32] | None
+    translation: Array | None = None
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the eye is, what it looks at and what is up, (3,) each, in the frame that is looked from."""
+
+    position: Array
+    target: Array
+    up: Array
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One scene to be drawn under the entity `root`.
+
+    Attributes:
+        unit: metres per unit of length.
+        meshes: of the body, body axes, stage units.
+        points: (P, 3) point masses of the body, to be joined to the reference point.
+        axis_length: of the body axes; 0 for none.
+        quaternion: (rows, 4) float32 [x, y, z, w] as the viewer wants it, or None: no attitude.
+        translation: (rows, 3) of the reference point, or None: it stays at the origin.
+        origin: whether the origin of space is in the picture and marked.
+        looked_from: name of a frame, or empty for space.
+        camera: None for the one that suits arrows and path.
+    """
+
+    root: str
+    title: str
+    unit: float
+    meshes: list[Mesh]
+    points: Array
+    axis_length: float
+    quaternion: NDArray[np.float32] | None
+    translation: Array | None
+    arrows: list[Arrow]
+    trails: list[Trail]
+    origin: bool = False
+    lines: list[Line] = field(default_factory=list)
+    spots: list[Spot] = field(default_factory=list)
+    vectors: list[Vector] = field(default_factory=list)
+    solids: list[Solid] = field(default_factory=list)
+    shells: list[Shell] = field(default_factory=list)
+    frames: list[Frame] = field(default_factory=list)
+    looked_from: str = ""
+    camera: Camera | None = None
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane figure: a path (rows, 2) with its moving point, or points that stand for themselves.
+
+    Attributes:
+        title: with the unit.
+        moves: whether the rows go along time.
+        rings: radii of circles about the origin, with their labels.
+        names: of the two axes.
+    """
+
+    key: str
+    title: str
+    color: Color
+    points: Array
+    moves: bool = True
+    rings: tuple[tuple[float, str], ...] = ()
+    names: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """All that is drawn of a dataset beside its plots.
+
+    Attributes:
+        kind: of the scene, in words.
+        stages: the first is the body's.
+        planes: figures beside it.
+        leading: variables whose plots come first.
+        notes: on scales, for the summary page.
+    """
+
+    kind: str
+    stages: list[Stage]
+    planes: list[Plane] = field(default_factory=list)
+    leading: tuple[str, ...] = ()
+    notes: list[str] = field(default_factory=list)
+
+
+def trail(
+    name: str,
+    color: Color,
+    points: Array,
+    *,
+    in_body: bool = False,
+    with_centre: bool = False,
+    words: str = "",
+    head: bool = False,
+) -> Trail:
+    """A trail of a moving point (rows, 3)."""
+    whole = points[thinned_indices(len(points), CURVE_POINTS)]
+    whole = whole[np.isfinite(whole).all(axis=1)]
+    line, whole_line = joined(points), joined(whole)
+    return Trail(name, color, points, line, whole, whole_line, in_body, with_centre, words, head)
+
+
+def joined(points: Array) -> bool:
+    """Whether samples are dense enough that joining them doesn't cut across the curve."""
+    first = np.arange(0, len(points) - 1, max(len(points) // 20_000, 1))
+    chords = np.linalg.norm(points[first + 1] - points[first], axis=1)
+    chords = chords[np.isfinite(chords)]
+    if not len(chords):
+        return True
+    points = points[first]
+    radius = float(np.nanmax(np.linalg.norm(points - np.nanmean(points, axis=0), axis=1)))
+    return float(np.percentile(chords, 95)) <= 0.35 * max(radius, 1e-6)
+
+
+def longest(vectors: Array) -> float:
+    """The largest norm of vectors (rows, 3); 0 where none is finite."""
+    norms = np.linalg.norm(vectors, axis=1)
+    return float(np.nanmax(norms)) if np.isfinite(norms).any() else 0.0
+
+
+def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:
+    """(rows, 4) w x y z of any norm as the viewer takes it: x y z w, unit, float32."""
+    # Normalised in float64 first: the viewer takes the float32 numbers as they are.
+    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return np.ascontiguousarray(unit[:, [1, 2, 3, 0]], dtype=np.float32)
+
+
+def quaternion_of(matrices: Array) -> Array:
+    """Quaternions (rows, 4) w x y z of rotation matrices (rows, 3, 3), continuous in sign (Shepperd 1978)."""
+    m = matrices
+    trace = np.trace(m, axis1=1, axis2=2)
+    squares = np.stack([trace, m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]], axis=1)
+    largest = np.argmax(squares, axis=1)
+    found = np.empty((len(m), 4))
+    products = np.empty((len(m), 4, 4))
+    products[:, 0] = np.stack(
+        [1 + trace, m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1
+    )
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        row = np.empty((len(m), 4))
+        row[:, 0] = m[:, j, i] - m[:, i, j]
+        row[:, 1 + k] = 1 + 2 * m[:, k, k] - trace
+        row[:, 1 + i] = m[:, k, i] + m[:, i, k]
+        row[:, 1 + j] = m[:, k, j] + m[:, j, k]
+        products[:, k + 1] = row
+    found = products[np.arange(len(m)), largest]
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    flips = np.sign(np.einsum("ij,ij->i", found[1:], found[:-1]))
+    flips[~(np.abs(flips) > 0)] = 1.0
+    return np.asarray(found * np.cumprod(np.append(1.0, flips))[:, None])
+
+
+def circle(radius: float, normal: Array, center: Array | None = None, count: int = 121) -> Array:
+    """Points (count, 3) of a circle about an axis."""
+    normal = normal / np.linalg.norm(normal)
+    first = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
+    first /= np.linalg.norm(first)
+    angle = np.linspace(0, 2 * np.pi, count)[:, None]
+    ring = radius * (np.cos(angle) * first + np.sin(angle) * np.cross(normal, first))
+    return np.asarray(ring if center is None else ring + center)

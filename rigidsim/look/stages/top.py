@@ -1,0 +1,155 @@
+"""A top: its pivot on a ground, gravity, and the trace of its figure axis, with that seen from above."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidsim.look import signals, surroundings
+from rigidsim.look.solids import Mesh
+from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
+from rigidsim.look.stages.parts import (
+    BODY,
+    FAINT,
+    FIGURE,
+    PALE,
+    PULL,
+    SPACE,
+    Array,
+    Camera,
+    Line,
+    Picture,
+    Plane,
+    Spot,
+    Vector,
+    circle,
+    trail,
+)
+from rigidsim.look.symbols import spinning_top
+
+if TYPE_CHECKING:
+    from rigidsim.look.rows import Table
+
+TRACE = 1.0  # where on the axis the traced point is, in reaches
+_SYMMETRIC = 1e-9  # of the moments
+
+
+def picture(dataset: Table, subject: Subject) -> Picture | None:
+    """Of a body about a fixed point off its centre of mass under a uniform gravity."""
+    pull = surroundings.gravity(dataset)
+    arm = signals.attribute(dataset, "center_of_mass")
+    if pull is None or subject.position is not None or subject.quaternion is None:
+        return None
+    if arm is None or not np.linalg.norm(arm) > 0:
+        return None
+    up = -pull / np.linalg.norm(pull)
+    axis = _figure(dataset, arm)
+    symbol = _symbol(dataset, subject, arm, axis)
+    if symbol is not None:
+        mesh, reach = symbol
+        subject = replace(subject, meshes=[mesh.scaled(1 / reach)], points=np.zeros((0, 3)), reach=reach)
+    arrows, _, notes = vectors_of(dataset, subject, paths=False)
+    if symbol is not None:
+        notes.append(
+            "the config gives moments and no shape: the body is drawn as a top with its axis, its centre of "
+            "mass and the radius of a disk of its mass and axial moment"
+        )
+    attitude = subject.attitude
+    assert attitude is not None
+    arrows = [replace(a, vectors=a.vectors * (1.25 if a.name == "angular_momentum" else 1.1)) for a in arrows]
+    tip = TRACE * attitude @ axis
+    stage = subject.stage(
+        arrows, [trail("tip", FIGURE, tip, words="trace of the axis", head=True)], "Top on its pivot"
+    )
+    lowest = min(float(np.nanmin(tip @ up)), float((subject.meshes[0].vertices @ axis).min()))
+    # A top that dips below its pivot stands on a post, not on a floor that it would pass through.
+    drop = 0.0 if lowest > -0.02 and float(np.nanmin(tip @ up)) > 0.25 else 1.35
+    ground = -drop * up
+    stage.lines.extend(_ground(up, ground))
+    if drop:
+        stage.lines.append(Line("ground/post", PALE, np.stack([ground, np.zeros(3)]), SPACE, 4.0))
+    across = _across(up)
+    stage.lines.append(Line("vertical", FAINT, np.stack([ground, 1.5 * up]), SPACE, 1.0, words="vertical"))
+    stage.vectors.append(
+        Vector("gravity", "gravity", PULL, 1.25 * across[0] + 0.9 * up, -0.55 * up, SPACE, "gravity", 0.02)
+    )
+    stage.spots.append(Spot("pivot", "pivot", PALE, np.zeros(3), SPACE, 5.0))
+    if symbol is None:
+        com = arm / subject.reach
+        stage.lines.append(Line("arm", PALE, np.stack([np.zeros(3), com]), BODY, 2.5))
+        stage.spots.append(Spot("center_of_mass", "centre of mass", PULL, com, BODY, 6.0))
+    elevation = np.deg2rad(20.0)
+    direction = np.cos(elevation) * (0.55 * across[0] - 0.83 * across[1]) + np.sin(elevation) * up
+    radius = 1.62 if drop == 0 else 1.85
+    target = (0.55 if drop == 0 else 0.1) * up
+    camera = Camera(target + radius / np.sin(FIELD / 2) * direction, target, up)
+    stage = replace(stage, camera=camera)
+    return Picture(
+        "top on a fixed point",
+        [stage],
+        [_from_above(tip, up, across)],
+        ("tilt", "precession_angle", "nutation_angle", "euler_angles"),
+        notes,
+    )
+
+
+def _figure(dataset: Table, arm: Array) -> Array:
+    """The axis whose trace is shown: of symmetry where the centre of mass lies on it, else through that."""
+    moments = signals.moments(dataset)
+    if moments is not None:
+        axis = signals.principal_axes(dataset)[signals.figure_index(moments)]
+        along = float(axis @ arm) / float(np.linalg.norm(arm))
+        if abs(along) > 1 - _SYMMETRIC:
+            return np.asarray(np.sign(along) * axis)
+    return np.asarray(arm / np.linalg.norm(arm))
+
+
+def _symbol(dataset: Table, subject: Subject, arm: Array, axis: Array) -> tuple[Mesh, float] | None:
+    """A toy top (in metres) and its reach where only the moments of a symmetric body are known."""
+    moments = signals.moments(dataset)
+    mass = dataset.attrs.get("mass")
+    only = len(subject.solids) == 1 and subject.solids[0].get("equivalent")
+    if not only or moments is None or mass is None:
+        return None
+    k = signals.figure_index(moments)
+    a, b = moments[(k + 1) % 3], moments[(k + 2) % 3]
+    along = abs(float(signals.principal_axes(dataset)[k] @ arm)) / float(np.linalg.norm(arm))
+    if abs(a - b) > _SYMMETRIC * max(a, b) or along < 1 - _SYMMETRIC:
+        return None
+    length = float(np.linalg.norm(arm))
+    # of a disk, C = m r^2/2; kept to what still looks like a top
+    radius = float(np.clip(np.sqrt(2 * moments[k] / float(mass)), 0.35 * length, 1.3 * length))
+    mesh = spinning_top(radius, length, 1.75 * length)
+    other = _across(axis)
+    return mesh.moved(np.stack([*other, axis], axis=1), np.zeros(3)), 1.75 * length
+
+
+def _across(axis: Array) -> tuple[Array, Array]:
+    """Two unit vectors that make a right-handed frame with an axis; X and Y for Z."""
+    first = np.eye(3)[0] if abs(axis[2]) > 0.999 else np.cross(np.array([0.0, 0.0, 1.0]), axis)
+    first = first - axis * (first @ axis)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def _ground(up: Array, at: Array) -> list[Line]:
+    first, second = _across(up)
+    lines = [Line("ground/rim", FAINT, circle(1.6, up, at), SPACE, 1.2, 0.8)]
+    for radius in (0.4, 0.8, 1.2):
+        lines.append(Line(f"ground/ring{radius:g}", FAINT, circle(radius, up, at), SPACE, 0.7, 0.4))
+    for k, way in enumerate((first, second, first + second, first - second)):
+        way = way / np.linalg.norm(way)
+        points = np.stack([at - 1.6 * way, at + 1.6 * way])
+        lines.append(Line(f"ground/spoke{k}", FAINT, points, SPACE, 0.7, 0.4))
+    return lines
+
+
+def _from_above(tip: Array, up: Array, across: tuple[Array, Array]) -> Plane:
+    plane = np.stack([tip @ across[0], tip @ across[1]], axis=1)
+    # its tilt, not its height, is what rings can tell
+    rings = tuple((float(np.sin(np.deg2rad(t))), f"{t}°") for t in (10, 30, 60, 90))
+    largest = float(np.nanmax(np.linalg.norm(plane, axis=1)))
+    shown = tuple(ring for ring in rings if ring[0] <= 1.6 * largest) or rings[:1]
+    return Plane("tip_from_above", "Axis from above", FIGURE, plane, rings=shown, names=("X", "Y"))

@@ -1,0 +1,98 @@
+"""What happened when, as lanes of states: the events of a run, and how it ended."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
+from rigidsim.scene.records import dataclass
+
+if TYPE_CHECKING:
+    from rigidsim.look.rows import Table
+
+MOST_EVENTS = 2000
+"""Of one kind that a lane shows; of more it shows the first."""
+_SHADES: tuple[Color, Color] = ((92, 148, 235), (240, 190, 60))
+_SECTION_POINTS = 8
+"""At least, for a section to be drawn."""
+_PREFERRED = ("libration", "polar_motion", "tip", "nadir", "angular_velocity", "euler_angles")
+
+
+@dataclass(frozen=True)
+class States:
+    """One lane.
+
+    Attributes:
+        seconds: (changes,), when a state begins.
+        values: what it is called.
+        colors: by value.
+    """
+
+    name: str
+    seconds: NDArray[np.float64]
+    values: list[str]
+    colors: dict[str, Color]
+
+
+def states_of(dataset: Table, start: float, end: float) -> list[States]:
+    """A lane for each event, which changes its colour when that happens, and one for a run that was stopped.
+
+    Args:
+        start, end: times of the first and last sample, s.
+    """
+    lanes = []
+    for name in events_of(dataset):
+        times = np.asarray(dataset[f"{name}_time"].values, dtype=np.float64)[:MOST_EVENTS]
+        values = [f"before {name}", *(f"{name} {k + 1}" for k in range(len(times)))]
+        colors = {value: PALE if k == 0 else _SHADES[k % 2] for k, value in enumerate(values)}
+        lanes.append(States(name, np.append(start, times), values, colors))
+    status = str(dataset.attrs.get("status", ""))
+    if status and status not in ("finished", "running"):
+        words = status.replace("_", " ")
+        middle = "running", words
+        lanes.append(
+            States("run", np.array([start, end]), list(middle), {"running": _SHADES[0], words: PULL})
+        )
+    return lanes
+
+
+def events_of(dataset: Table) -> list[str]:
+    """Names of the events whose times the dataset has."""
+    names = []
+    for name in (*map(str, dataset.data_vars), *map(str, dataset.coords)):
+        variable = dataset[name]
+        event = str(variable.attrs.get("event", ""))
+        if event and name == f"{event}_time" and variable.dims == (event,) and variable.shape[0]:
+            names.append(event)
+    return names
+
+
+def sections_of(dataset: Table) -> list[Plane]:
+    """For each event that happened often enough: two components of what was recorded there, as points."""
+    planes = []
+    for event in events_of(dataset):
+        for name in _PREFERRED:
+            full = f"{event}_{name}"
+            if full not in dataset or dataset[full].ndim != 2:
+                continue
+            values = np.asarray(dataset[full].values, dtype=np.float64)
+            values = values[np.isfinite(values).all(axis=1)]
+            if len(values) < _SECTION_POINTS:
+                continue
+            spread = np.ptp(values, axis=0)
+            first, second = sorted(np.argsort(spread)[-2:])
+            labels = [str(k) for k in range(values.shape[1])]
+            across = str(dataset[full].dims[1])
+            if across in dataset:
+                labels = [str(label) for label in dataset[across].values]
+            unit = str(dataset[full].attrs.get("units", ""))
+            title = f"Section at {event}: {name.replace('_', ' ')}" + (f" [{unit}]" if unit != "1" else "")
+            points = values[:, [first, second]]
+            points = points - (points.min(axis=0) + points.max(axis=0)) / 2
+            names = (labels[first], labels[second])
+            planes.append(Plane(f"section_{event}", title, _SHADES[1], points, moves=False, names=names))
+            break
+    return planes

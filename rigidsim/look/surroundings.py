@@ -1,0 +1,140 @@
+"""What stands around a body, as the dataset's attribute ``surroundings`` tells: gravity, sources, attractors.
+
+It is a JSON list of objects: ``{"what": "gravity", "acceleration"}``, ``{"what": "attractor",
+"gravitational_parameter", "position"}`` and ``{"what": "source", "gravitational_parameter"}`` with ``orbit``
+(elements at time zero and their rates), ``position`` or ``ephemeris``; SI units, space axes. Datasets of
+older versions have none.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.scene.records import dataclass
+
+if TYPE_CHECKING:
+    from rigidsim.look.rows import Table
+
+Array = NDArray[np.float64]
+Color = tuple[int, int, int]
+
+_ALIKE = 0.01  # of a gravitational parameter, for a body to be taken for one that is known
+_KEPLER_STEPS = 60  # of Newton's method; from E = M + e sin M it converges for any e < 1
+GREY: Color = (150, 154, 162)
+
+
+@dataclass(frozen=True)
+class Globe:
+    """A body that attracts, as it is drawn.
+
+    Attributes:
+        radius: m.
+        color: about that of its disk.
+    """
+
+    name: str
+    gravitational_parameter: float
+    radius: float
+    color: Color
+
+
+GLOBES: tuple[Globe, ...] = (
+    # nominal G M and equatorial radii of IAU 2015 Resolution B3 for Sun, Earth and Jupiter; else G M of JPL's
+    # planetary ephemerides and radii of Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22
+    Globe("Sun", 1.3271244e20, 6.957e8, (255, 214, 110)),
+    Globe("Mercury", 2.2031868e13, 2.4397e6, (160, 150, 140)),
+    Globe("Venus", 3.24858592e14, 6.0518e6, (222, 190, 130)),
+    Globe("Earth", 3.986004e14, 6.3781e6, (70, 122, 190)),
+    Globe("Moon", 4.902800e12, 1.7374e6, (168, 166, 160)),
+    Globe("Mars", 4.2828375e13, 3.39619e6, (196, 112, 72)),
+    Globe("Jupiter", 1.2668653e17, 7.1492e7, (208, 172, 136)),
+    Globe("Saturn", 3.7931206e16, 6.0268e7, (218, 196, 148)),
+    Globe("Uranus", 5.7939512e15, 2.5559e7, (150, 205, 215)),
+    Globe("Neptune", 6.8350999e15, 2.4764e7, (80, 120, 205)),
+)
+
+
+def told(dataset: Table, what: str) -> list[dict[str, Any]]:
+    """What the dataset says of one kind of thing around the body; empty where it says nothing."""
+    try:
+        listed = json.loads(str(dataset.attrs.get("surroundings", "[]")))
+    except ValueError:
+        return []
+    return [one for one in listed if isinstance(one, dict) and one.get("what") == what]
+
+
+def gravity(dataset: Table) -> Array | None:
+    """Acceleration (3,) of a uniform field, m/s^2, space axes; None where there is none."""
+    for one in told(dataset, "gravity"):
+        pull = _vector(one.get("acceleration"))
+        if pull is not None and np.linalg.norm(pull) > 0:
+            return pull
+    return None
+
+
+def globe_of(one: dict[str, Any]) -> Globe | None:
+    """Who attracts, told by its gravitational parameter; None where it is nobody's."""
+    strength = float(one.get("gravitational_parameter") or 0.0)
+    near = min(GLOBES, key=lambda globe: abs(globe.gravitational_parameter - strength))
+    return near if abs(strength / near.gravitational_parameter - 1) < _ALIKE else None
+
+
+def source_path(one: dict[str, Any], seconds: Array) -> Array | None:
+    """Where a source is, (rows, 3), m, space axes, from the body; None where that can't be told.
+
+    Args:
+        one: as from ``told(dataset, "source")``.
+        seconds: (rows,), of the scene.
+    """
+    place = _vector(one.get("position"))
+    if place is not None:
+        return np.tile(place, (len(seconds), 1))
+    orbit = one.get("orbit")
+    return kepler_path(orbit, seconds) if isinstance(orbit, dict) else None
+
+
+def kepler_path(orbit: dict[str, float], seconds: Array) -> Array:
+    """Positions (rows, 3), m, on an orbit of classical elements whose node and periapsis move uniformly.
+
+    Args:
+        orbit: elements at time zero (m, rad), their rates and the mean motion (rad/s).
+    """
+    e, axis = orbit["eccentricity"], orbit["semi_major_axis"]
+    mean = np.remainder(orbit["mean_anomaly"] + orbit["mean_motion"] * seconds + np.pi, 2 * np.pi) - np.pi
+    anomaly = mean + e * np.sin(mean)
+    for _ in range(_KEPLER_STEPS):
+        step = (anomaly - e * np.sin(anomaly) - mean) / (1 - e * np.cos(anomaly))
+        anomaly = anomaly - step
+        if not len(step) or np.abs(step).max() < 1e-14:
+            break
+    x, y = axis * (np.cos(anomaly) - e), axis * np.sqrt(1 - e * e) * np.sin(anomaly)
+    turn = orbit["periapsis"] + orbit["periapsis_rate"] * seconds
+    node = orbit["ascending_node"] + orbit["node_rate"] * seconds
+    u, v = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
+    tilt = orbit["inclination"]
+    return np.stack(
+        [
+            u * np.cos(node) - v * np.cos(tilt) * np.sin(node),
+            u * np.sin(node) + v * np.cos(tilt) * np.cos(node),
+            v * np.sin(tilt),
+        ],
+        axis=1,
+    )
+
+
+def orbit_normal(orbit: dict[str, float]) -> Array:
+    """Unit vector (3,) about which the source goes in the direct sense at time zero, space axes."""
+    tilt, node = orbit["inclination"], orbit["ascending_node"]
+    return np.array([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)])
+
+
+def _vector(value: Any) -> Array | None:
+    try:
+        found = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    return found if found.shape == (3,) and np.isfinite(found).all() else None

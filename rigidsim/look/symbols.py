@@ -1,0 +1,80 @@
+"""Meshes that stand for something: a toy top, a globe; and the edges and circles that are drawn on meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.solids import Mesh, ball, revolved
+from rigidsim.scene.outlines import Line
+
+Array = NDArray[np.float64]
+Color = tuple[int, int, int]
+
+_SHARP = np.cos(np.deg2rad(25.0))  # between the normals of two faces: what counts as an edge
+
+
+def spinning_top(radius: float, height: float, whole: float) -> Mesh:
+    """A top that stands on its tip at the origin, with its disk at some height and a stem above it.
+
+    Args:
+        radius: of the disk.
+        height: of the disk.
+        whole: to the end of the stem.
+    """
+    stem, rim = 0.09 * radius, 0.13 * radius
+    pieces = (
+        Line((0.0, 0.0), (0.30 * radius, height - 3.2 * rim)),
+        Line((0.30 * radius, height - 3.2 * rim), (radius, height - rim)),
+        Line((radius, height - rim), (radius, height + rim)),
+        Line((radius, height + rim), (stem, height + 3.0 * rim)),
+        Line((stem, height + 3.0 * rim), (stem, whole)),
+        Line((stem, whole), (0.0, whole)),
+    )
+    return revolved(pieces, middle=height)
+
+
+def globe(half_sizes: Array, color: Color) -> Mesh:
+    """An ellipsoid in belts of two shades of a colour, brighter towards its north pole."""
+    mesh = ball(*half_sizes)
+    height = mesh.vertices[mesh.triangles].mean(axis=1)[:, 2] / half_sizes[2]
+    belt = (np.floor((np.arcsin(np.clip(height, -1, 1)) / np.pi + 0.5) * 12).astype(int) % 2) * 0.07
+    shade = (0.78 + 0.2 * height - belt)[:, None]
+    colors = np.clip(np.array(color) * shade, 0, 255).astype(np.uint8)
+    return Mesh(mesh.vertices, mesh.triangles, mesh.normals, np.repeat(colors, 3, axis=0))
+
+
+def graticule(half_sizes: Array, step: float = 30.0, lift: float = 1.004) -> list[Array]:
+    """Meridians and parallels of an ellipsoid, a little above it, each (points, 3)."""
+    around = np.linspace(0, 2 * np.pi, 97)
+    half = np.linspace(-np.pi / 2, np.pi / 2, 49)
+    lines = [
+        np.stack([np.cos(half) * np.cos(at), np.cos(half) * np.sin(at), np.sin(half)], axis=1)
+        for at in np.deg2rad(np.arange(0.0, 360.0, step))
+    ]
+    for latitude in np.deg2rad(np.arange(-90.0 + step, 90.0, step)):
+        flat = np.cos(latitude)
+        lines.append(
+            np.stack([flat * np.cos(around), flat * np.sin(around), np.full(97, np.sin(latitude))], axis=1)
+        )
+    return [line * half_sizes * lift for line in lines]
+
+
+def sharp_edges(mesh: Mesh) -> Array:
+    """Edges (E, 2, 3) of a mesh along which its faces meet at more than 25 degrees."""
+    corners = mesh.vertices[mesh.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    # No vertices are shared: those at one place are told by their rounded coordinates.
+    keys = np.round(corners.reshape(-1, 3) / mesh.reach() * 1e6).astype(np.int64)
+    _, names = np.unique(keys, axis=0, return_inverse=True)
+    names = names.reshape(-1, 3)
+    pairs = np.concatenate([names[:, [0, 1]], names[:, [1, 2]], names[:, [2, 0]]])
+    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    faces = np.tile(np.arange(len(corners)), 3)
+    sorted_pairs = np.sort(pairs, axis=1)
+    order = np.lexsort((sorted_pairs[:, 1], sorted_pairs[:, 0]))
+    same = (sorted_pairs[order[1:]] == sorted_pairs[order[:-1]]).all(axis=1)
+    first, second = order[:-1][same], order[1:][same]
+    sharp = np.einsum("ij,ij->i", normals[faces[first]], normals[faces[second]]) < _SHARP
+    return np.asarray(ends[first[sharp]])
