@@ -19,6 +19,7 @@ import numpy as np
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import STEPS_BETWEEN, AngleState, AngleWrapping
 from rigidsim.solve.charts import Charts
+from rigidsim.solve.precision import Scalar
 from rigidsim.solve.projection import Projection
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.stepper import Mark, Stepper
@@ -122,6 +123,27 @@ class CorrectedStepper:
             if self.projection is not None:
                 self.projection.use(self.charts.chart)
         self.stepper.back_to(boundary.mark)
+
+    def arrive(self, boundary: StepBoundary, moment: Scalar) -> StepBoundary:
+        """Back to a boundary before a moment, and on by the same steps to the first one at or past it, where
+        nothing is corrected yet; the boundary before that.
+        """
+        most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
+        self.back_to(boundary)
+        while most > 1:
+            here, half = self.boundary(), most // 2
+            self.skip(half)
+            if self.stepper.time >= moment:
+                self.back_to(here)
+                most = half
+            else:
+                most -= half
+        while True:
+            before = self.boundary()
+            self.stepper.step()
+            if self.stepper.time >= moment:
+                return before
+            self.correct()
 
     def skip(self, count: int) -> bool:
         """``count`` steps without dense output, fewer where they collapse; False when the state is no longer

@@ -329,22 +329,7 @@ class IntegrationLoop:
         """Back to a boundary before a moment and on to the first one at or past it, which is where every way
         ends.
         """
-        most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
-        self.corrected.back_to(boundary)
-        while most > 1:
-            here, half = self.corrected.boundary(), most // 2
-            self.corrected.skip(half)
-            if self.stepper.time >= moment:
-                self.corrected.back_to(here)
-                most = half
-            else:
-                most -= half
-        while True:
-            self._before = self.corrected.boundary()
-            self.stepper.step()
-            if self.stepper.time >= moment:
-                break
-            self.corrected.correct()
+        self._before = self.corrected.arrive(boundary, moment)
         self._account()
 
     def _lost(self, boundary: StepBoundary, tried: int) -> bool:
