@@ -12,6 +12,7 @@ They agree in every word, and number by number:
 - what is written with an exponent is an error or a bound: the same order of magnitude (a factor of 10: errors
   are made of last bits); below 1e-13 it is rounding, whatever its size;
 - other numbers agree to one part in 1e9, or to one in their last digit;
+- the share in a verdict ("1.8 % of it at most") is made of last bits, and isn't compared;
 - in tables of checks the columns "measured" and "error" aren't compared (some are of chaotic motions, which
   no two CPUs share): each row holds them to what is expected and allowed, and its verdict is compared.
 """
@@ -106,6 +107,7 @@ def _compared(text: str) -> list[str]:
 
 def _plain(line: str) -> str:
     line = re.sub(r"─+", "─", " ".join(line.split()))
+    line = re.sub(r"[\d.]+ % of it at most", "SHARE of it at most", line)
     return _TIME.sub("TIME", line) if line.startswith(("cost ", "CPU ")) else line
 
 

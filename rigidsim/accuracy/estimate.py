@@ -43,6 +43,7 @@ class Estimate:
             grow exponentially.
         seconds: of the run that neighbours followed from its start on; ``share``: the same as a part of it.
         how: in words.
+        closed_form: whether the scene has one, against which the run was held.
     """
 
     attitude: float | None
@@ -55,6 +56,7 @@ class Estimate:
     seconds: float = 0.0
     share: float = 1.0
     how: str = ""
+    closed_form: bool = False
 
     @property
     def leading(self) -> float:
@@ -126,7 +128,7 @@ def _by_comparison(
     prepared: InitialValueProblem, found: ExactError, law: float, seconds: float, margins: Margins
 ) -> Estimate:
     """What was found, and some more for what lies between the samples that were compared."""
-    bits, label = _LAST_BITS * float(prepared.precision.epsilon), _label(prepared, seconds)
+    bits, label = _LAST_BITS * float(prepared.precision.epsilon), label_rounding(prepared, seconds)
     rate = float(prepared.system.rate_bound)
     extent, speed = _size(prepared.scene.position), _size(prepared.scene.velocity)
 
@@ -143,10 +145,11 @@ def _by_comparison(
         amplification=amplification if amplification > margins.stable else 1.0,
         seconds=seconds,
         how="held against the closed form at some samples",
+        closed_form=True,
     )
 
 
-def _label(prepared: InitialValueProblem, seconds: float) -> float:
+def label_rounding(prepared: InitialValueProblem, seconds: float) -> float:
     """By which times of samples are rounded, seconds."""
     late = max(abs(float(prepared.scene.start)), abs(float(prepared.scene.start) + seconds))
     return _LABEL * float(prepared.precision.epsilon) * late
@@ -177,7 +180,7 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
     turned = beyond(errors)
     moved = max(turned, beyond(np.array(spread.position))) if flight else turned
 
-    label = math.ldexp(_label(prepared, duration), -exponent)
+    label = math.ldexp(label_rounding(prepared, duration), -exponent)
     rate = math.ldexp(float(system.rate_bound), exponent)
 
     def at_end(name: str, size: float, most: float, pace: float = 0.0) -> float:

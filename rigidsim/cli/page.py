@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 Styled: TypeAlias = "str | tuple[str, str]"
 """A text, alone or with the style that it has on a terminal."""
 
-_PIPED_WIDTH = 110  # columns at least, where there is no terminal
+_PIPED_WIDTH = 110  # columns, where there is no terminal and COLUMNS says nothing
+_LEAST_WIDTH = 40
 _LABEL = 8
-_BETWEEN = "   "
+_BETWEEN = "   "  # what stands between the columns of a table
 _WORD = re.compile(r"\s*\S+\s*")
 _NUMBERS = ("largest drift", "final", "bound", "initial", "put back")
 
@@ -31,7 +32,12 @@ class Page:
     """Plain lines on stdout."""
 
     def __init__(self) -> None:
-        self._width = max(_PIPED_WIDTH, shutil.get_terminal_size().columns)
+        self._width = _piped_width()
+
+    @property
+    def width(self) -> int:
+        """In columns."""
+        return self._width
 
     def say(self, *parts: Styled, whole: bool = False) -> None:
         """A text, broken between words.
@@ -56,11 +62,15 @@ class Page:
         for number, part in enumerate(_broken(text, self._width - _LABEL - 1)):
             print(f"{'' if number else label:{_LABEL}} {part}".rstrip())
 
+    def fits(self, columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> bool:
+        """Whether a table has room without folding."""
+        return sum(_widths(columns, rows)) + len(_BETWEEN) * (len(columns) - 1) <= self.width
+
     def table(self, columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> None:
         """A table under the names of its columns."""
         rows = [tuple(row) for row in rows]
         lines = [tuple(columns), *(tuple(map(_bare, row)) for row in rows)]
-        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        widths = _widths(columns, rows)
         whole = sum(widths) + len(_BETWEEN) * (len(widths) - 1)
         if whole > self._width or not all(_is_narrow(cell) and "\n" not in cell for cell in sum(lines, ())):
             _Screen.of_stdout().table(columns, rows)
@@ -80,6 +90,11 @@ class _Screen(Page):
 
     def __init__(self, console: Console) -> None:
         self._console = console
+
+    @property
+    def width(self) -> int:
+        """In columns."""
+        return self._console.width
 
     @classmethod
     def of_stdout(cls) -> _Screen:
@@ -109,11 +124,16 @@ class _Screen(Page):
         self._console.print(table)
 
 
+def _piped_width() -> int:
+    """Wide enough for whole words, unless who reads it asks for another width."""
+    return max(_LEAST_WIDTH, shutil.get_terminal_size((_PIPED_WIDTH, 24)).columns)
+
+
 def console() -> Console:
     """stdout; wide enough for whole words when piped."""
     from rich.console import Console
 
-    width = None if sys.stdout.isatty() else max(_PIPED_WIDTH, shutil.get_terminal_size().columns)
+    width = None if sys.stdout.isatty() else _piped_width()
     return Console(width=width, highlight=False)
 
 
@@ -123,6 +143,11 @@ def page(out: Console | None = None) -> Page:
         return _Screen(out)
     colours = any(os.environ.get(name) for name in ("FORCE_COLOR", "TTY_COMPATIBLE"))
     return _Screen.of_stdout() if sys.stdout.isatty() or colours else Page()
+
+
+def _widths(columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> list[int]:
+    lines = [tuple(columns), *(tuple(map(_bare, row)) for row in rows)]
+    return [max(map(len, column)) for column in zip(*lines, strict=True)]
 
 
 def _bare(part: Styled) -> str:

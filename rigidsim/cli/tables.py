@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigidsim.cli.page import Page, Styled, page
 from rigidsim.cli.understood import understood
+from rigidsim.cli.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
@@ -58,6 +59,8 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None) -> No
     if isinstance(summary, Summary):
         _print_ended(summary, on)
     on.line("folder", folder)
+    for number, command in enumerate(next_lines(summary.status, summary.exit_code, folder)):
+        on.line("" if number else "next", command, "cyan")
 
 
 def print_understood(body: Body | None, start: Start | None, time: Span | None, out: Console) -> None:
@@ -113,6 +116,10 @@ def _print_ended(summary: Summary, on: Page) -> None:
         on.line("motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
     for warning in summary.warnings:
         on.line("warning", warning, "bold red")
+    told, style = verdict_line(summary)
+    on.line("verdict", told, style)
+    for text in filter(None, map(advice_line, summary.advice)):
+        on.line("advice", text, "cyan")
 
 
 def _event(summary: Summary, name: str) -> str:
@@ -138,14 +145,23 @@ def _words(summary: Summary) -> TimeWords:
 
 
 def _print_invariants(summary: Summary, on: Page) -> None:
+    """Where it doesn't fit, without the last drifts, which say least."""
     held = ["put back"] if summary.hold_invariants else []
+    columns = ["invariant", "initial", "largest drift", "final", "bound", *held]
     rows: list[list[Styled]] = []
     for name, row in summary.invariants.items():
         sound = row.largest_drift is None or row.largest_drift <= row.bound
         largest = (_drift(row.largest_drift), "" if sound else "red")
         rows.append([name, _initial(row.initial), largest, _drift(row.final_drift), _drift(row.bound)])
         rows[-1] += [_drift(row.put_back)] if held else []
-    on.table(["invariant", "initial", "largest drift", "final", "bound", *held], rows)
+    if not on.fits(columns, rows):
+        least = columns.index("final")
+        columns, rows = _without(columns, least), [_without(row, least) for row in rows]
+    on.table(columns, rows)
+
+
+def _without(row: list[Any], place: int) -> list[Any]:
+    return [cell for n, cell in enumerate(row) if n != place]
 
 
 def _print_accuracy(accuracy: Accuracy, on: Page) -> None:

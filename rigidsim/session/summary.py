@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidsim.session.advice import advice_on
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words
@@ -95,6 +96,7 @@ def summarise(
         events=events,
         event_times=event_times,
         chart_changes=chart_changes,
+        advice=advice_on(found),
         undefined_samples={name: seen.count for name, seen in found.statistics.undefined.items()},
     )
 

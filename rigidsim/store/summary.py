@@ -50,6 +50,13 @@ class WarningCode(Enum):
     UNDEFINED = "undefined"
 
 
+class AdviceCode(Enum):
+    """What would do better nearly for free; ``value`` stands in summaries."""
+
+    HOLD_INVARIANTS = "hold_invariants"
+    CLOSED_FORM = "closed_form"
+
+
 @dataclass(frozen=True)
 class Caution:
     """A warning: its code for decisions, its text for people."""
@@ -177,6 +184,19 @@ class EventTimes(Part):
     early: Annotated[tuple[FiniteNumber, ...], Claim(since=4)] = ()
 
 
+class Advice(Part):
+    """Something that would do better.
+
+    Attributes:
+        code: an ``AdviceCode``.
+        now, then: attitude error at the end as it is, and about as it would be, rad.
+    """
+
+    code: Text
+    now: FiniteNumber
+    then: FiniteNumber
+
+
 class ChartChanges(Part):
     """How often a run in Euler angles went from its sequence to the partner or back."""
 
@@ -215,6 +235,7 @@ class Summary(Brief):
         time_reached: seconds: of the last sample, or of the event that ended the run.
         engine_time: seconds: where the integration stood, which goes past samples in steps of its own.
         events, event_times: how often each happened, and when those that did.
+        advice: what would do better nearly for free, the best last.
         undefined_samples: by recorded variable that is NaN at some, how many.
         provenance: attributes of the dataset that are repeated here.
         dataset_sha256, timeline_sha256: of the files, once there are any.
@@ -244,6 +265,7 @@ class Summary(Brief):
     events: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
     event_times: dict[Text, EventTimes] = Field(default_factory=dict)
     chart_changes: Annotated[ChartChanges | None, Claim()] = None
+    advice: tuple[Advice, ...] = ()
     undefined_samples: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
     dataset_sha256: Digest | None = None
     timeline_sha256: Digest | None = None

@@ -570,7 +570,7 @@ def test_the_summary_fits_eighty_columns(tables: dict[str, str], config: Config)
     text = " ".join(" ".join(lines).split())
     for row in summary["invariants"].values():
         assert f"{row['scale_name']} (" in text
-    assert lines[-1] == "folder   runs/[bold]free"  # a path is no markup
+    assert "folder   runs/[bold]free" in lines  # a path is no markup
 
 
 @pytest.mark.parametrize("width", [80, 120])

@@ -1,0 +1,60 @@
+"""What a run's numbers come to, in plain words: the verdict, advice, and what to do next."""
+
+from __future__ import annotations
+
+import shlex
+
+from rigidsim.session.verdict import Soundness, verdict_on
+from rigidsim.store.summary import Advice, AdviceCode, Summary
+
+_STYLES = {Soundness.LOST: "bold yellow", Soundness.DRIFTED: "bold red"}
+_SOUND = "sound: every drift is within what rounding explains, {share} of it at most"
+_WORDS = {
+    Soundness.SOUND: _SOUND,
+    Soundness.AMPLIFIED: _SOUND + "; the motion itself amplifies errors",
+    Soundness.HELD: "sound as far as drifts tell: these are projected away; the attitude's error is "
+    "estimated apart from them",
+    Soundness.UNCHECKED: "unchecked: nothing is conserved here that could be watched",
+    Soundness.LOST: "drifts are within what rounding explains, {share} of it at most, but digits are gone at "
+    "the end: see the warning",
+    Soundness.DRIFTED: "not sound: {worst} drifted by {times} times what rounding explains; see the warning",
+}
+_ADVICE = {
+    AdviceCode.HOLD_INVARIANTS: "hold_invariants = true would bring {now} rad to about {then} for a few "
+    "percent more CPU",
+    AdviceCode.CLOSED_FORM: 'this scene has a closed form: method = "closed_form" is right to {then} rad at '
+    "any time, in place of {now}",
+}
+
+
+def verdict_line(summary: Summary) -> tuple[str, str]:
+    """The verdict, and the style that it has on a terminal."""
+    found = verdict_on(summary)
+    words = _WORDS[found.soundness]
+    share = found.share or 0.0
+    told = words.format(share=_percent(share), worst=found.worst, times=f"{share:.2g}")
+    return told, _STYLES.get(found.soundness, "green")
+
+
+def _percent(share: float) -> str:
+    return "none" if share == 0 else f"{100 * share:.2g} %" if share >= 0.001 else "less than 0.1 %"
+
+
+def advice_line(advice: Advice) -> str | None:
+    """One piece of advice; None for one of a later version."""
+    known = {code.value: text for code, text in _ADVICE.items()}
+    text = known.get(advice.code)
+    return None if text is None else text.format(now=f"{advice.now:.1e}", then=f"{advice.then:.0e}")
+
+
+def next_lines(status: str, exit_code: int, place: str) -> list[str]:
+    """Commands that one may want now; none for a run in memory."""
+    if not place:
+        return []
+    where = shlex.quote(place)
+    if exit_code == 0 and status.startswith("finished"):
+        return [f"rigidsim view {where}", f"rigidsim plot {where}"]
+    return [f"rigidsim resume {where}"] if exit_code == 130 or status in _RESUMABLE else []
+
+
+_RESUMABLE = ("running", "stopped: wall_time", "stopped: max_steps")

@@ -1,0 +1,44 @@
+"""What would do better than a run did, nearly for free: decided from its numbers, told elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+from rigidsim.accuracy.error_law import CLOSED_FORM
+from rigidsim.accuracy.estimate import label_rounding
+from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.store.summary import Advice, AdviceCode
+
+_LONG = 8192
+"""Steps from which on projected invariants pay for themselves (``experiments/precision_tradeoff.py``: from
+1e4 rad on, some 2500 steps in double precision)."""
+_HELD = 3.0
+"""tolerance sqrt(steps): attitude error with projected invariants, whose growth is that of a random walk.
+Over free bodies and heavy symmetric tops it was 1 to 2 of that at 1e7 rad (``experiments.long_horizon``)."""
+_WORTH = 30.0
+"""Times by which an error has to become smaller for anybody to be bothered with it."""
+
+
+def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
+    """Settings that would have given a far better attitude at the same cost or less, the best last.
+
+    Only what was measured is promised: projected invariants make up for the errors of motions that are
+    integrable (those with a closed form), whose frequencies depend on what is projected alone.
+    """
+    prepared, estimate = found.prepared, found.estimate
+    if estimate is None or not estimate.closed_form or estimate.attitude is None:
+        return ()
+    formulation, config = prepared.system.requirements.formulation, prepared.scene.config
+    if formulation != "quaternion" or config.integrator.accuracy is not None:
+        return ()
+    now, advice = estimate.attitude, []
+    held = _HELD * prepared.law_tolerance * math.sqrt(found.progress.steps) * estimate.amplification
+    # times of samples are rounded to doubles, which every estimate counts
+    held += label_rounding(prepared, estimate.seconds) * float(prepared.system.rate_bound)
+    if not prepared.holds_invariants and found.progress.steps >= _LONG and now > _WORTH * held:
+        advice.append(Advice(code=AdviceCode.HOLD_INVARIANTS.value, now=now, then=held))
+    exact = CLOSED_FORM * float(prepared.precision.epsilon)
+    stepped = bool(config.events) or config.output.lyapunov or prepared.holds_invariants
+    if not stepped and now > _WORTH * exact:
+        advice.append(Advice(code=AdviceCode.CLOSED_FORM.value, now=now, then=exact))
+    return tuple(advice)

@@ -1,0 +1,64 @@
+"""How sound a run is, as its summary has it: one value for decisions, told elsewhere."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from rigidsim.scene.records import dataclass
+from rigidsim.store.summary import Summary, WarningCode
+
+
+class Soundness(Enum):
+    """From best to worst."""
+
+    SOUND = "sound"
+    AMPLIFIED = "amplified"
+    HELD = "held"
+    UNCHECKED = "unchecked"
+    LOST = "lost"
+    DRIFTED = "drifted"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """On a run that ended.
+
+    Attributes:
+        share: largest drift of any invariant over what rounding explains; None where nothing was checked.
+        worst: the invariant that it is of; empty for none.
+    """
+
+    soundness: Soundness
+    share: float | None
+    worst: str
+
+
+_GONE = {WarningCode.ATTITUDE_UNCERTAIN.value, WarningCode.RATES_UNCERTAIN.value}
+
+
+def verdict_on(summary: Summary) -> Verdict:
+    """The worst that can be said: drifts that rounding does not explain, then digits that are gone;
+    projected invariants prove nothing, and a motion may amplify errors whatever its drifts.
+    """
+    checked = {name: row for name, row in summary.invariants.items() if not row.numerical}
+    shares = {
+        name: row.largest_drift / row.bound
+        for name, row in (checked or summary.invariants).items()
+        if row.largest_drift is not None and row.bound > 0
+    }
+    worst = max(shares, key=lambda name: shares[name], default="")
+    share = shares.get(worst)
+    return Verdict(_soundness(summary, share), share, worst)
+
+
+def _soundness(summary: Summary, share: float | None) -> Soundness:
+    if share is not None and not share <= 1:
+        return Soundness.DRIFTED
+    if _GONE.intersection(summary.warning_codes):
+        return Soundness.LOST
+    if share is None:
+        return Soundness.UNCHECKED
+    if summary.hold_invariants:
+        return Soundness.HELD
+    amplification = summary.accuracy.amplification
+    return Soundness.AMPLIFIED if amplification is not None and amplification > 1 else Soundness.SOUND

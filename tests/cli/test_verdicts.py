@@ -1,0 +1,71 @@
+"""The end of a run's screen: verdict, advice, what to do next, in eighty columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rigidsim.cli.verdicts import advice_line, next_lines
+from rigidsim.store.summary import Advice, AdviceCode
+
+LONG = "end = 12000\nsamples = 101"
+ESTIMATED = ("--set", "output.estimate=true")
+
+
+@pytest.fixture
+def screen(
+    config: Callable[..., str], rigidsim_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., list[str]]:
+    """Lines of a run's table, eighty columns wide."""
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def shown(*options: str, **given: str) -> list[str]:
+        done = rigidsim_command("run", config(**given), *ESTIMATED, *options)
+        return done.stdout.splitlines()
+
+    return shown
+
+
+def said(lines: list[str], label: str) -> list[str]:
+    """What stands behind a label, its further lines among it."""
+    begun = next(n for n, line in enumerate(lines) if line.startswith(f"{label:8} "))
+    rest = [line for line in lines[begun + 1 :]]
+    more = next((n for n, line in enumerate(rest) if not line.startswith(" " * 9)), len(rest))
+    return [line[9:] for line in lines[begun : begun + 1 + more]]
+
+
+def test_a_long_run_is_told_what_would_do_better(screen: Callable[..., list[str]]) -> None:
+    lines = screen("--set", "integrator.hold_invariants=false", time=LONG)
+    assert " ".join(said(lines, "verdict")).startswith("sound: every drift is within what rounding explains")
+    told = "\n".join(lines)
+    assert "hold_invariants = true would bring" in told
+    assert 'method = "closed_form" is right to' in told
+    assert said(lines, "next") == ["rigidsim view runs/free", "rigidsim plot runs/free"]
+    assert max(map(len, lines)) <= 80
+
+
+def test_a_run_that_a_guard_stopped_is_resumed_next(screen: Callable[..., list[str]]) -> None:
+    lines = screen("--set", "limits.max_steps=1")
+    assert said(lines, "next") == ["rigidsim resume runs/free"]
+    assert not any(line.startswith("advice") for line in lines)
+
+
+def test_held_invariants_fit_into_eighty_columns(screen: Callable[..., list[str]]) -> None:
+    lines = screen("--set", "integrator.hold_invariants=true")
+    assert max(map(len, lines)) <= 80
+    assert "put back" in "\n".join(lines)
+    assert "projected away" in " ".join(said(lines, "verdict"))
+
+
+def test_commands_quote_places_with_spaces() -> None:
+    assert next_lines("finished", 0, "my runs/free")[0] == "rigidsim view 'my runs/free'"
+    assert next_lines("finished", 0, "") == []
+    assert next_lines("stopped: non-finite state", 3, "runs/free") == []
+
+
+def test_every_code_has_its_words_and_others_none() -> None:
+    for code in AdviceCode:
+        assert "1.0e-08" in (advice_line(Advice(code=code.value, now=1e-8, then=1e-12)) or "")
+    assert advice_line(Advice(code="of a later version", now=1e-8, then=1e-12)) is None

@@ -1,0 +1,97 @@
+"""What a run says would do better does, by as much; and what can't be promised isn't said."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from support import config
+
+import rigidsim
+from rigidsim.session.verdict import Soundness, verdict_on
+from rigidsim.store.summary import AdviceCode
+
+LONG = config(  # some 24,000 steps
+    time="end = 12000\nsamples = 101", integrator="hold_invariants = false", estimate=True
+)
+
+
+def run(text: str, **changes: Any) -> rigidsim.Run:
+    return rigidsim.run(rigidsim.parse(text), changes=changes.get("changes", {}), out=None)
+
+
+@pytest.fixture(scope="module")
+def plain() -> rigidsim.Run:
+    return run(LONG)
+
+
+def advised(run: rigidsim.Run) -> dict[str, dict[str, Any]]:
+    return {row["code"]: row for row in run.summary.get("advice", [])}
+
+
+def error(run: rigidsim.Run) -> float:
+    return float(run.summary["accuracy"]["estimated_attitude_error"])
+
+
+@pytest.mark.parametrize(
+    ("code", "key", "value"),
+    [
+        (AdviceCode.HOLD_INVARIANTS, "integrator.hold_invariants", True),
+        (AdviceCode.CLOSED_FORM, "integrator.method", "closed_form"),
+    ],
+)
+def test_advice_keeps_its_word(plain: rigidsim.Run, code: AdviceCode, key: str, value: Any) -> None:
+    promised = advised(plain)[code.value]
+    assert promised["now"] == error(plain)
+    assert promised["then"] < promised["now"] / 30
+    better = run(LONG, changes={key: value})
+    # "about": the estimate of a held run has a margin of 3 over what it found against the closed form
+    assert error(better) <= 3 * promised["then"]
+
+
+def test_short_runs_and_exact_ones_need_none() -> None:
+    short = config(time="end = 3\nsamples = 11", estimate=True)
+    assert advised(run(short)) == {}
+    assert advised(run(LONG, changes={"integrator.method": "closed_form"})) == {}
+
+
+def test_a_closed_form_finds_no_events() -> None:
+    """It takes no steps: the advice would be refused."""
+    codes = advised(run(LONG + '\n[[events]]\nname = "flip"\nexpression = "wy"\n'))
+    assert set(codes) == {"hold_invariants"}
+
+
+def test_what_has_no_closed_form_is_promised_nothing() -> None:
+    driven = config(
+        time="end = 3000\nsamples = 11",
+        loads='kind = "torque"\ncomponents = ["1e-9", "0", "0"]',
+        estimate=True,
+    )
+    assert advised(run(driven)) == {}
+
+
+def test_a_verdict_names_the_worst(plain: rigidsim.Run) -> None:
+    found = verdict_on(plain.outcome)
+    drifts = {
+        n: row["largest_drift"] for n, row in plain.summary["invariants"].items() if not row["numerical"]
+    }
+    assert found.soundness is Soundness.SOUND
+    assert found.worst == max(drifts, key=lambda name: drifts[name])
+    assert found.share == pytest.approx(
+        drifts[found.worst] / plain.summary["invariants"][found.worst]["bound"]
+    )
+
+
+def test_verdicts_go_by_the_worst_that_can_be_said(plain: rigidsim.Run) -> None:
+    summary = plain.outcome
+    energy = summary.invariants["energy"]
+    drifted = energy.having(largest_drift=2 * energy.bound)
+    many = {**summary.invariants, "energy": drifted}
+    assert verdict_on(summary.having(hold_invariants=True)).soundness is Soundness.HELD
+    lost = summary.having(warnings=("gone",), warning_codes=("attitude_uncertain",))
+    assert verdict_on(lost).soundness is Soundness.LOST
+    assert verdict_on(lost.having(invariants=many)).soundness is Soundness.DRIFTED
+    assert verdict_on(lost.having(invariants=many)).worst == "energy"
+    assert verdict_on(summary.having(invariants={})).soundness is Soundness.UNCHECKED
+    amplified = summary.accuracy.having(amplification=5.0)
+    assert verdict_on(summary.having(accuracy=amplified)).soundness is Soundness.AMPLIFIED
