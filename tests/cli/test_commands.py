@@ -359,7 +359,7 @@ def test_schema_is_valid_and_accepts_a_config(config: Config, rigidsim_command: 
     import jsonschema
 
     schema = json.loads(rigidsim_command("schema").stdout)
-    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.Draft7Validator.check_schema(schema)
     table = tomllib.loads(Path(config()).read_text())
     jsonschema.validate(table, schema)
     with pytest.raises(jsonschema.ValidationError):

@@ -31,7 +31,7 @@ def screen(
 def said(lines: list[str], label: str) -> list[str]:
     """What stands behind a label, its further lines among it."""
     begun = next(n for n, line in enumerate(lines) if line.startswith(f"{label:8} "))
-    rest = [line for line in lines[begun + 1 :]]
+    rest = lines[begun + 1 :]
     more = next((n for n, line in enumerate(rest) if not line.startswith(" " * 9)), len(rest))
     return [line[9:] for line in lines[begun : begun + 1 + more]]
 
