@@ -116,10 +116,10 @@ def _print_ended(summary: Summary, on: Page) -> None:
         on.line("motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
     for warning in summary.warnings:
         on.line("warning", warning, "bold red")
-    told, style = verdict_line(summary)
-    on.line("verdict", told, style)
-    for text in filter(None, map(advice_line, summary.advice)):
-        on.line("advice", text, "cyan")
+    verdict, style = verdict_line(summary)
+    on.line("verdict", verdict, style)
+    for advice in filter(None, map(advice_line, summary.advice)):
+        on.line("advice", advice, "cyan")
 
 
 def _event(summary: Summary, name: str) -> str:
