@@ -11,6 +11,7 @@ import re
 from dataclasses import field
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 from rigidsim.scene import units
@@ -69,11 +70,7 @@ class ExactNumber:
         return self.rational if self.pi_power == 0 else fraction_of(self.at(context))
 
     def __float__(self) -> float:
-        import mpmath
-
-        context = mpmath.MPContext()
-        context.prec = 120
-        return float(self.at(context))
+        return float(self.at(_for_doubles()))
 
     @property
     def alone(self) -> ExactNumber:
@@ -84,6 +81,16 @@ class ExactNumber:
     def sign(self) -> int:
         """-1, 0 or 1."""
         return (self.rational > 0) - (self.rational < 0)
+
+
+@cache
+def _for_doubles() -> Any:
+    """The context in which numbers are rounded to doubles: making one takes longer than all else of a config."""
+    import mpmath
+
+    context = mpmath.MPContext()
+    context.prec = 120
+    return context
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,21 @@ from typing import Any
 
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.variables import dataset_variables
-from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.batch.lanes import recommended_width
+from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.workflows.plan import plan
+from rigidsim.workflows.sweep_batch import why_alone
 from rigidsim.workflows.sweep_check import QUICK, check_sweep
-from rigidsim.workflows.sweep_members import alone, recording
+from rigidsim.workflows.sweep_members import alone, batches_of, recording
 
 _SECONDS_OF_A_TILE = 10.0
 _LARGEST_TILE = 8192
 _FEW = 64
 _TILES_OF_FEW = 16
+_LARGEST_TILE_BYTES = 64e6
 _BUILD_SECONDS = 0.2  # equations compiled anew for each member that runs by itself
+_BATCH_SECONDS = 2e-5  # what is done for a member of a batch beside its integration
+_TRIED = 64
 
 
 def tile_length(sweep: Sweep) -> int:
@@ -26,17 +31,31 @@ def tile_length(sweep: Sweep) -> int:
     if sweep.count <= _FEW:
         return max(1, -(-sweep.count // _TILES_OF_FEW))
     made = plan(alone(sweep, 0), pilot_seconds=0.05)
-    return _length(sweep, _member_seconds(made))
+    return _length(sweep, _member_seconds(sweep, made), bytes_of_member(sweep, prepare(sweep.worked_out(0))))
 
 
-def _member_seconds(made: dict[str, Any]) -> float:
+def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
     predicted = made["predicted"]
-    return float(predicted["integration_seconds"] + predicted["recording_seconds"]) + _BUILD_SECONDS
+    seconds = float(predicted["integration_seconds"] + predicted["recording_seconds"])
+    if not _side_by_side(sweep):
+        return seconds + _BUILD_SECONDS
+    return seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS  # half of what lanes could gain
 
 
-def _length(sweep: Sweep, seconds: float) -> int:
+def _side_by_side(sweep: Sweep) -> bool:
+    """Whether members run in batches, as far as some of them tell."""
+    if why_alone(sweep, sweep.table.keep):
+        return False
+    some = range(0, sweep.count, -(-sweep.count // _TRIED))
+    _, shared = batches_of(sweep.experiment.text).refused(some)
+    return shared
+
+
+def _length(sweep: Sweep, seconds: float, size: float) -> int:
+    """Of tiles whose members take so many seconds and bytes each."""
+    most = min(_SECONDS_OF_A_TILE / seconds, _LARGEST_TILE_BYTES / size)
     length = 8
-    while length < _LARGEST_TILE and 2 * length * seconds <= _SECONDS_OF_A_TILE and 32 * length < sweep.count:
+    while length < _LARGEST_TILE and 2 * length <= most and 32 * length < sweep.count:
         length *= 2
     return length
 
@@ -70,8 +89,10 @@ def plan_sweep(sweep: Sweep) -> dict[str, Any]:
     sweep = recording(sweep)
     first = check_sweep(sweep, every=sweep.count <= QUICK)
     made = plan(alone(sweep, 0))
-    seconds = _member_seconds(made)
-    length = sweep.table.tile or (tile_length(sweep) if sweep.count <= _FEW else _length(sweep, seconds))
+    seconds, size = _member_seconds(sweep, made), bytes_of_member(sweep, first)
+    length = sweep.table.tile
+    if length is None:
+        length = tile_length(sweep) if sweep.count <= _FEW else _length(sweep, seconds, size)
     return {
         "kind": "sweep",
         "name": sweep.experiment.config.name,
@@ -96,6 +117,6 @@ def plan_sweep(sweep: Sweep) -> dict[str, Any]:
             "seconds_per_member": seconds,
             "total_seconds": seconds * sweep.count,
             "memory_bytes": made["predicted"]["memory_bytes"],
-            "dataset_bytes": bytes_of_member(sweep, first) * sweep.count,
+            "dataset_bytes": size * sweep.count,
         },
     }
