@@ -267,11 +267,11 @@ def print_checked(found: Checked) -> None:
         on.line("warning", caution.text, "bold red")
 
 
-def print_verdict(verdict: dict[str, Any]) -> None:
-    """A verification in words, from ``Verdict.as_dict``."""
+def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:
+    """A verification in words, from ``Verdict.as_dict``; ``what`` were compared."""
     on = page()
     if verdict["identical"]:
-        on.say(f"identical: {verdict['samples']:,} samples, every variable, every bit")
+        on.say(f"identical: {verdict['samples']:,} {what}s, every variable, every bit")
     else:
         on.say(f"different: {verdict['path']}")
     for problem in verdict["problems"]:
@@ -279,7 +279,7 @@ def print_verdict(verdict: dict[str, Any]) -> None:
     first = verdict["first_difference"]
     if first is not None:
         on.say(
-            f"  first difference: {first['variable']} at sample {first['sample']}: saved "
+            f"  first difference: {first['variable']} at {what} {first['sample']}: saved "
             f"{first['saved']!r}, again {first['again']!r}, {first['size']:.3g} apart"
         )
     names = verdict["differing_variables"]

@@ -85,7 +85,7 @@ class ExactNumber:
 
 @cache
 def _for_doubles() -> Any:
-    """The context in which numbers are rounded to doubles: making one takes longer than all else of a config."""
+    """The context in which numbers are rounded to doubles: making one takes longer than reading a config."""
     import mpmath
 
     context = mpmath.MPContext()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -21,6 +24,7 @@ from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweep import Axis
 from rigidsim.solve.batch.members import AxisNumbers, Members
+from rigidsim.store.seal import seal
 from rigidsim.store.sweep_folder import SweepFolder
 from rigidsim.store.sweep_generation import Work, ranges_of
 from rigidsim.store.sweep_run import open_sweep
@@ -28,6 +32,7 @@ from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import resume_sweep, scanned
 from rigidsim.workflows.sweep import sweep as run_sweep
 from rigidsim.workflows.sweep_members import run_members, sweep_of
+from rigidsim.workflows.sweep_verify import verify_sweep
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -229,6 +234,36 @@ def test_an_indicator_moves_no_bit_of_what_else_is_kept(samples: int) -> None:
     for name, values in without.items():
         assert values.tobytes() == along[name].tobytes(), name
     assert np.isfinite(without["angular_velocity_final"]).all()
+
+
+def test_verify_runs_members_again_and_finds_a_flipped_bit(folder: Path, tmp_path: Path) -> None:
+    def told(*options: str) -> tuple[int, dict[str, Any]]:
+        found = CliRunner().invoke(app, ["verify", *options, "--json"])
+        return found.exit_code, json.loads(found.stdout)
+
+    code, verdict = told(str(folder))
+    assert code == 0
+    assert verdict["identical"]
+    assert verdict["samples"] == 6
+    forged = tmp_path / "forged"
+    shutil.copytree(folder, forged)
+    with h5py.File(forged / "dataset.h5", "r+") as file:
+        values = file["angular_velocity_final"]
+        values[2, 1, 0] = np.nextafter(values[2, 1, 0], 1)
+    summary = json.loads((forged / "summary.json").read_text())
+    with pytest.raises(RunFolderError):
+        verify_sweep(forged)  # whose seal is broken
+    summary["dataset_sha256"] = seal(forged / "dataset.h5")[1]
+    (forged / "summary.json").write_text(json.dumps(summary))
+    code, verdict = told(str(forged))
+    assert code == 1
+    assert verdict["differing_variables"] == ["angular_velocity_final"]
+    first = verdict["first_difference"]
+    assert first["sample"] == 5
+    assert 0 < first["size"] < 1e-15
+    wrong = CliRunner().invoke(app, ["verify", str(folder), "--members", "0"])
+    assert wrong.exit_code == 2
+    assert "one or more are allowed" in wrong.output
 
 
 def test_values_of_an_axis_are_worked_out_once_however_many_members_have_them(

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import json
+from typing import Annotated
 
 import typer
 
 from rigidsim.cli.options import JsonOption, RunPath
 
+MembersOption = Annotated[
+    int, typer.Option("--members", metavar="N", help="Of a sweep: how many members, drawn at random.")
+]
 
-def verify(run_path: RunPath, as_json: JsonOption = False) -> None:
+
+def verify(run_path: RunPath, members: MembersOption = 100, as_json: JsonOption = False) -> None:
     """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
 
     Example: rigidsim verify runs/intermediate_axis
     """
     from rigidsim.cli import tables
     from rigidsim.session import progress
-    from rigidsim.workflows.verify import verify as compare
+    from rigidsim.store.sweep_folder import is_sweep
 
-    with progress.observer() as observer:
-        verdict = compare(run_path, observer=observer)
+    if is_sweep(run_path):
+        from rigidsim.workflows.sweep_verify import verify_sweep
+
+        verdict, what = verify_sweep(run_path, members=members), "member"
+    else:
+        from rigidsim.workflows.verify import verify as compare
+
+        with progress.observer() as observer:
+            verdict, what = compare(run_path, observer=observer), "sample"
     if as_json:
         print(json.dumps(verdict.as_dict()))
     else:
-        tables.print_verdict(verdict.as_dict())
+        tables.print_verdict(verdict.as_dict(), what)
     raise typer.Exit(0 if verdict.identical else 1)
