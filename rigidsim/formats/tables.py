@@ -144,7 +144,8 @@ def _columns(dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None) -
     is_date = variable.dtype.kind == "M"
     labels = []
     for dim in map(str, variable.dims[1:]):
-        labels.append(LABELS.get(dim) or [str(n) for n in range(variable.sizes[dim])])
+        own = [str(x) for x in dataset[dim].values] if dim in dataset.coords else None
+        labels.append(LABELS.get(dim) or own or [str(n) for n in range(variable.sizes[dim])])
     found = []
     for index in product(*(range(len(names)) for names in labels)):
         suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True))

@@ -16,6 +16,7 @@ from rigidsim.model.equations import (
 from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.needs import work_is_needed
@@ -89,6 +90,7 @@ def assemble_states(
         blocks = _rotation_blocks(m, plan)
     if flies:
         blocks.append(_flight_block(m, plan))
+    blocks += _point_mass_blocks(m)
     blocks += _load_blocks(m)
     if work_is_needed(m):
         blocks.append(_work_block(m))
@@ -180,6 +182,15 @@ def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
         exponents=[scaling.length] * 3 + [scaling.speed] * 3,
         why=plan.requirements.why["flight"],
     )
+
+
+def _point_mass_blocks(m: Mechanics) -> list[StateBlock]:
+    """The bodies that move beside this one, and what they feel of it."""
+    states = m.point_masses
+    if states is None:
+        return []
+    states.react([part for load in m.loads if isinstance(load, MovingSource) for part in load.reaction(m)])
+    return [states.block()]
 
 
 def _load_blocks(m: Mechanics) -> list[StateBlock]:

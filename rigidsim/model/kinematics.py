@@ -15,6 +15,7 @@ import heyoka as hy
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.orbit_states import OrbitStates, orbit_states
+from rigidsim.model.point_mass_states import PointMassStates
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
@@ -139,6 +140,14 @@ class Kinematics:
             tag = self.orbit_tags.get(orbit, "")
             self._orbits[orbit] = orbit_states(orbit, tag, unit, self.scene.start, context, self.number)
         return self._orbits[orbit]
+
+    @cached_property
+    def point_masses(self) -> PointMassStates | None:
+        """The bodies that move beside this one; None without any."""
+        masses = self.scene.bodies
+        if masses is None:
+            return None
+        return PointMassStates(masses, self.scaling, self.scene.context, self.number)
 
     def table(self, orbit: TabulatedOrbit) -> OrbitStates:
         """An orbit by a table, likewise."""

@@ -37,6 +37,7 @@ class Load(SceneLoad):
         table: the orbit of its source, where a table gives it; loads on it share its states likewise.
         corotating_orbit: a circular orbit in a fixed plane in whose frame its potential rests: then there is
             Jacobi's constant.
+        masses_beside: whether its source is one of the point masses that move beside the body.
         has_source: whether the direction to its source is known: nadir, roll and libration count from it.
         attracting_point: centre of its force (mpf, m, space axes), where that always points to one.
     """
@@ -50,6 +51,7 @@ class Load(SceneLoad):
     table: TabulatedOrbit | None = None
     corotating_orbit: KeplerOrbit | None = None
     has_source: bool = False
+    masses_beside: bool = False
     attracting_point: Vector | None = None
 
     # --- equations ---------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.load import Load
+from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.reference_plane import flight_normal
 from rigidsim.model.rotations import Symbolic, apply, transpose
@@ -80,6 +81,8 @@ def moves_slowly_in_orbit(m: Mechanics) -> bool:
     context, scene = m.scene.context, m.scene
     if load.orbit is not None:
         rate = abs(load.orbit.mean_motion)
+    elif isinstance(load, MovingSource):
+        rate = load.encounter(scene)[1]
     elif load.table is not None:
         rate = abs(load.table.mean_motion)
     elif load.attracting_point is not None and scene.position is not None and scene.velocity is not None:
@@ -96,6 +99,8 @@ def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbol
     to_body = transpose(m.matrix)
     if load.orbit is not None:
         return apply(to_body, m.orbit(load.orbit).normal), "normal of its orbit"
+    if isinstance(load, MovingSource):
+        return apply(to_body, load.orbit_normal(m)), "normal of the osculating orbit"
     if load.table is not None:
         return apply(to_body, m.table(load.table).normal), "normal of its orbit, by its table"
     if load.attracting_point is not None:

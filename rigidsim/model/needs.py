@@ -79,6 +79,10 @@ def _no_vertical(scene: Scene, formulation: str) -> str | None:
     return "the scene has no load that marks a vertical; record angular_momentum instead"
 
 
+def _no_point_masses(scene: Scene, formulation: str) -> str | None:
+    return None if scene.bodies is not None else "there are no [[bodies]]; add them, or leave it out"
+
+
 def _source_states(scene: Scene) -> str | None:
     return "flight" if flies_about_source(scene) else None
 
@@ -146,6 +150,7 @@ NEEDS: dict[str, Need] = {
     "attracting_line": Need(
         lambda m: m.velocity is not None and m.attitude is not None and central_forces.line(m) is not None
     ),
+    "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_no_point_masses),
     "free_fall": Need(lambda m: m.velocity is not None and central_forces.falls_freely(m)),
     "attractor": Need(
         lambda m: m.velocity is not None and any(x.attracting_point is not None for x in m.loads)

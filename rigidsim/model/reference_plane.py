@@ -23,6 +23,7 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import seconds
 from rigidsim.model.load import Load
+from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, constant
 from rigidsim.model.two_part import as_factor
@@ -98,6 +99,8 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
         if orbit.node_rate == 0:
             return fixed_plane(m, _normal_of(context, orbit.inclination, orbit.ascending_node), described)
         return _moving(m.orbit(orbit).normal, described + ", whose node moves")
+    if isinstance(load, MovingSource):
+        return _moving(load.orbit_normal(m), "osculating plane of the source's orbit")
     if load.table is not None:
         return _moving(m.table(load.table).normal, "plane of the source's orbit, by its table")
     if load.attracting_point is not None:
@@ -119,6 +122,8 @@ def initial_normal(scene: Scene, loads: Sequence[Any]) -> Vector:
         q, p = (load.table.at(scene.start)[name] for name in ("q", "p"))
         chi = context.sqrt(1 - p * p - q * q)
         return [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
+    if isinstance(load, MovingSource):
+        return load.starting_normal(scene)
     if load.attracting_point is not None and scene.position is not None and scene.velocity is not None:
         offset = [x - a for x, a in zip(scene.position, load.attracting_point, strict=True)]
         return cross(offset, scene.velocity)
@@ -134,6 +139,8 @@ def plane_drift(scene: Scene, loads: Sequence[Any]) -> Any | None:
         return abs(load.orbit.node_rate)
     if load.table is not None:
         return load.table.normal_drift
+    if isinstance(load, MovingSource):
+        return None
     return None if load.attracting_point is not None else scene.context.mpf(_ECLIPTIC_DRIFT)
 
 
@@ -147,7 +154,7 @@ def _source(scene: Scene, loads: Sequence[Any]) -> Any:
     for load in loads:
         ephemeris = getattr(load, "ephemeris", None)
         placed = (load.orbit, load.table, load.attracting_point)
-        if any(x is not None for x in placed) or ephemeris == "sun":
+        if any(x is not None for x in placed) or isinstance(load, MovingSource) or ephemeris == "sun":
             return load
     what = f'given "{ORBIT}", but no load of the scene has an orbit whose plane is known'
     if any(getattr(load, "ephemeris", None) == "moon" for load in loads):

@@ -176,6 +176,26 @@ def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
     return norm(context, scene.position) + swiftest * horizon, swiftest
 
 
+def _point_mass_rates(scene: Scene) -> list[Any]:
+    """Fastest angular rates of pairs of point masses, rad/s."""
+    masses = scene.bodies
+    if masses is None:
+        return []
+    count = range(len(masses.names))
+    return [masses.encounter(scene.context, i, j)[1] for i in count for j in count if i < j]
+
+
+def _point_mass_scales(scene: Scene) -> tuple[Any, Any]:
+    """Largest distance from the origin (m) and speed (m/s) at the start, of point masses and body."""
+    context, masses = scene.context, scene.bodies
+    assert masses is not None
+    places, speeds = list(masses.positions), list(masses.velocities)
+    if scene.position is not None and scene.velocity is not None:
+        places.append(scene.position)
+        speeds.append(scene.velocity)
+    return largest_of([norm(context, x) for x in places]), largest_of([norm(context, v) for v in speeds])
+
+
 def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
     """The units of a scene; a pure function of it, so that the same config gives the same bits."""
     context, body = scene.context, scene.body
@@ -189,7 +209,7 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         if axial is not None and all(body.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j):
             swing_moment = body.inertia[(axial + 1) % 3][(axial + 1) % 3]
         fastest = largest_of([fastest, context.sqrt(potential / swing_moment)])
-    fastest = largest_of([fastest, source_rate(scene)])
+    fastest = largest_of([fastest, source_rate(scene), *_point_mass_rates(scene)])
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
         time = exponent(context, scene.end - scene.start)
@@ -198,7 +218,10 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         relative = exponent(context, bound) + time if bound != 0 else 0
         rates.append(relative if abs(relative) >= _WORTH_A_UNIT else 0)
     length = speed = 0
-    if scene.position is not None and scene.velocity is not None:
+    if scene.bodies is not None:
+        farthest, swiftest = _point_mass_scales(scene)
+        length, speed = exponent(context, farthest), exponent(context, swiftest)
+    elif scene.position is not None and scene.velocity is not None:
         farthest, swiftest = _flight_scales(scene, drive)
         length, speed = exponent(context, farthest), exponent(context, swiftest)
     return Scaling(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, StrictStr, Tag, WithJsonSchema, create_model, field_validator
 
@@ -150,6 +150,13 @@ class Body(Solid):
     )
     mass: Kilogram | None = Field(
         default=None, description="needed by shapes, and where a load or a path needs it", examples=[12]
+    )
+    host: StrictStr | None = Field(
+        default=None, description="name of the one of [[bodies]] that this body is", examples=["earth"]
+    )
+    coupling: Literal["one_way", "full"] | None = Field(
+        default=None,
+        description="whether [[bodies]] feel this body's shape: one_way (the default) or full",
     )
     center_of_mass: Triple[Metre] | None = Field(
         default=None,

@@ -8,9 +8,10 @@ from pydantic import Field, StrictStr
 
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
+from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import Surroundings
-from rigidsim.scene.traced import called
+from rigidsim.scene.validation_messages import nearest
 
 
 class Orbit(ConfigTable):
@@ -20,6 +21,9 @@ class Orbit(ConfigTable):
     the one of Kepler's third law. A ``table`` gives elements over time; those that it hasn't are constant.
     """
 
+    body: StrictStr | None = Field(
+        default=None, description="name of the one of [[bodies]] that attracts, alone", examples=["sun"]
+    )
     table: StrictStr | None = Field(
         default=None,
         description="name of a CSV file beside the config, with elements over time",
@@ -90,20 +94,25 @@ class KeplerOrbit:
         return abs(self.mean_motion) * context.sqrt(1 - e * e) / (1 - e) ** 2
 
 
-def eccentric_anomaly(context: Any, mean: Any, eccentricity: Any) -> Any:
-    """Solution of Kepler's equation M = E - e sin E, to the context's precision."""
-    return called(_kepler, context, mean, eccentricity)
+def attracting_body(orbit: Orbit, around: Surroundings) -> int:
+    """Number of the point mass that an orbit names.
 
-
-def _kepler(context: Any, mean: Any, e: Any) -> Any:
-    anomaly = mean + e * context.sin(mean)
-    # Newton converges quadratically; the count covers any precision from a start that is good to e^2
-    for _ in range(12 + int(context.prec).bit_length()):
-        step = (anomaly - e * context.sin(anomaly) - mean) / (1 - e * context.cos(anomaly))
-        anomaly -= step
-        if abs(step) <= context.ldexp(1, -context.prec // 2 - 2):
-            break
-    return anomaly
+    Raises:
+        ConfigError: there is none of that name, or it is this body itself.
+    """
+    more = sorted(orbit.model_fields_set - {"body"})
+    if more:
+        raise around.fault(f"orbit.{more[0]}", "given beside body, whose motion is integrated; remove it")
+    masses = around.bodies
+    names = () if masses is None else masses.names
+    if masses is None or orbit.body not in names:
+        allowed = ", ".join(names) or "none, since there are no [[bodies]]"
+        what = f'given "{orbit.body}"{nearest(str(orbit.body), names)}; allowed: {allowed}'
+        raise around.fault("orbit.body", what)
+    found = names.index(orbit.body)
+    if found == masses.host:
+        raise around.fault("orbit.body", f'given "{orbit.body}", which is the body itself; name another')
+    return found
 
 
 def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> KeplerOrbit:

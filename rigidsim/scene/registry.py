@@ -16,6 +16,7 @@ from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions import Expression
 from rigidsim.scene.fields import ConfigTable
+from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.records import dataclass
 
 
@@ -37,6 +38,7 @@ class Surroundings:
         epoch: time 0 of the scene, where the config says it.
         tables: texts of the tables that belong to the config, by name.
         span: start and end of the run, s (mpf).
+        bodies: point masses that move beside the body.
     """
 
     number: int
@@ -48,6 +50,13 @@ class Surroundings:
     epoch: Epoch | None = None
     tables: Mapping[str, str] = field(default_factory=dict)
     span: tuple[Any, Any] | None = None
+    bodies: PointMasses | None = None
+
+    @property
+    def carried_bodies(self) -> PointMasses:
+        """The point masses, where there are any."""
+        assert self.bodies is not None
+        return self.bodies
 
     def fault(self, key: str, text: str) -> ConfigError:
         """The error that names a key of this load."""

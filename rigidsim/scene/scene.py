@@ -13,6 +13,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
+from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
 from rigidsim.scene.sample_times import SampleTimes, sample_times
@@ -35,6 +36,7 @@ class Scene:
         inverse_inertia: pseudo-inverse of ``body.inertia``.
         axes, epoch: what the space axes and time 0 are, where the config says it or a load implies it.
         figure: the body's figure axis, see ``[frame] figure_axis``.
+        bodies: point masses that move beside the body; None without any.
         reference: unit normal (space axes) of the plane that obliquity and longitudes count from; None for
             the source's own, moving plane.
     """
@@ -60,6 +62,7 @@ class Scene:
     figure: Figure
     reference: Vector | None
     config: schema.Config
+    bodies: PointMasses | None = None
 
     @property
     def free_flight(self) -> bool:
@@ -107,7 +110,11 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     try:
         inverse = inverse_inertia(context, body)
         position, velocity = _translation(config, body, context)
-        resolved = _resolve_loads(config, body, context, free_flight=position is not None, span=(start, end))
+        free_flight, table = position is not None, config.body
+        masses = resolve_point_masses(
+            config.bodies, table.host, table.coupling, body.mass, context, free_flight=free_flight
+        )
+        resolved = _resolve_loads(config, body, context, masses, free_flight=free_flight, span=(start, end))
         gravity = _gravity(resolved, context)
         for number, load in enumerate(resolved):
             load.check(number, position)
@@ -137,6 +144,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             figure=figure_of(config, body, context),
             reference=reference_normal(config, context),
             config=config,
+            bodies=masses,
         )
     except ConfigError as error:
         raise error.at(experiment.source) from None
@@ -207,13 +215,19 @@ def _initial_rates(
 
 
 def _resolve_loads(
-    config: schema.Config, body: RigidBody, context: Any, *, free_flight: bool, span: tuple[Any, Any]
+    config: schema.Config,
+    body: RigidBody,
+    context: Any,
+    masses: PointMasses | None,
+    *,
+    free_flight: bool,
+    span: tuple[Any, Any],
 ) -> list[SceneLoad]:
     found = []
     tables = {name: table.text for name, table in config.tables.items()}
     for number, fields in enumerate(config.loads):
         fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
-        around = Surroundings(number, context, *fixed, tables, span)
+        around = Surroundings(number, context, *fixed, tables, span, masses)
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
         found.append(kind.resolve(fields, around))
     return found

@@ -43,6 +43,7 @@ from rigidsim.scene.fields import (
     refuse,
 )
 from rigidsim.scene.frame_table import Frame
+from rigidsim.scene.point_mass_table import PointMassBody
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.sweep_table import SweepTable
 from rigidsim.scene.validation_messages import nearest, shown
@@ -329,6 +330,9 @@ class Config(ConfigTable):
     body: Body = Field(description="what turns")
     initial: Initial = Field(description="the state at the start")
     loads: list[LoadFields] = Field(default_factory=list, description=_ABOUT_LOADS)
+    bodies: list[PointMassBody] = Field(
+        default_factory=list, description="point masses under mutual gravity, beside the body"
+    )
     events: list[EventTable] = Field(
         default_factory=list, description="where an expression of time and the state crosses zero"
     )

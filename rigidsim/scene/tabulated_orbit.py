@@ -23,7 +23,7 @@ import numpy as np
 
 from rigidsim.scene.element_table import ElementTable, TableError
 from rigidsim.scene.interpolation import ORDER, Interpolation, left_out
-from rigidsim.scene.orbits import eccentric_anomaly
+from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.records import dataclass
 
 AXIS, LONGITUDE = "axis", "longitude"

@@ -16,6 +16,7 @@ _TABLES = (
     "body",
     "initial",
     "loads",
+    "bodies",
     "frame",
     "time",
     "integrator",
@@ -26,7 +27,7 @@ _TABLES = (
     "sweep",
     "tables",
 )
-_ARRAYS_OF_TABLES = ("loads", "events")
+_ARRAYS_OF_TABLES = ("loads", "bodies", "events")
 _MEANT = {
     "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
     "stick": "rod", "pipe": "tube", "rectangle": "plate", "square": "plate", "donut": "torus",

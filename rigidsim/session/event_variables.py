@@ -12,7 +12,7 @@ from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import EventTimes
-from rigidsim.store.variables import LABELS, Extra, Variable
+from rigidsim.store.variables import LABELS, OF_THE_RUN, Extra, Variable
 
 
 def event_variables(
@@ -56,7 +56,7 @@ def refuse_taken_names(prepared: InitialValueProblem) -> None:
         ConfigError: an event's dimension or variables would be called like something else.
     """
     taken = {name for variable in dataset_variables(prepared) for name in variable.part_names()}
-    taken |= {*LABELS, *LYAPUNOV_NAMES, "checkpoint", "events"}
+    taken |= {*LABELS, *OF_THE_RUN, *LYAPUNOV_NAMES, "checkpoint", "events"}
     dates, variables = dates_of(prepared), recorded_variables(prepared)
     if dates is not None:
         variables += dates.variables

@@ -55,7 +55,7 @@ def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
 
     In single precision time has one too, since its labels are exact to a double.
     """
-    parts = prepared.precision.part_count
+    parts, bodies = prepared.precision.part_count, prepared.scene.bodies
     result = [time_variable(prepared.clock.part_count)]
     for recorded in prepared.system.recorded:
         attributes: dict[str, Any] = {"units": recorded.units, "long_name": recorded.long_name}
@@ -69,7 +69,8 @@ def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
         attributes |= recorded.attributes
         if recorded.invariant:
             attributes["invariant"] = 1
-        result.append(Variable(recorded.name, recorded.dims, attributes, parts))
+        own = {"point_mass": bodies.names} if bodies is not None and "point_mass" in recorded.dims else {}
+        result.append(Variable(recorded.name, recorded.dims, attributes, parts, own))
     return result
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.store import netcdf
 from rigidsim.store.validated_open import open_dataset
-from rigidsim.store.variables import LABELS
+from rigidsim.store.variables import LABELS, OF_THE_RUN
 
 if TYPE_CHECKING:
     import xarray
@@ -39,7 +39,7 @@ def join_segments(paths: Sequence[Path], *, status: str, indexed: bool = True) -
         for name, variable in first.variables.items():
             if variable.dims[:1] == ("time",):
                 joined[str(name)] = _joined(paths, starts, str(name), variable)
-            elif name in LABELS:
+            elif name in LABELS or name in OF_THE_RUN:
                 joined[str(name)] = variable.load()
         attributes = dict(first.attrs, status=status)
         known = [name for name in map(str, first.coords) if name in joined]

@@ -15,7 +15,7 @@ from rigidsim.store.collected import JoinedBlocks
 from rigidsim.store.netcdf import Block
 from rigidsim.store.run import Run
 from rigidsim.store.summary import Brief
-from rigidsim.store.variables import LABELS, Extra, Variable
+from rigidsim.store.variables import Extra, Variable, used_labels
 
 if TYPE_CHECKING:
     import xarray
@@ -81,9 +81,8 @@ class MemoryRun(Run):
         for extra in self.extras:
             found[extra.name] = xarray.Variable(extra.dims, extra.values, dict(extra.attributes))
         coordinates = {"time": found.pop("time")}
-        used = {dim for variable in self.variables for dim in variable.dims}
-        for dim in (dim for dim in LABELS if dim in used):
-            labels = np.array(LABELS[dim])
+        for dim, names in used_labels(self.variables).items():
+            labels = np.array(names)
             coordinates[dim] = xarray.Variable((dim,), labels, {"long_name": dim.replace("_", " ")})
         coordinates |= {n: found.pop(n) for n in list(found) if found[n].dims == (n,)}
         told = xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))

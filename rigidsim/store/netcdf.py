@@ -14,7 +14,7 @@ from h5py import h5d, h5ds
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store.netcdf_file import NetcdfFile, write_rows, writing
-from rigidsim.store.variables import LABELS, Extra, Variable
+from rigidsim.store.variables import Extra, Variable, used_labels
 
 CHUNK_ROWS = 8192
 GZIP_LEVEL = 4  # with shuffle: every reader opens it (other filters fail in some)
@@ -35,12 +35,10 @@ def declare(
     compressed: bool,
 ) -> Created:
     """Lay out dimensions, coordinates, variables and attributes."""
-    used = {dim for variable in variables for dim in variable.dims}
     file.attributes(attributes)
     file.dimension("time", rows)
-    for dim, labels in LABELS.items():
-        if dim in used:
-            file.labels(dim, labels, {"long_name": dim.replace("_", " ")})
+    for dim, labels in used_labels(variables).items():
+        file.labels(dim, labels, {"long_name": dim.replace("_", " ")})
     options = {"chunk_rows": min(CHUNK_ROWS, rows), "gzip": GZIP_LEVEL} if compressed and rows else {}
     return {
         name: file.variable(name, ("time", *variable.dims), variable.part_attributes(part), **options)

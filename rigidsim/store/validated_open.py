@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.variables import LABELS, SCHEMA_VERSION, is_bare_dimension
+from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, is_bare_dimension
 
 if TYPE_CHECKING:
     import xarray
@@ -77,12 +77,17 @@ def inspect(path: Path) -> None:
                 raise RunFolderError(f"{path}: the variable {name!a} lies in another file")
             if name in LABELS and item.shape != (len(LABELS[name]),):
                 raise RunFolderError(f"{path}: the coordinate {name} isn't labelled {LABELS[name]}")
-            if name not in LABELS:
+            if name not in LABELS and not _names(name, item):
                 _check_numbers(item, name, path)
             if name == "time":
                 rows = item.shape[0] if item.ndim == 1 else None
         if rows is None:
             raise RunFolderError(f"{path}: has no coordinate time; it is no dataset of rigidsim")
+
+
+def _names(name: str, item: Any) -> bool:
+    """Whether it is a coordinate of names that the run has of its own."""
+    return name in OF_THE_RUN and item.ndim == 1 and item.dtype.kind == "O"
 
 
 def _check_version(found: Any, path: Path) -> None:

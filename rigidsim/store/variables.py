@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from itertools import count, takewhile
 from typing import TYPE_CHECKING, Any
@@ -29,6 +29,9 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates beside time, with their labels."""
 
+OF_THE_RUN = ("point_mass",)
+"""Coordinates whose labels a run has of its own: names of ``[[bodies]]``."""
+
 SCHEMA_VERSION = 4
 """1: without seals. 2: files end with the SHA-256 of their content; checkpoints. 3: what was put back of held
 invariants along time (runs that hold none have the same variables as before). 4: dates along time (runs
@@ -48,20 +51,26 @@ class Variable:
     """A variable along time.
 
     Attributes:
-        dims: beside time; each is a key of ``LABELS``.
+        dims: beside time; each is a key of ``LABELS``, or among ``OF_THE_RUN``.
         attributes: units, long_name, frame, ...
         parts: how many float64 numbers hold one value exactly; part 0 has the plain name.
+        own_labels: of those dimensions whose labels are the run's.
     """
 
     name: str
     dims: tuple[str, ...]
     attributes: Mapping[str, Any] = field(default_factory=dict)
     parts: int = 1
+    own_labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    def labels(self, dim: str) -> Sequence[str]:
+        """Of one of its dimensions."""
+        return LABELS[dim] if dim in LABELS else self.own_labels[dim]
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Beside time."""
-        return tuple(len(LABELS[dim]) for dim in self.dims)
+        return tuple(len(self.labels(dim)) for dim in self.dims)
 
     def part_names(self) -> list[str]:
         """The value's own name, then those of its residuals."""
@@ -80,6 +89,12 @@ class Variable:
             "long_name": f"residual {part} of {self.name}",
             "residual_of": self.name,
         }
+
+
+def used_labels(variables: Iterable[Variable]) -> dict[str, Sequence[str]]:
+    """The dimensions that variables have beside time, in the order of a dataset, with their labels."""
+    found = {dim: variable.labels(dim) for variable in variables for dim in variable.dims}
+    return {dim: found[dim] for dim in (*LABELS, *OF_THE_RUN) if dim in found}
 
 
 def part_name(name: str, part: int) -> str:

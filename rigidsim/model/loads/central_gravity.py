@@ -11,11 +11,13 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads.gravity_gradient import gradient_terms, positive_strength, tidal_range
+from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.orbits import Orbit, attracting_body
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
@@ -25,8 +27,13 @@ class CentralGravityFields(LoadFields):
     """A point that attracts a freely flying body: force and torque to second degree."""
 
     kind: Literal["central_gravity"]
-    gravitational_parameter: GravitationalParameter = Field(
-        description="G M of the attracting point", examples=["3.986004418e14 m^3/s^2"]
+    gravitational_parameter: GravitationalParameter | None = Field(
+        default=None, description="G M of the attracting point", examples=["3.986004418e14 m^3/s^2"]
+    )
+    orbit: Orbit | None = Field(
+        default=None,
+        description="names the one of [[bodies]] that attracts, in place of parameter and position",
+        examples=[{"body": "earth"}],
     )
     position: Triple[Metre] = Field(
         default_factory=lambda: [ZERO] * 3,
@@ -54,8 +61,16 @@ class CentralGravity(Load):
     has_source = True
 
     @classmethod
-    def resolve(cls, fields: CentralGravityFields, around: Surroundings) -> CentralGravity:
+    def resolve(cls, fields: CentralGravityFields, around: Surroundings) -> Load:
         """See ``SceneLoad``."""
+        if fields.orbit is not None:
+            if fields.orbit.body is None:
+                raise around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed")
+            number = attracting_body(fields.orbit, around)
+            for key in ("gravitational_parameter", "position"):
+                if key in fields.model_fields_set:
+                    raise around.fault(key, "given beside orbit.body, which says it; remove it")
+            return MovingSource(around.carried_bodies, number, pulls=True)
         strength = positive_strength(fields.gravitational_parameter, around)
         return cls(strength, [x.at(around.context) for x in fields.position])
 

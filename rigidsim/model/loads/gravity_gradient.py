@@ -12,6 +12,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
+from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
@@ -20,7 +21,7 @@ from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.orbit_of_table import resolve_tabulated_orbit
-from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
+from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
@@ -33,8 +34,8 @@ class GravityGradientFields(LoadFields):
     """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]
-    gravitational_parameter: GravitationalParameter = Field(
-        description="G M of the attracting body", examples=["3.986004418e14 m^3/s^2"]
+    gravitational_parameter: GravitationalParameter | None = Field(
+        default=None, description="G M of the attracting body", examples=["3.986004418e14 m^3/s^2"]
     )
     orbit: Orbit | None = Field(
         default=None,
@@ -73,8 +74,13 @@ class GravityGradient(Load):
     has_source = True
 
     @classmethod
-    def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> GravityGradient:
+    def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> Load:
         """See ``SceneLoad``."""
+        if fields.orbit is not None and fields.orbit.body is not None:
+            for key in ("gravitational_parameter", "position", "ephemeris"):
+                if getattr(fields, key) is not None:
+                    raise around.fault(key, "given beside orbit.body, which says it; remove it")
+            return MovingSource(around.carried_bodies, attracting_body(fields.orbit, around), pulls=False)
         strength, context = positive_strength(fields.gravitational_parameter, around), around.context
         given = [key for key in ("orbit", "position", "ephemeris") if getattr(fields, key) is not None]
         if len(given) != 1:
@@ -235,8 +241,10 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
     """A gravitational parameter, m^3/s^2 (mpf).
 
     Raises:
-        ConfigError: it isn't positive.
+        ConfigError: it isn't there, or isn't positive.
     """
+    if given is None:
+        raise around.fault("gravitational_parameter", "missing; it is needed")
     if given.sign <= 0:
         raise around.fault("gravitational_parameter", f"given {float(given):g}; a positive number is allowed")
     return given.at(around.context)

@@ -91,6 +91,9 @@ class MagneticDipole(Load):
         if fields.orbit is None:
             return cls(moment, _numbers(fields.field or [], around))
         motion = None if strength is None else strength.at(around.context)
+        if fields.orbit.body is not None:
+            what = "given for a magnetic_dipole, which takes elements alone; gravity_gradient takes a body"
+            raise around.fault("orbit.body", what)
         if fields.orbit.table is not None:
             what = "given for a magnetic_dipole, which takes elements alone; gravity_gradient takes a table"
             raise around.fault("orbit.table", what)

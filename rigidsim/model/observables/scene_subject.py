@@ -32,7 +32,11 @@ def is_planet(m: Mechanics) -> bool:
     """Whether a fast spin precesses under the gravity gradient of a body on an orbit, or of an ephemeris."""
     if m.attitude is None or not m.turning:
         return False
-    distant = [x for x in m.turning if x.orbit or x.table or getattr(x, "ephemeris", None) is not None]
+    distant = [
+        x
+        for x in m.turning
+        if x.orbit or x.table or x.masses_beside or getattr(x, "ephemeris", None) is not None
+    ]
     fast = norm(m.scene.context, m.scene.angular_velocity) >= _FAST * source_rate(m.scene)
     return len(distant) == len(m.turning) and bool(fast) and _turns_about_its_figure(m)
 

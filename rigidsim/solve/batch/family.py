@@ -40,6 +40,7 @@ class Alone(Enum):
     ANGLES = "full turns of recorded angles are counted along the motion"
     SWITCHING = "the equations change along the motion"
     TABLE = "an orbit goes by a table"
+    BODIES = "point masses move beside the body"
     LYAPUNOV = "the Lyapunov spectrum has an integrator of its own"
     KEY = "what is swept is not a number of the body, the start, a load or a parameter"
     UNTRACEABLE = "the equations depend on what is swept in a way that can't be told beforehand"
@@ -83,6 +84,8 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
         return Alone.SWITCHING
     if system.pieces is not None:
         return Alone.TABLE
+    if system.scene.bodies is not None:
+        return Alone.BODIES
     planar = system.requirements.formulation == "planar"
     if system.partner is not None or (system.angle_states and not planar):
         return Alone.CHART

@@ -1,0 +1,197 @@
+"""Point masses that move beside the body: where they are, and what their motion keeps.
+
+Left to themselves (coupling "one_way") they keep energy, momentum and angular momentum; where they feel the
+body ("full") the whole does. Masses in kg are G M / G, with G such that the host's is the body's own, or
+CODATA's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.drift_scales import rotational_scale
+from rigidsim.model.loads.moving_source import MovingSource
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables.observable import SPACE, Observable, same_unit
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import exponent
+from rigidsim.scene.arithmetic import Vector, apply, cross, norm
+from rigidsim.scene.point_masses import PointMasses
+from rigidsim.scene.registry import register_observable
+
+EACH = ("point_mass", *SPACE)
+
+
+def _masses(m: Mechanics) -> PointMasses:
+    return m.carried(m.scene.bodies)
+
+
+def _kilograms(m: Mechanics) -> Vector:
+    """Mass of each."""
+    masses = _masses(m)
+    constant = masses.constant(m.scene.context, m.scene.body.mass)
+    return [x / constant for x in masses.strengths]
+
+
+def _moving(m: Mechanics) -> list[tuple[Any, list[Symbolic], list[Symbolic], Vector, Vector]]:
+    """Mass, position and velocity (expressions, and at the start) of all that move: the body too, where it
+    flies by itself and is felt.
+    """
+    states, masses = m.carried(m.point_masses), _masses(m)
+    found = list(
+        zip(
+            _kilograms(m),
+            states.positions,
+            states.velocities,
+            masses.positions,
+            masses.velocities,
+            strict=True,
+        )
+    )
+    if masses.full and masses.host is None:
+        start = m.carried(m.scene.position), m.carried(m.scene.velocity)
+        found.append((m.carried(m.scene.body.mass), m.carried(m.position), m.carried(m.velocity), *start))
+    return found
+
+
+# --- sizes at the start, SI -------------------------------------------------------------------------------
+
+
+def _pairs(count: int) -> list[tuple[int, int]]:
+    return [(i, j) for i in range(count) for j in range(i + 1, count)]
+
+
+def _energy_scale(m: Mechanics) -> tuple[Any, str]:
+    context, masses, kilograms = m.scene.context, _masses(m), _kilograms(m)
+    size = sum((k * norm(context, v) ** 2 / 2 for k, _, _, _, v in _moving(m)), context.zero)
+    for i, j in _pairs(len(masses.names)):
+        place = [a - b for a, b in zip(masses.positions[i], masses.positions[j], strict=True)]
+        size += kilograms[i] * masses.strengths[j] / norm(context, place)
+    name = "kinetic energy plus size of the potential energy at the start"
+    if masses.full:
+        size += rotational_scale(m)[0]
+    return (size or context.one), name
+
+
+def _angular_scale(m: Mechanics) -> tuple[Any, str]:
+    context = m.scene.context
+    size = sum((k * norm(context, cross(x, v)) for k, _, _, x, v in _moving(m)), context.zero)
+    if _masses(m).full:
+        size += norm(context, apply(m.scene.body.inertia, m.scene.angular_velocity))
+    return (size or context.one), "sum of the sizes of all angular momenta at the start"
+
+
+def _linear_scale(m: Mechanics) -> tuple[Any, str]:
+    size = sum((k * norm(m.scene.context, v) for k, _, _, _, v in _moving(m)), m.scene.context.zero)
+    return (size or m.scene.context.one), "sum of the sizes of all momenta at the start"
+
+
+def _unit(scale: Any) -> Any:
+    return lambda m: exponent(m.scene.context, scale(m)[0])
+
+
+_ENERGY, _ANGULAR, _LINEAR = _unit(_energy_scale), _unit(_angular_scale), _unit(_linear_scale)
+
+# --- expressions ------------------------------------------------------------------------------------------
+
+
+def _energy(m: Mechanics) -> list[Symbolic]:
+    context, scaling, masses, unit = m.scene.context, m.scaling, _masses(m), _ENERGY(m)
+    kilograms, states = _kilograms(m), m.carried(m.point_masses)
+    terms = []
+    for mass, _, velocity, _, _ in _moving(m):
+        half = m.number(context.ldexp(mass / 2, 2 * scaling.speed - unit))
+        terms.append(half * hy.sum([v * v for v in velocity]))
+    for (i, j), inverse in states.inverse_distances.items():
+        pair = kilograms[i] * masses.strengths[j]
+        terms.append(m.number(context.ldexp(-pair, -scaling.length - unit)) * inverse)
+    if masses.full:
+        own = m.number(context.ldexp(context.one, scaling.energy - unit))
+        terms.append(own * m.rotational_energy)
+        terms += [own * m.carried(load.potential(m)) for load in m.loads]
+    return [hy.sum(terms)]
+
+
+def _angular(m: Mechanics) -> list[Symbolic]:
+    context, scaling, unit = m.scene.context, m.scaling, _ANGULAR(m)
+    terms: list[list[Symbolic]] = [[], [], []]
+    for mass, place, velocity, _, _ in _moving(m):
+        factor = m.number(context.ldexp(mass, scaling.length + scaling.speed - unit))
+        for found, x in zip(terms, cross(place, velocity), strict=True):
+            found.append(factor * x)
+    if _masses(m).full:
+        own = m.number(context.ldexp(context.one, scaling.momentum - unit))
+        for found, x in zip(terms, m.momentum_space, strict=True):
+            found.append(own * x)
+    return [hy.sum(found) for found in terms]
+
+
+def _linear(m: Mechanics) -> list[Symbolic]:
+    context, scaling, unit = m.scene.context, m.scaling, _LINEAR(m)
+    terms: list[list[Symbolic]] = [[], [], []]
+    for mass, _, velocity, _, _ in _moving(m):
+        factor = m.number(context.ldexp(mass, scaling.speed - unit))
+        for found, v in zip(terms, velocity, strict=True):
+            found.append(factor * v)
+    return [hy.sum(found) for found in terms]
+
+
+def _flat(vectors: Sequence[list[Symbolic]]) -> list[Symbolic]:
+    return [x for vector in vectors for x in vector]
+
+
+# --- when they are constant -------------------------------------------------------------------------------
+
+
+def _kept(m: Mechanics) -> str | None:
+    if not _masses(m).full:
+        return "the point masses feel each other's gravity alone"
+    if any(not isinstance(load, MovingSource) for load in m.loads):
+        return None
+    return "all forces are those of the bodies on each other"
+
+
+def _alone(m: Mechanics) -> str | None:
+    return "the bodies feel this one, too (system_...); leave it out" if _masses(m).full else None
+
+
+def _whole(m: Mechanics) -> str | None:
+    if not _masses(m).full:
+        return 'the bodies don\'t feel this one (orbital_...); leave it out, or set [body] coupling = "full"'
+    return None if _kept(m) else "other loads than those of the bodies act; leave it out"
+
+
+_POINTS = ("point_masses",)
+_WITH_BODY = ("point_masses", "attitude", "place")
+for _observable in (
+    Observable(
+        "point_mass_position", EACH, "m", "positions of the point masses",
+        lambda m: _flat(m.carried(m.point_masses).positions),
+        lambda m: [m.scaling.length] * 3 * len(_masses(m).names), "space axes", _POINTS,
+    ),
+    Observable(
+        "point_mass_velocity", EACH, "m s-1", "velocities of the point masses",
+        lambda m: _flat(m.carried(m.point_masses).velocities),
+        lambda m: [m.scaling.speed] * 3 * len(_masses(m).names), "space axes", _POINTS,
+    ),
+    *(
+        Observable(
+            f"{which}_{name}", dims, units, long_name, expressions, same_unit(unit, 3 if dims else 1),
+            "space axes" if dims else "", needs, _kept, scale, absent=absent,
+        )
+        for which, needs, absent, of in (
+            ("orbital", _POINTS, _alone, "of the point masses"),
+            ("system", _WITH_BODY, _whole, "of body and point masses together"),
+        )
+        for name, dims, units, long_name, expressions, unit, scale in (
+            ("energy", (), "J", f"energy {of}", _energy, _ENERGY, _energy_scale),
+            ("angular_momentum", SPACE, "kg m2 s-1", f"angular momentum {of}", _angular,
+             _ANGULAR, _angular_scale),
+            ("linear_momentum", SPACE, "kg m s-1", f"linear momentum {of}", _linear, _LINEAR, _linear_scale),
+        )
+    ),
+):  # fmt: skip
+    register_observable(_observable)

@@ -1,0 +1,46 @@
+"""``[[bodies]]``: the keys of point masses that move beside the body."""
+
+from __future__ import annotations
+
+from pydantic import Field, StrictStr
+
+from rigidsim.scene.exact import ZERO
+from rigidsim.scene.fields import (
+    Angle,
+    ConfigTable,
+    Dimensionless,
+    GravitationalParameter,
+    Metre,
+    Speed,
+    Triple,
+)
+
+
+class StartingOrbit(ConfigTable):
+    """Osculating elements at the start, about another of the bodies."""
+
+    about: StrictStr = Field(description="name of the body that the elements are about", examples=["sun"])
+    semi_major_axis: Metre = Field(description="of the ellipse", examples=["1 au"])
+    eccentricity: Dimensionless = Field(default=ZERO, description="0 to below 1")
+    inclination: Angle = Field(default=ZERO, description="to the plane XY of space")
+    ascending_node: Angle = Field(default=ZERO, description="its longitude from X")
+    periapsis: Angle = Field(default=ZERO, description="from the ascending node")
+    mean_anomaly: Angle = Field(default=ZERO, description="at the start")
+
+
+class PointMassBody(ConfigTable):
+    """A point mass under the gravity of all others."""
+
+    name: StrictStr = Field(
+        description="letters, digits and underscores, beginning with a letter", examples=["sun"]
+    )
+    gravitational_parameter: GravitationalParameter = Field(
+        description="G M", examples=["1.32712440018e20 m^3/s^2"]
+    )
+    position: Triple[Metre] | None = Field(default=None, description="at the start, space axes")
+    velocity: Triple[Speed] | None = Field(default=None, description="at the start, space axes")
+    orbit: StartingOrbit | None = Field(
+        default=None,
+        description="elements at the start, in place of position and velocity",
+        examples=[{"about": "sun", "semi_major_axis": "1 au", "eccentricity": 0.0167}],
+    )

@@ -1,0 +1,232 @@
+"""Point masses under mutual gravity: what ``[[bodies]]`` describes, with every number worked out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.kepler import eccentric_anomaly
+from rigidsim.scene.point_mass_table import PointMassBody, StartingOrbit
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.validation_messages import nearest, shown
+
+GRAVITATIONAL_CONSTANT = "6.67430e-11"
+"""m^3/(kg s^2), CODATA 2018 and 2022: for masses in kg where only gravitational parameters are known."""
+_SAME_MASS = 0.01
+"""Relative difference up to which a mass and a gravitational parameter mean the same body: G is uncertain by
+2e-5, and published masses of asteroids by per cents."""
+_MOST = 64
+_CLOSEST = 1000
+"""A scale of distance is at least this part of the initial one: it must not vanish for a plunging orbit."""
+
+
+@dataclass(frozen=True)
+class PointMasses:
+    """At the start of a run; numbers are mpf, SI, space axes.
+
+    Attributes:
+        strengths: gravitational parameters, m^3/s^2.
+        positions, velocities: one vector for each.
+        host: number of the one that the rigid body is; None where it is none of them.
+        full: whether they feel the rigid body's torques and the forces of its shape.
+    """
+
+    names: tuple[str, ...]
+    strengths: Vector
+    positions: tuple[Vector, ...]
+    velocities: tuple[Vector, ...]
+    host: int | None
+    full: bool
+
+    def constant(self, context: Any, mass: Any | None) -> Any:
+        """G, by which masses in kg follow: that of the host's own mass (kg) where it is known and reacts."""
+        if self.full and self.host is not None and mass is not None:
+            return self.strengths[self.host] / mass
+        return context.mpf(GRAVITATIONAL_CONSTANT)
+
+    def encounter(self, context: Any, one: int, other: int) -> tuple[Any, Any]:
+        """As of ``closest``, of two of them."""
+        place = [a - b for a, b in zip(self.positions[one], self.positions[other], strict=True)]
+        moving = [a - b for a, b in zip(self.velocities[one], self.velocities[other], strict=True)]
+        return closest(context, place, moving, self.strengths[one] + self.strengths[other])
+
+
+def closest(context: Any, place: Vector, moving: Vector, strength: Any) -> tuple[Any, Any]:
+    """Least distance (m) of two masses left to themselves, and the angular rate there (rad/s).
+
+    Args:
+        place, moving: relative position and velocity.
+        strength: sum of their gravitational parameters.
+    """
+    distance, speed = norm(context, place), norm(context, moving)
+    momentum = norm(context, cross(place, moving))
+    energy = speed**2 / 2 - strength / distance
+    squared = 1 + 2 * energy * momentum**2 / strength**2
+    e = context.sqrt(squared) if squared > 0 else context.zero
+    nearest_ = momentum**2 / strength / (1 + e)
+    if nearest_ > distance:
+        nearest_ = distance
+    if nearest_ < distance / _CLOSEST:
+        nearest_ = distance / _CLOSEST
+    return nearest_, context.sqrt(2 * strength / nearest_ + speed**2) / nearest_
+
+
+def _fault(number: int, key: str, text: str) -> ConfigError:
+    return ConfigError(Problem(f"[[bodies]] number {number + 1} {key}", text))
+
+
+def resolve_point_masses(
+    tables: Sequence[PointMassBody],
+    host: str | None,
+    coupling: str | None,
+    mass: Any | None,
+    context: Any,
+    *,
+    free_flight: bool,
+) -> PointMasses | None:
+    """Work out where they start; None without any.
+
+    Args:
+        host, coupling: of ``[body]``.
+        mass: of the rigid body, kg (mpf).
+        free_flight: whether the rigid body has a position of its own.
+
+    Raises:
+        ConfigError: a contradiction or a value out of range.
+    """
+    if not tables:
+        for key, given in (("host", host), ("coupling", coupling)):
+            if given is not None:
+                what = f'given "{given}", but there are no [[bodies]]; add them, or remove it'
+                raise ConfigError(Problem(f"[body] {key}", what))
+        return None
+    names = [table.name for table in tables]
+    _check_names(names)
+    at_host = _host(host, names, free_flight)
+    full = coupling == "full"
+    strengths = [table.gravitational_parameter.at(context) for table in tables]
+    for number, strength in enumerate(strengths):
+        if not strength > 0:
+            raise _fault(
+                number,
+                "gravitational_parameter",
+                f"given {context.nstr(strength, 8)}; a positive number is allowed",
+            )
+    if full and mass is None:
+        what = 'missing; coupling = "full" needs it, since the bodies feel the forces of this one'
+        raise ConfigError(Problem("[body] mass", what))
+    if full and at_host is not None:
+        expected = strengths[at_host] / context.mpf(GRAVITATIONAL_CONSTANT)
+        if abs(mass - expected) > _SAME_MASS * expected:
+            what = f"given {context.nstr(mass, 6)} kg, but the gravitational parameter of its host "
+            what += f'"{names[at_host]}" makes it {context.nstr(expected, 6)} kg; correct one of them'
+            raise ConfigError(Problem("[body] mass", what))
+    places: dict[int, tuple[Vector, Vector]] = {}
+    for number in range(len(tables)):
+        _place(number, tables, names, strengths, context, places, ())
+    positions = [places[n][0] for n in range(len(tables))]
+    velocities = [places[n][1] for n in range(len(tables))]
+    if all(table.position is None and table.velocity is None for table in tables):
+        positions, velocities = (_about_barycentre(x, strengths) for x in (positions, velocities))
+    for i in range(len(tables)):
+        for j in range(i):
+            if positions[i] == positions[j]:
+                raise _fault(i, "position", f'the same as that of "{names[j]}"; start it elsewhere')
+    return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
+
+
+def _check_names(names: Sequence[str]) -> None:
+    if len(names) > _MOST:
+        raise ConfigError(Problem("[[bodies]]", f"given {len(names)}; at most {_MOST} are allowed"))
+    for number, name in enumerate(names):
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", name):
+            allowed = "letters, digits and underscores are allowed, beginning with a letter"
+            raise _fault(number, "name", f"given {shown(name)}; {allowed}")
+        if name in names[:number]:
+            raise _fault(number, "name", f'given "{name}", as another body; give each a name of its own')
+
+
+def _host(host: str | None, names: Sequence[str], free_flight: bool) -> int | None:
+    if host is None:
+        if not free_flight:
+            what = "missing; name the one of [[bodies]] that this body is, or give it an [initial] position "
+            raise ConfigError(Problem("[body] host", what + "and velocity of its own"))
+        return None
+    if host not in names:
+        what = f"given {shown(host)}{nearest(host, names)}; allowed: {', '.join(names)}"
+        raise ConfigError(Problem("[body] host", what))
+    if free_flight:
+        what = f'given "{host}" beside [initial] position or velocity; remove one of them'
+        raise ConfigError(Problem("[body] host", what))
+    return names.index(host)
+
+
+def _place(
+    number: int,
+    tables: Sequence[PointMassBody],
+    names: Sequence[str],
+    strengths: Vector,
+    context: Any,
+    places: dict[int, tuple[Vector, Vector]],
+    asking: tuple[int, ...],
+) -> tuple[Vector, Vector]:
+    """Position and velocity of one, and of those that it goes about."""
+    if number in places:
+        return places[number]
+    table, zero = tables[number], [context.zero] * 3
+    if table.orbit is None:
+        alone = table.position is None and table.velocity is None
+        if alone and any(t is not table and t.orbit is t.position is t.velocity is None for t in tables):
+            raise _fault(number, "position", "missing; only one body may be left where all others start from")
+        place = [x.at(context) for x in table.position] if table.position else list(zero)
+        moving = [x.at(context) for x in table.velocity] if table.velocity else list(zero)
+    else:
+        if table.position is not None or table.velocity is not None:
+            raise _fault(number, "orbit", "given beside position or velocity; remove one of them")
+        about = table.orbit.about
+        others = [name for name in names if name != table.name]
+        if about not in others:
+            what = f"given {shown(about)}{nearest(about, others)}; allowed: {', '.join(others) or 'none'}"
+            raise _fault(number, "orbit.about", what)
+        centre = names.index(about)
+        if centre in asking:
+            raise _fault(number, "orbit.about", f'given "{about}", which goes about this body itself')
+        r, v = _place(centre, tables, names, strengths, context, places, (*asking, number))
+        x, u = _of_elements(number, table.orbit, strengths[centre] + strengths[number], context)
+        place = [a + b for a, b in zip(r, x, strict=True)]
+        moving = [a + b for a, b in zip(v, u, strict=True)]
+    places[number] = place, moving
+    return places[number]
+
+
+def _of_elements(number: int, orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vector, Vector]:
+    """Relative position and velocity of osculating elements (Murray & Dermott 1999, sections 2.4 and 2.8)."""
+    a, e = orbit.semi_major_axis.at(context), orbit.eccentricity.at(context)
+    if not a > 0:
+        raise _fault(
+            number,
+            "orbit.semi_major_axis",
+            f"given {context.nstr(a, 8)} m; a positive length is allowed",
+        )
+    if not 0 <= e < 1:
+        what = f"given {context.nstr(e, 8)}; 0 (a circle) to below 1 is allowed"
+        raise _fault(number, "orbit.eccentricity", what)
+    anomaly = eccentric_anomaly(context, orbit.mean_anomaly.at(context), e)
+    c, s, root = context.cos(anomaly), context.sin(anomaly), context.sqrt(1 - e * e)
+    angles = (orbit.ascending_node, orbit.inclination, orbit.periapsis)
+    (cn, sn), (ci, si), (cw, sw) = ((context.cos(x.at(context)), context.sin(x.at(context))) for x in angles)
+    p = [cn * cw - sn * sw * ci, sn * cw + cn * sw * ci, sw * si]
+    q = [-cn * sw - sn * cw * ci, -sn * sw + cn * cw * ci, cw * si]
+    speed = context.sqrt(strength / a) / (1 - e * c)
+    place = [a * ((c - e) * x + root * s * y) for x, y in zip(p, q, strict=True)]
+    moving = [speed * (root * c * y - s * x) for x, y in zip(p, q, strict=True)]
+    return place, moving
+
+
+def _about_barycentre(vectors: Sequence[Vector], strengths: Vector) -> list[Vector]:
+    whole = sum(strengths)
+    mean = [sum(s * v[i] for s, v in zip(strengths, vectors, strict=True)) / whole for i in range(3)]
+    return [[x - y for x, y in zip(v, mean, strict=True)] for v in vectors]

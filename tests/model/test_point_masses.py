@@ -1,0 +1,270 @@
+"""Point masses that move beside the body: against Kepler's closed form, heyoka's own n-body equations and the
+six-degree motion about a fixed point; what each coupling keeps.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import heyoka as hy
+import numpy as np
+import pytest
+import xarray
+from support import IMPATIENT, law, run_text, same_bits
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.solve.problem import prepare
+
+EPS = 2.0**-52
+AU, SUN, EARTH, MOON = 149597870700.0, 1.32712440018e20, 3.986004418e14, 4.9028e12
+DAY = 86400.0
+PLANET = """
+name = "planet"
+[body]
+principal_moments = ["8.010e37 kg m^2", "8.012e37 kg m^2", "8.0365e37 kg m^2"]
+mass = "5.97219e24 kg"
+%s
+[initial]
+euler_angles = [0, "23.44 deg", 0]
+angular_velocity = [0, 0, "36 deg/day"]
+%s
+[time]
+end = "40 day"
+samples = 9
+"""
+BODIES = f"""
+[[bodies]]
+name = "sun"
+gravitational_parameter = {SUN!r}
+[[bodies]]
+name = "earth"
+gravitational_parameter = {EARTH!r}
+[bodies.orbit]
+about = "sun"
+semi_major_axis = "1 au"
+eccentricity = 0.3
+inclination = "7 deg"
+ascending_node = 0.4
+periapsis = 1.1
+mean_anomaly = 6.1
+"""
+THIRD = f"""
+[[bodies]]
+name = "moon"
+gravitational_parameter = {MOON!r}
+orbit = {{about = "earth", semi_major_axis = "384400 km", eccentricity = 0.0549, inclination = "5.145 deg"}}
+"""
+
+
+def gradient(name: str) -> str:
+    return f'[[loads]]\nkind = "gravity_gradient"\norbit = {{body = "{name}"}}\n'
+
+
+def planet(coupling: str, *, moon: bool = True) -> str:
+    masses = BODIES + (THIRD + gradient("moon") if moon else "") + gradient("sun")
+    return PLANET % (f'host = "earth"\ncoupling = "{coupling}"', masses)
+
+
+@pytest.fixture(scope="module", params=["one_way", "full"])
+def planetary(request: pytest.FixtureRequest) -> tuple[str, rigidsim.Run]:
+    return request.param, run_text(planet(request.param))
+
+
+def test_what_each_coupling_keeps(planetary: tuple[str, rigidsim.Run]) -> None:
+    coupling, run = planetary
+    which = "system" if coupling == "full" else "orbital"
+    other = "orbital" if coupling == "full" else "system"
+    dataset = run.dataset
+    # each step rounds all positions and velocities (Brouwer 1937): a random walk, of some terms for each mass
+    bound = 8 * EPS * math.sqrt(run.summary["cost"]["steps"]) * 3
+    for name in ("energy", "angular_momentum", "linear_momentum"):
+        assert float(np.abs(dataset[f"{which}_{name}_drift"]).max()) < bound
+        assert f"{other}_{name}" not in dataset
+    assert float(np.abs(dataset.energy_balance_drift).max()) < bound  # the spin takes what torques give it
+
+
+def test_positions_are_those_of_heyokas_own_equations(planetary: tuple[str, rigidsim.Run]) -> None:
+    coupling, run = planetary
+    dataset = run.dataset
+    assert list(dataset.point_mass.values) == ["sun", "earth", "moon"]
+    assert dataset.point_mass_position.dims == ("time", "point_mass", "space_axis")
+    places, speeds = dataset.point_mass_position.values, dataset.point_mass_velocity.values
+    unit = 2.0**37, 2.0**15  # m and m/s, so that numbers are of order one
+    strengths = [s / unit[0] / unit[1] ** 2 for s in (SUN, EARTH, MOON)]
+    start = np.concatenate(
+        [np.concatenate([x / unit[0], v / unit[1]]) for x, v in zip(places[0], speeds[0], strict=True)]
+    )
+    engine = hy.taylor_adaptive(hy.model.nbody(3, masses=strengths), start, compact_mode=True)
+    engine.propagate_until(40 * DAY * unit[1] / unit[0])
+    found = engine.state.reshape(3, 6)[:, :3] * unit[0]
+    # rounding of places of an astronomical unit, which velocities carry along for so many days
+    rounding = 16 * EPS * AU * math.sqrt(run.summary["cost"]["steps"])
+    apart = np.abs(places[-1] - found).max()
+    if coupling == "one_way":
+        assert apart < rounding
+    else:  # the Moon feels the Earth's flattening, by 3/2 (C - A) / (M a^2) = 5e-8 of its fall, t^2/2 of it
+        assert 10 * rounding < apart < 1e-6 * 0.5 * EARTH / 384.4e6**2 * (40 * DAY) ** 2
+
+
+def test_one_mass_is_keplers_closed_form() -> None:
+    """The same spin under the same orbit given by its elements: the Sun as the planet sees it."""
+    run = run_text(planet("one_way", moon=False)).dataset
+    period = 2 * math.pi * math.sqrt(AU**3 / (SUN + EARTH))
+    # the planet's orbit about the Sun is, turned by half a turn, the Sun's about the planet
+    orbit = (
+        f'{{semi_major_axis = "1 au", eccentricity = 0.3, inclination = "7 deg", ascending_node = 0.4, '
+        f"periapsis = {1.1 + math.pi!r}, mean_anomaly = 6.1, period = {period!r}}}"
+    )
+    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = {SUN!r}\norbit = {orbit}\n'
+    kepler = run_text(PLANET % ("", load)).dataset
+    rounding = law(EPS, 1000, math.radians(36) / DAY, 40 * DAY)
+    apart = np.abs(run.quaternion.values - kepler.quaternion.values).max()
+    assert apart < 4 * rounding
+    drawn = run_text(
+        planet("one_way", moon=False).replace("eccentricity = 0.3", "eccentricity = 0.3001")
+    ).dataset
+    assert np.abs(drawn.quaternion.values - kepler.quaternion.values).max() > 100 * rounding
+
+
+# --- six degrees of freedom: a long body about a planet, its shape felt in its path ----------------
+
+DUMBBELL = """
+name = "dumbbell"
+[body]
+principal_moments = ["1e13 kg m^2", "2e14 kg m^2", "2.05e14 kg m^2"]
+mass = "1000 kg"
+%s
+[initial]
+angular_velocity = [1e-3, 2e-4, 8e-4]
+quaternion = [0.9, 0.2, -0.1, 0.3]
+%s
+[time]
+end = "3 h"
+samples = 13
+"""
+POSITION, VELOCITY = [9.0e6, 1.0e5, -4.0e5], [-300.0, 6500.0, 900.0]
+ATTRACTOR = f'[[bodies]]\nname = "planet"\ngravitational_parameter = {EARTH!r}\nposition = [0, 0, 0]\n'
+FLIGHT = f"position = {POSITION}\nvelocity = {VELOCITY}\n"
+SATELLITE = f'[[bodies]]\nname = "satellite"\ngravitational_parameter = 6.6743e-8\n{FLIGHT}'  # of 1000 kg
+
+
+@pytest.fixture(scope="module")
+def about_a_fixed_point() -> xarray.Dataset:
+    load = f'[[loads]]\nkind = "central_gravity"\ngravitational_parameter = {EARTH!r}\n'
+    return run_text(DUMBBELL % ("", FLIGHT + load)).dataset
+
+
+@pytest.mark.parametrize("way", ["host", "own flight"])
+def test_full_coupling_is_six_degree_central_gravity(way: str, about_a_fixed_point: xarray.Dataset) -> None:
+    """The planet is 6e21 times as heavy, so that it stays where it is to all digits."""
+    expected = about_a_fixed_point
+
+    def run(coupling: str) -> xarray.Dataset:
+        given = f'coupling = "{coupling}"'
+        if way == "host":
+            masses = ATTRACTOR + SATELLITE + gradient("planet")
+            return run_text(DUMBBELL % (f'host = "satellite"\n{given}', masses)).dataset
+        pulled = '[[loads]]\nkind = "central_gravity"\norbit = {body = "planet"}\n'
+        return run_text(DUMBBELL % (given, FLIGHT + ATTRACTOR + pulled)).dataset
+
+    def place(dataset: xarray.Dataset) -> np.ndarray:
+        if way == "host":
+            return dataset.point_mass_position.sel(point_mass="satellite").values
+        return dataset.position.values
+
+    full = run("full")
+    rounding = law(EPS, 200, 1.3e-3, 3 * 3600.0)  # relative to the distance, and as an angle
+    amplified = 64  # of the orbit's along-track errors and the tumbling's, over the law of free rotation
+    assert np.abs(place(full) - expected.position.values).max() < amplified * rounding * 9e6
+    assert np.abs(full.quaternion.values - expected.quaternion.values).max() < amplified * rounding
+    for name in ("energy", "angular_momentum", "linear_momentum"):
+        assert float(np.abs(full[f"system_{name}_drift"]).max()) < 8 * EPS * math.sqrt(200) * 3
+    if way == "host":  # and without the forces of its shape it moves elsewhere
+        assert np.abs(place(run("one_way")) - expected.position.values).max() > 1e3
+    else:  # a body that flies by itself feels its own shape in either case
+        assert np.abs(place(run("one_way")) - expected.position.values).max() < amplified * rounding * 9e6
+
+
+def test_action_is_reaction_between_equals() -> None:
+    """A planet hardly heavier than the body: all that is kept belongs to both."""
+    light = ATTRACTOR.replace(repr(EARTH), "2e-6")
+    satellite = SATELLITE.replace(str(POSITION), "[1000, 0, 0]").replace(str(VELOCITY), "[0, 4e-5, 1e-5]")
+    text = DUMBBELL % ('host = "satellite"\ncoupling = "full"', light + satellite + gradient("planet"))
+    text = (
+        text.replace("1e13", "1e6")
+        .replace("2e14", "2e7")
+        .replace("2.05e14", "2.05e7")
+        .replace('"3 h"', '"90 day"')
+    )
+    run = run_text(text.replace("[1e-3, 2e-4, 8e-4]", "[1e-7, 2e-7, 8e-7]"))
+    dataset = run.dataset
+    bound = 16 * EPS * math.sqrt(run.summary["cost"]["steps"]) * 3
+    for name in ("energy", "angular_momentum", "linear_momentum"):
+        assert float(np.abs(dataset[f"system_{name}_drift"]).max()) < bound
+    spin = np.linalg.norm(dataset.angular_momentum - dataset.angular_momentum[0], axis=1)
+    scale = dataset.system_angular_momentum_drift.attrs["scale"]
+    assert spin.max() > 1e6 * bound * scale  # what the spin takes from the orbit is far more than is lost
+
+
+def test_a_saved_run_has_labels_and_is_prolonged(tmp_path: Path) -> None:
+    text = planet("full").replace('"36 deg/day"', '"360 deg/day"')
+    shorter = text.replace('end = "40 day"\nsamples = 9', 'end = "20 day"\nsamples = 5')
+    run = run_text(shorter, out=tmp_path)
+    whole = rigidsim.resume(run.folder.path, until="40 day", tuning=IMPATIENT)
+    same_bits(whole.dataset, run_text(text).dataset)
+    with xarray.open_dataset(whole.folder.path / "dataset.h5") as read:
+        moon = read.point_mass_position.sel(point_mass="moon", space_axis="X")
+        assert moon.shape == (9,)
+        assert read.point_mass_position.attrs["units"] == "m"
+    assert rigidsim.verify(whole.folder.path).identical
+
+
+REFUSED = {
+    "no host": (PLANET % ("", BODIES + gradient("sun")), "[body] host: missing; name the one of [[bodies]]"),
+    "no such host": (
+        (PLANET % ('host = "erth"', BODIES + gradient("sun"))),
+        '[body] host: given "erth"; did you mean "earth"?; allowed: sun, earth',
+    ),
+    "no bodies": (PLANET % ('host = "earth"', ""), 'but there are no [[bodies]]'),
+    "no such source": (
+        PLANET % ('host = "earth"', BODIES + gradient("moon")),
+        '[[loads]] number 1 orbit.body: given "moon"; allowed: sun, earth',
+    ),
+    "itself": (PLANET % ('host = "earth"', BODIES + gradient("earth")), "which is the body itself"),
+    "mass": (
+        planet("full").replace("5.97219e24", "6.5e24"),
+        '[body] mass: given 6.5e+24 kg, but the gravitational parameter of its host "earth"',
+    ),
+    "twice": (planet("full").replace('"moon"', '"earth"'), 'given "earth", as another body'),
+    "about itself": (
+        planet("full").replace('about = "sun"', 'about = "moon"'),
+        "which goes about this body itself",
+    ),
+    "both": (
+        planet("full").replace(repr(MOON), f"{MOON!r}\nposition = [0, 0, 1]"),
+        "[[bodies]] number 3 orbit: given beside position or velocity",
+    ),
+    "pulled host": (
+        planet("full").replace("gravity_gradient", "central_gravity"),
+        'but [body] host makes the body one of [[bodies]]',
+    ),
+    "name": (planet("full").replace('"moon"', '"the moon"'), "letters, digits and underscores"),
+    "elements": (
+        planet("full").replace('{body = "sun"}', '{body = "sun", eccentricity = 0.1}'),
+        "orbit.eccentricity: given beside body, whose motion is integrated",
+    ),
+    "recorded": (
+        planet("one_way") + '[output]\nrecord = ["system_energy"]\n',
+        'set [body] coupling = "full"',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("which", REFUSED)
+def test_bodies_that_can_not_be(which: str) -> None:
+    text, says = REFUSED[which]
+    with pytest.raises(ConfigError) as caught:
+        _ = prepare(rigidsim.parse(text)).system.outputs
+    assert says in str(caught.value)
