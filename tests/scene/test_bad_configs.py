@@ -68,7 +68,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "table misspelt": (
         {"more": '[integratr]\nprecision = "double"'},
         "integratr",
-        ["unknown key", 'did you mean "integrator"?', "allowed: body, description, events, frame, initial"],
+        ["unknown key", 'did you mean "integrator"?', "allowed: bodies, body, description, events, frame, initial"],
     ),
     "top key misspelt": ({"top": 'name = "x"\nnmae = "y"'}, "nmae", ["unknown key", 'did you mean "name"?']),
     "body key misspelt": (
@@ -81,7 +81,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[body] str",
         ["unknown key", "allowed: center"],
     ),
-    "top key like a Python type": ({"top": 'name = "x"\nint = 1'}, "int", ["unknown key", "allowed: body"]),
+    "top key like a Python type": ({"top": 'name = "x"\nint = 1'}, "int", ["unknown key", "allowed: bodies"]),
     "body key with brackets": ({"body": BALL + '"a[0]" = 1'}, "[body] a[0]", ["unknown key"]),
     "initial key misspelt": (
         {"initial": "angular_velocty = [1, 0, 0]"},
