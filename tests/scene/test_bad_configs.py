@@ -68,7 +68,11 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "table misspelt": (
         {"more": '[integratr]\nprecision = "double"'},
         "integratr",
-        ["unknown key", 'did you mean "integrator"?', "allowed: bodies, body, description, events, frame, initial"],
+        [
+            "unknown key",
+            'did you mean "integrator"?',
+            "allowed: bodies, body, description, events, frame, initial",
+        ],
     ),
     "top key misspelt": ({"top": 'name = "x"\nnmae = "y"'}, "nmae", ["unknown key", 'did you mean "name"?']),
     "body key misspelt": (
