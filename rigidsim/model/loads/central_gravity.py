@@ -8,9 +8,10 @@ import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.loads.gravity_gradient import gradient_terms, positive_strength, tidal_range
+from rigidsim.model.loads.gravity_gradient import positive_strength
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic, apply, transpose

@@ -10,13 +10,13 @@ from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
+from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads.moving_source import MovingSource
-from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, parallel
+from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
@@ -27,7 +27,6 @@ from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
 from rigidsim.scene.tabulated_orbit import TabulatedOrbit
-from rigidsim.scene.traced import largest_of, smallest_of
 
 
 class GravityGradientFields(LoadFields):
@@ -248,34 +247,3 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
     if given.sign <= 0:
         raise around.fault("gravitational_parameter", f"given {float(given):g}; a positive number is allowed")
     return given.at(around.context)
-
-
-def tidal_range(scene: Scene, strength: Any, distance: Any) -> Any:
-    """(3/2) (G M / R^3) (I_max - I_min): range of the gradient's potential energy at a distance, J."""
-    moments = scene.body.principal_moments
-    return 3 * strength / distance**3 * (largest_of(moments) - smallest_of(moments)) / 2
-
-
-def gradient_terms(
-    m: Kinematics, direction: list[Symbolic], strength: Any, factor: Symbolic | None = None
-) -> list[Term]:
-    """Torque 3 strength factor c x (I c) for a unit direction c in body axes (MacCullagh).
-
-    Args:
-        strength: constant part (mpf), which becomes one coefficient with the moments.
-        factor: what varies of it.
-    """
-    inertia = m.numbers.inertia
-    units = unit_vectors(m.scene.context)
-    columns = transpose(inertia)
-    terms: list[Term] = []
-    for a in range(3):
-        for j in range(a, 3):
-            vector = cross(units[a], columns[j])
-            if j != a:
-                vector = [x + y for x, y in zip(vector, cross(units[j], columns[a]), strict=True)]
-            if any(x != 0 for x in vector):
-                product = direction[a] * direction[j]
-                scaled = [3 * strength * x for x in vector]
-                terms.append((scaled, product if factor is None else factor * product))
-    return terms

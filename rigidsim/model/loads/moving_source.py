@@ -14,6 +14,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import unit_vectors
@@ -22,7 +23,6 @@ from rigidsim.scene.arithmetic import Vector, cross
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.traced import largest_of, smallest_of
 
 _UNROLLED = 2
 
@@ -121,8 +121,6 @@ class MovingSource(Load):
 
     def torque(self, m: Kinematics) -> list[Term]:
         """(3 G M / r^3) c x (I c)."""
-        from rigidsim.model.loads.gravity_gradient import gradient_terms
-
         _, body, inverse = self.geometry(m)
         return gradient_terms(m, body, self._scaled(m, 3, 2 * m.scaling.time), inverse**3)
 
@@ -194,10 +192,8 @@ class MovingSource(Load):
         return place, moving
 
     def amplitude(self, scene: Scene) -> Any:
-        """(3/2) (G M / R^3) (I_max - I_min) at the least distance, J."""
-        distance, _ = self.encounter(scene)
-        moments = scene.body.principal_moments
-        return 3 * self.strength / distance**3 * (largest_of(moments) - smallest_of(moments)) / 2
+        """As of ``tidal_range`` at the least distance."""
+        return tidal_range(scene, self.strength, self.encounter(scene)[0])
 
     def fastest_rate(self, scene: Scene) -> Any:
         """At the least distance."""
