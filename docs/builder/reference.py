@@ -68,7 +68,9 @@ def _tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
             for fields in _alternatives(key["items"], schema):
                 yield f"[[loads]] {fields['properties']['kind']['const']}", fields
         elif target is not None:
-            yield (f"[[{name}]]" if key.get("type") == "array" else f"[{name}]"), target
+            named = isinstance(key.get("additionalProperties"), Mapping)
+            plain = f'[{name}."NAME"]' if named else f"[{name}]"
+            yield (f"[[{name}]]" if key.get("type") == "array" else plain), target
     for heading, name in _INNER:
         yield heading, defined[name]
 
@@ -83,8 +85,8 @@ _INNER = (
 
 def _target(key: Mapping[str, Any], schema: Mapping[str, Any]) -> dict[str, Any] | None:
     """The table that a key holds."""
-    for node in (key, key.get("items", {}), *key.get("allOf", [])):
-        if "$ref" in node:
+    for node in (key, key.get("items"), key.get("additionalProperties"), *key.get("allOf", [])):
+        if isinstance(node, Mapping) and "$ref" in node:
             return schema["$defs"][node["$ref"].rpartition("/")[2]]
     return None
 

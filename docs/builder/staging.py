@@ -40,7 +40,7 @@ def gather(folder: Path) -> list[Path]:
         DeadLinkError: with all dead links of all pages.
     """
     pages = {page: place_of(page) for page in [*sorted(DOCS.rglob("*.md")), *_notebooks(), *ELSEWHERE]}
-    del pages[ROOT / "README.md"]  # the site begins with docs/index.md
+    pages.pop(ROOT / "README.md", None)  # the site begins with docs/index.md
     dead: list[str] = []
     for page, place in pages.items():
         text = _notebook_text(page) if page.suffix == ".ipynb" else page.read_text(encoding="utf-8")

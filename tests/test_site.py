@@ -1,0 +1,120 @@
+"""The documentation's site: pages gathered with their links, the reference made from the code."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "docs" / "builder"))
+
+import checking  # noqa: E402
+import reference  # noqa: E402
+import staging  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All pages, as Sphinx gets them."""
+    folder = tmp_path_factory.mktemp("pages")
+    staging.gather(folder)
+    reference.write(folder / "reference")
+    staging.add_contents(folder)
+    return folder
+
+
+def test_every_page_is_in_the_table_of_contents(pages: Path) -> None:
+    index = (pages / "index.md").read_text(encoding="utf-8")
+    listed = {line for block in index.split("```{toctree}")[1:] for line in block.split("```")[0].split()}
+    found = {str(page.relative_to(pages).with_suffix("")) for page in pages.rglob("*.md")} - {"index"}
+    assert found <= listed
+    assert {"choosing", "tutorial", "notebooks/mars_precession", "experiments/index"} <= found
+    assert "`reference/" not in index.split("## And")[0].split("## Reference")[1].replace("python docs", "")
+
+
+def test_links_lead_to_places_of_the_site(pages: Path) -> None:
+    planar = (pages / "experiments" / "index.md").read_text(encoding="utf-8")
+    assert "](../analysis.md)" in planar  # ../docs/analysis.md in the repository
+    assert (pages / "experiments" / "figures" / "hyperion.png").exists()
+    assert "](configs/heavy_top_nutating.toml)" in (pages / "gallery.md").read_text(encoding="utf-8")
+
+
+def test_dead_links_are_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    docs = tmp_path / "docs"
+    docs.mkdir()
+    (docs / "page.md").write_text("[gone](nowhere.md), `[code](is.md)` and\n```\n[a fence](is.md)\n```\n")
+    monkeypatch.setattr(staging, "DOCS", docs)
+    monkeypatch.setattr(staging, "ROOT", tmp_path)
+    monkeypatch.setattr(staging, "ELSEWHERE", {})
+    with pytest.raises(staging.DeadLinkError) as raised:
+        staging.gather(tmp_path / "pages")
+    assert str(raised.value) == "docs/page.md: [gone](nowhere.md) leads nowhere"
+
+
+@pytest.mark.parametrize(
+    ("page", "fault"),
+    [
+        ('<a href="two.html">', []),
+        ('<a href="two.html#there">', []),
+        ('<a href="three.html">', ["one.html: three.html leads nowhere"]),
+        ('<a href="two.html#where">', ["one.html: two.html#where names a place that isn't there"]),
+        ('<a href="https://example.org/x">', []),
+        ('<script src="https://example.org/x.js">', ["one.html: fetches https://example.org/x.js"]),
+        ('<link href="//example.org/x.css">', ["one.html: fetches //example.org/x.css"]),
+    ],
+)
+def test_a_built_site_is_checked_as_a_reader_finds_it(page: str, fault: list[str], tmp_path: Path) -> None:
+    (tmp_path / "one.html").write_text(page)
+    (tmp_path / "two.html").write_text('<h2 id="there">')
+    assert checking.faults(tmp_path) == fault
+
+
+def test_the_reference_has_every_key_command_and_variable(pages: Path) -> None:
+    from rigidsim.cli.commands import COMMANDS
+    from rigidsim.scene.editor_schema import editor_schema
+    from rigidsim.scene.registry import OBSERVABLES
+
+    config, commands, dataset = (
+        (pages / "reference" / f"{name}.md").read_text(encoding="utf-8")
+        for name in ("config", "commands", "dataset")
+    )
+    schema = editor_schema()
+    keys = {key for table in [schema, *schema["$defs"].values()] for key in table["properties"]}
+    assert {key for key in keys if f"`{key}`" not in config} == set()
+    assert {name for name in COMMANDS if f"## rigidsim {name}\n" not in commands} == set()
+    assert {name for name in OBSERVABLES if f"| `{name}` |" not in dataset} == set()
+
+
+@pytest.mark.slow
+def test_every_warning_and_status_has_its_remedy() -> None:
+    from rigidsim.solve.status import Status
+    from rigidsim.store.summary import WarningCode
+
+    text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    codes = {code.value for code in WarningCode}
+    assert {code for code in codes if f"\n### {code.replace('_', ' ')}\n" not in text} == set()
+    unfinished = {status.value for status in Status if status.exit_code}
+    assert {status for status in unfinished if f"`{status}`" not in text} == set()
+
+
+@pytest.mark.slow
+def test_every_config_is_in_the_gallery() -> None:
+    """``python -m docs.gallery NAME`` puts it there."""
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    names = [config.stem for config in (ROOT / "configs").glob("*.toml")]
+    assert [name for name in names if f"\n## {name}\n" not in text] == []
+    assert [n for n in names if not (ROOT / "docs" / "figures" / "gallery" / f"{n}.png").exists()] == []
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("sphinx", reason="pip install -e '.[docs]'")
+    pytest.importorskip("furo", reason="pip install -e '.[docs]'")
+    command = [sys.executable, str(ROOT / "docs" / "build.py"), str(tmp_path / "site")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    search = (tmp_path / "site" / "searchindex.js").read_text(encoding="utf-8")
+    assert "libration" in search
