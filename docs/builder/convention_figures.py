@@ -1,6 +1,6 @@
 """Pictures of the conventions: ``python docs/builder/convention_figures.py`` draws them into docs/figures.
 
-The axes that they show are turned by the package's own rotations, so that a picture can't contradict the code.
+The axes that they show are turned by the package's own rotations, so that no picture contradicts the code.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from rigidsim.scene import attitude  # noqa: E402
+from rigidsim.scene import attitude
 
 FIGURES = Path(__file__).resolve().parents[1] / "figures"
 _COLOURS = ("#d1495b", "#3a9a5b", "#2f6fbf")
