@@ -33,6 +33,7 @@ STUDIES = (
     "precession_and_nutation",
     "spectral_lines",
     "hyperion",
+    "satellite_stability",
 )
 
 

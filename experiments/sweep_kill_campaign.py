@@ -104,7 +104,7 @@ def _trial(
     folder, disturbed = SweepFolder(out / "kills"), 0
     for _ in range(draw.randint(1, 3)):
         before = _files(folder)
-        if not _disturbed(way, draw, place, out, folder, duration):
+        if not _disturbed(tally, way, draw, place, out, folder, duration):
             break
         disturbed += 1
         tally.counts[way] += 1
@@ -140,7 +140,7 @@ def _expect_whole(tally: Tally, folder: SweepFolder, name: str, way: str) -> Non
 
 
 def _disturbed(
-    way: str, draw: random.Random, place: Path, out: Path, folder: SweepFolder, duration: float
+    tally: Tally, way: str, draw: random.Random, place: Path, out: Path, folder: SweepFolder, duration: float
 ) -> bool:
     """Begin, and disturb; False where the sweep was complete before it could be."""
     command = [sys.executable, "-m", "rigidsim", "sweep", str(place / "kills.toml"), "--out", str(out)]
@@ -168,7 +168,12 @@ def _disturbed(
         workers = _workers(child.pid)
         if workers:
             os.kill(draw.choice(workers), signal.SIGKILL)
-        child.wait(_PATIENCE)
+        try:
+            child.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            tally.expect(False, f"{way}: the sweep hangs ({out.name})")
+            os.killpg(child.pid, signal.SIGKILL)
+            child.wait()
         return bool(workers)
     os.killpg(child.pid, signal.SIGKILL)
     child.wait()

@@ -167,7 +167,8 @@ def _means(one: Series) -> Kept:
     variable = one.variable
     present = ~np.isnan(one.parts[0])
     count = np.maximum(present.sum(axis=1), 1)
-    total = sum(np.where(present, part, 0).sum(axis=1) for part in reversed(one.parts))
+    # in the order of the samples: ``sum`` takes another one where a member is alone in its block
+    total = sum(np.cumsum(np.where(present, part, 0), axis=1)[:, -1] for part in reversed(one.parts))
     mean = np.where(present.any(axis=1), total / count, np.nan)
     attributes = {
         "units": variable.attributes.get("units", "1"),

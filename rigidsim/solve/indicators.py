@@ -11,8 +11,9 @@ With d(t) the length of a tangent vector over its initial one and g = ln d (obse
 
 The mean of Y tends to 2 for quasi-periodic motion and grows like half the largest exponent times T in chaos.
 By parts, int t g' dt = t g(t) - int g dt, so that no derivative of g is needed; the integrals are taken by
-the trapezoid rule over the samples. Several samples a period make the value good to a few per cent; to tell
-order from chaos one an orbit will do.
+the trapezoid rule over the samples, added in their order: ``sum`` would add those of a single motion in
+another order than those of many, and a member's bits would depend on who is beside it. Several samples a
+period make the value good to a few per cent; to tell order from chaos one an orbit will do.
 """
 
 from __future__ import annotations
@@ -58,13 +59,14 @@ def indicators(times: np.ndarray, growth: np.ndarray) -> Indicators:
     np.cumsum(step * (g[1:] + g[:-1]) / 2, axis=0, out=area[1:])
     with np.errstate(invalid="ignore", divide="ignore"):
         y = np.where(since > 0, 2 * (g - area / since), 0.0)
-        mean = (step * (y[1:] + y[:-1]) / 2).sum(axis=0)
+        mean = np.zeros_like(g)
+        np.cumsum(step * (y[1:] + y[:-1]) / 2, axis=0, out=mean[1:])
         last = known.sum(axis=0) - 1
         there = last >= 0
         place = np.maximum(last, 0)[None, :]
         until = np.where(there, np.take_along_axis(since, place, axis=0)[0], np.nan)
         grown = np.take_along_axis(g, place, axis=0)[0]
-        megno = np.where(until > 0, mean / until, 0.0)
+        megno = np.where(until > 0, mean[-1] / until, 0.0)
         exponent = np.where(until > 0, grown / until, 0.0)
     fli = np.where(known, g, -np.inf).max(axis=0)
     lost = ~there

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from typing import Any
 
 from rigidsim.errors import StoppedError
 from rigidsim.store.sweep_generation import Generation
@@ -49,6 +50,8 @@ class Workers:
                         tile = waiting.pop()
                         running[pool.submit(tile_image, *task(generation, tile))] = tile
                     done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
+                    if not done:
+                        _refuse_dead(pool)
                     for future in done:
                         image = future.result()
                         yield running.pop(future), image
@@ -67,6 +70,20 @@ class Workers:
         )
 
 
+def _processes(pool: ProcessPoolExecutor) -> list[Any]:
+    return list((getattr(pool, "_processes", None) or {}).values())
+
+
+def _refuse_dead(pool: ProcessPoolExecutor) -> None:
+    """The pool itself doesn't notice a worker that dies while it sends a tile: it waits for the rest of it.
+
+    Raises:
+        BrokenProcessPool: one has ended.
+    """
+    if not all(process.is_alive() for process in _processes(pool)):
+        raise BrokenProcessPool("a worker died")
+
+
 def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
     tile, count = deaths.most_common(1)[0]
     if count >= _MOST_DEATHS:
@@ -79,7 +96,7 @@ def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
 
 def _end(pool: ProcessPoolExecutor) -> None:
     """Nobody waits for what is in work."""
-    processes = list((getattr(pool, "_processes", None) or {}).values())
+    processes = _processes(pool)
     pool.shutdown(wait=False, cancel_futures=True)
     for process in processes:
         process.kill()

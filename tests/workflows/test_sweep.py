@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
+from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +31,11 @@ from rigidsim.store.seal import seal
 from rigidsim.store.sweep_folder import SweepFolder
 from rigidsim.store.sweep_generation import Work, ranges_of
 from rigidsim.store.sweep_run import open_sweep
+from rigidsim.workflows import sweep_workers
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import resume_sweep, scanned
 from rigidsim.workflows.sweep import sweep as run_sweep
-from rigidsim.workflows.sweep_members import run_members, sweep_of
+from rigidsim.workflows.sweep_members import run_members, sweep_of, tile_image
 from rigidsim.workflows.sweep_verify import verify_sweep
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
@@ -234,6 +238,16 @@ def test_an_indicator_moves_no_bit_of_what_else_is_kept(samples: int) -> None:
     for name, values in without.items():
         assert values.tobytes() == along[name].tobytes(), name
     assert np.isfinite(without["angular_velocity_final"]).all()
+
+
+def test_what_is_kept_of_a_member_has_the_same_bits_alone_and_in_company() -> None:
+    keep = ("final", "extremes", "means", "megno", "fli", "lyapunov")
+    sweep = sweep_of(PLANAR_MAP.replace("SAMPLES", "200").replace('["final"]', json.dumps(keep)))
+    together = run_members(sweep, range(sweep.count), keep).kept
+    for member in (1, 4, 7, 13):
+        alone = run_members(sweep, [member], keep).kept
+        for name, variable in alone.items():
+            assert variable.values[0].tobytes() == together[name].values[member].tobytes(), name
 
 
 def test_verify_runs_members_again_and_finds_a_flipped_bit(folder: Path, tmp_path: Path) -> None:
@@ -479,6 +493,33 @@ def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: P
     found = swept(tmp_path, text, workers=2, observer=killer)
     assert found.finished
     assert killer.killed
+    expected = open_sweep(folder).dataset.angular_velocity_final
+    np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
+
+
+def dies_while_sending(*task: Any) -> bytes:
+    """Of the first worker: the beginning of a result, and death; of all others the tile."""
+    marker = Path(os.environ["DIED_WHILE_SENDING"])
+    try:
+        marker.touch(exist_ok=False)
+    except FileExistsError:
+        return tile_image(*task)
+    queues = [x for x in gc.get_objects() if isinstance(x, SimpleQueue) and hasattr(x, "_writer")]
+    for queue in queues:
+        queue._wlock.acquire()
+        os.write(queue._writer.fileno(), struct.pack("!i", 1000) + b"the first bytes")
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
+
+
+@pytest.mark.slow  # three processes that import everything
+def test_a_worker_that_dies_while_it_sends_a_tile_is_noticed(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DIED_WHILE_SENDING", str(tmp_path / "died"))
+    monkeypatch.setattr(sweep_workers, "tile_image", dies_while_sending)
+    found = swept(tmp_path, workers=2)
+    assert (tmp_path / "died").exists()
     expected = open_sweep(folder).dataset.angular_velocity_final
     np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
 
