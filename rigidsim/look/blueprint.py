@@ -6,7 +6,8 @@ Imports rerun when it is loaded, so load it only where a timeline is written.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
@@ -16,9 +17,12 @@ from rerun.blueprint.components import LinkAxis
 from rigidsim.look.clock import Clock
 from rigidsim.look.drawing import OLDER, fades, trail_path, trail_stride
 from rigidsim.look.plots import Plot
-from rigidsim.look.plotting import LEGEND_LINE, legend_lines, plane_path, plane_reach, plot_path
+from rigidsim.look.plotting import LEGEND_LINE, legend_lines, legend_of, plane_path, plane_reach, plot_path
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
+
+if TYPE_CHECKING:
+    from rigidsim.look.drawn import DrawnRun
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
 TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
@@ -90,6 +94,49 @@ def build_blueprint(
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         _time_panel(clock, turns, following=following),
+    )
+
+
+def build_comparison(runs: Sequence[DrawnRun], clock: Clock, difference: Plot | None) -> rrb.Blueprint:
+    """The layout for runs side by side.
+
+    Args:
+        runs: each with one stage, under names of its own.
+        clock: of all times.
+        difference: how far their attitudes are apart, where that is known.
+    """
+    spaces = [_space_view(run.picture.stages[0], run.clock, narrow=True, subject=run.subject) for run in runs]
+    legend = legend_of(runs[0].picture.stages)
+    height = 30.0 + 24.0 * legend_lines(legend)
+    texts = [
+        rrb.TextDocumentView(origin=f"/{page.lower()}", name=run.picture.stages[0].title.split(":")[0])
+        for run in runs
+        for page in run.pages
+    ]
+    half = -(-len(spaces) // 2)
+    scene = (
+        rrb.Horizontal(*spaces)
+        if len(spaces) <= 3
+        else rrb.Vertical(rrb.Horizontal(*spaces[:half]), rrb.Horizontal(*spaces[half:]))
+    )
+    shares = [_PIXELS * 0.7 - height, height, _PIXELS * 0.3]
+    left = rrb.Vertical(scene, _legend_view(legend), _tabs(texts), row_shares=shares)
+    common: dict[str, list[Plot]] = {}
+    for run in runs:
+        for plot in run.plots:
+            common.setdefault(plot.key, []).append(plot)
+    joined = [
+        replace(same[0], series=[one for plot in same for one in plot.series]) for same in common.values()
+    ]
+    views = [] if difference is None else [_plot_view(difference)]
+    views += [_plot_view(plot) for plot in joined if plot.place == "leading"][: 4 - len(views)]
+    views += [_plot_view(plot) for plot in joined if plot.place == "drift"]
+    turns = max(run.turns for run in runs)
+    return rrb.Blueprint(
+        rrb.Horizontal(left, rrb.Vertical(*views), column_shares=[5, 3.4]),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        _time_panel(clock, turns, following=False),
     )
 
 

@@ -2,34 +2,12 @@
 
 from __future__ import annotations
 
-import errno
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rigidsim.look.clock import Clock, build_clock
-from rigidsim.look.page import config_page, legible, notes_page, summary_page, title_of
-from rigidsim.look.plots import Plot, Series, plan_plots
-from rigidsim.look.readable_time import TimeWords
-from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import Picture, Plane
-from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.states import States, sections_of, states_of
+from rigidsim.look.drawn import DrawnRun
+from rigidsim.look.page import title_of
+from rigidsim.look.recording import CHUNK, check_room, recording_to
 from rigidsim.look.thinning import AnyTable, KeptRows, thin, thinned_indices
-from rigidsim.scene.records import dataclass
-
-if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
-
-CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
-_ROW_BYTES = 600  # at most: some twenty variables
-_FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 
 def write_timeline(
@@ -57,175 +35,11 @@ def write_timeline(
     shown = thin(dataset, rows, kept=kept)
     count = shown.sizes["time"]
     steps = thinned_indices(dataset.sizes["time"], rows)
-    view = _View.of(dataset, shown, steps)
-    _check_room(path, count)
-    with _strict():
-        import rerun as rr
-
-        # The context manager finishes the file: without it there is no footer.
-        with rr.RecordingStream("rigidsim") as recording:
-            if not rr.is_enabled(recording):
-                raise RuntimeError("RERUN is set to off in the environment: unset it")
-            recording.save(path, default_blueprint=view.blueprint())
-            recording.send_recording_name(legible(title_of(dataset)))
-            view.draw_static(recording)
-            for start in range(0, count, CHUNK):
-                _check_room(path, count - start)
-                view.draw_rows(recording, slice(start, min(start + CHUNK, count)))
+    run = DrawnRun.of(dataset, shown, steps)
+    with recording_to(path, title_of(dataset), count) as recording:
+        recording.start(run.blueprint())
+        run.draw_static(recording.stream)
+        for start in range(0, count, CHUNK):
+            check_room(path, count - start)
+            run.draw_rows(recording.stream, slice(start, min(start + CHUNK, count)))
     return count
-
-
-@dataclass(frozen=True)
-class _View:
-    """Everything that is drawn of one dataset.
-
-    Attributes:
-        steps: (rows,), which rows of the dataset these are.
-        pages: markdown by name.
-        words: how its times are told.
-    """
-
-    picture: Picture
-    subject: Subject
-    plots: list[Plot]
-    planes: list[Plane]
-    states: list[States]
-    clock: Clock
-    seconds: NDArray[np.float64]
-    steps: NDArray[np.int64]
-    pages: dict[str, str]
-    words: TimeWords
-    turns: float
-    strides: dict[str, dict[str, int]] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, dataset: Table, shown: Table, steps: NDArray[np.int64]) -> _View:
-        """That of a dataset and its rows in memory."""
-        seconds = np.asarray(shown["time"].values, dtype=np.float64)
-        clock = build_clock(seconds)
-        told = shown.assign_attrs(dataset.attrs)
-        picture, subject = build_picture(told)
-        plots = plan_plots(told, picture.leading)
-        notes = list(picture.notes)
-        if not clock.duration:
-            notes.append(f"the run doesn't fit nanoseconds: its timeline is `{clock.name}`")
-            series = Series("time_seconds", ["time"], [(170, 170, 175)], seconds[:, None])
-            plots.append(Plot("time_seconds", "Time [s]", "more", [series]))
-        pages = {
-            "Summary": summary_page(dataset, shown),
-            "Picture": notes_page(picture.kind, notes),
-            "Config": config_page(dataset),
-        }
-        return cls(
-            picture=picture,
-            subject=subject,
-            plots=plots,
-            planes=[*picture.planes, *sections_of(dataset)],
-            states=states_of(dataset, float(seconds[0]), float(seconds[-1])),
-            clock=clock,
-            seconds=seconds,
-            steps=steps,
-            pages={name: text for name, text in pages.items() if text},
-            words=TimeWords.of(dataset.attrs, float(seconds[0]), float(seconds[-1])),
-            turns=_turns(shown, seconds),
-        )
-
-    def blueprint(self, *, following: bool = False) -> Any:
-        """The layout."""
-        from rigidsim.look.blueprint import build_blueprint
-        from rigidsim.look.plotting import legend_of
-
-        return build_blueprint(
-            self.picture.stages,
-            self.plots,
-            self.clock,
-            self.turns,
-            planes=self.planes,
-            subject=self.subject,
-            legend=legend_of(self.picture.stages),
-            states=bool(self.states),
-            pages=list(self.pages),
-            following=following,
-        )
-
-    def draw_static(self, recording: Any) -> None:
-        """What holds for all times."""
-        import rerun as rr
-
-        from rigidsim.look import drawing, plotting
-
-        for name, text in self.pages.items():
-            document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
-            recording.log(f"/{name.lower()}", document, static=True)
-        drawing.draw_static(recording, self.picture.stages)
-        plotting.draw_plot_styles(recording, self.plots)
-        plotting.draw_planes(recording, self.planes)
-        plotting.draw_legend(recording, plotting.legend_of(self.picture.stages))
-        lanes = [self._times(self._ticks(lane.seconds)) for lane in self.states]
-        plotting.draw_states(recording, self.states, lanes)
-        told = thinned_indices(len(self.seconds), plotting.CLOCK_ROWS)
-        words = [f"t = {self.words.coarse(float(t))}" for t in self.seconds[told]]
-        plotting.draw_clock(recording, words, self._times(self.clock.ticks[told], self.steps[told]))
-
-    def draw_rows(self, recording: Any, rows: slice) -> None:
-        """What changes, for some rows."""
-        from rigidsim.look import drawing, plotting
-
-        times = self._times(self.clock.ticks[rows], self.steps[rows])
-        for stage in self.picture.stages:
-            if stage.root not in self.strides:
-                self.strides[stage.root] = drawing.strides_of(stage)
-            for path, picked, columns in drawing.stage_columns(stage, rows, self.strides[stage.root]):
-                mine = times
-                if picked != rows:
-                    mine = self._times(self.clock.ticks[picked], self.steps[picked])
-                recording.send_columns(path, indexes=mine, columns=columns)
-        plotting.draw_plot_rows(recording, self.plots, times, rows)
-        plotting.draw_plane_rows(recording, self.planes, times, rows)
-
-    def _ticks(self, seconds: NDArray[np.float64]) -> NDArray[np.int64]:
-        return np.rint(seconds / self.clock.seconds_per_tick).astype(np.int64)
-
-    def _times(self, ticks: NDArray[np.int64], steps: NDArray[np.int64] | None = None) -> list[Any]:
-        import rerun as rr
-
-        name = self.clock.name
-        time = (
-            rr.TimeColumn(name, duration=ticks.astype("timedelta64[ns]"))
-            if self.clock.duration
-            else rr.TimeColumn(name, sequence=ticks)
-        )
-        return [time] if steps is None else [time, rr.TimeColumn("step", sequence=steps)]
-
-
-def _turns(dataset: Table, seconds: np.ndarray) -> float:
-    """Turns of the body during the run, from its mean rate; 0 when the rate isn't known."""
-    if "angular_velocity" not in dataset:
-        return 0.0
-    rate = np.linalg.norm(np.asarray(dataset["angular_velocity"].values, dtype=float), axis=-1)
-    mean = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
-    return mean * float(abs(seconds[-1] - seconds[0])) / (2 * np.pi)
-
-
-@contextmanager
-def _strict() -> Iterator[None]:
-    """Errors of the rerun API as exceptions, for the length of the block only.
-
-    Otherwise wrong lengths, shapes and times are dropped with a warning.
-    """
-    from rerun.error_utils import set_strict_mode, strict_mode
-
-    before = strict_mode()
-    set_strict_mode(True)
-    try:
-        yield
-    finally:
-        set_strict_mode(before)
-
-
-def _check_room(path: Path, rows: int) -> None:
-    """Refuse before rerun finds the disk full: then it may wait for ever."""
-    room, needed = shutil.disk_usage(path.parent).free, _FIRST_BYTES + _ROW_BYTES * rows
-    if room < needed:
-        missing = f"it may need {needed / 1e6:.1f} MB, and {room / 1e6:.1f} MB are free"
-        raise OSError(errno.ENOSPC, missing, str(path))

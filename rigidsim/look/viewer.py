@@ -10,6 +10,7 @@ import tempfile
 import time
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any, Self
 
 LOOPBACK = "127.0.0.1"  # rerun's own default would listen on every interface
 QUIET = {"CI": "1"}  # the one variable that keeps the viewer from sending usage statistics (0.41)
@@ -17,6 +18,22 @@ QUIET = {"CI": "1"}  # the one variable that keeps the viewer from sending usage
 
 class NoGraphics(RuntimeError):
     """The machine has no Vulkan driver that the headless viewer could draw with."""
+
+
+class NoDisplay(RuntimeError):
+    """There is no screen that a window could be on."""
+
+
+NO_DISPLAY = (
+    "there is no display here (neither DISPLAY nor WAYLAND_DISPLAY is set); --web serves the viewer to a "
+    "browser on this machine (on another one through a tunnel: ssh -L 9090:127.0.0.1:9090 "
+    "-L 9876:127.0.0.1:9876 HOST), and --png, --gif or --mp4 FILE draw without one"
+)
+
+
+def has_display() -> bool:
+    """Whether a window can be opened; elsewhere than on Linux it is taken for granted."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def open_viewer(path: Path, *, web: bool = False) -> int:
@@ -31,8 +48,12 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
 
     Raises:
         FileNotFoundError: no such file, or no viewer in the installed rerun-sdk.
+        NoDisplay: a window is asked for where there is no screen.
     """
-    command = [str(viewer_binary()), str(_existing(path)), "--bind", LOOPBACK]
+    recording = _existing(path)
+    if not web and not has_display():
+        raise NoDisplay(NO_DISPLAY)
+    command = [str(viewer_binary()), str(recording), "--bind", LOOPBACK]
     command += ["--serve-web"] if web else ["--port", "auto"]
     process = subprocess.Popen(command, env=os.environ | QUIET)
     try:
@@ -43,13 +64,45 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
         return 130
 
 
+def start_empty(*, web: bool = False) -> tuple[subprocess.Popen[bytes], int]:
+    """Start a viewer that waits for recordings, and the port of 127.0.0.1 on which it takes them.
+
+    Raises:
+        FileNotFoundError: no viewer in the installed rerun-sdk.
+        NoDisplay: a window is asked for where there is no screen.
+    """
+    if not web and not has_display():
+        raise NoDisplay(NO_DISPLAY)
+    port = _free_port()
+    command = [str(viewer_binary()), "--bind", LOOPBACK, "--port", str(port)]
+    command += ["--serve-web"] if web else ["--expect-data-soon"]
+    return subprocess.Popen(command, env=os.environ | QUIET), port
+
+
+def wait_for(process: subprocess.Popen[bytes], port: int, seconds: float) -> None:
+    """Wait until a viewer takes recordings.
+
+    Raises:
+        RuntimeError: it ended, or doesn't within so many seconds.
+    """
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        if process.poll() is not None:
+            raise RuntimeError(f"the viewer ended with exit code {process.returncode}")
+        with socket.socket() as probe:
+            if probe.connect_ex((LOOPBACK, port)) == 0:
+                return
+        time.sleep(0.1)
+    raise RuntimeError(f"the viewer didn't answer within {seconds:g} s")
+
+
 def screenshot(
     path: Path,
     png: Path,
     *,
     size: tuple[int, int] = (1600, 900),
     timeout: float = 120.0,
-    at: float | None = None,
+    at: float = 0.0,
 ) -> Path:
     """Picture of a recording in the viewer, drawn without a screen.
 
@@ -58,94 +111,135 @@ def screenshot(
         png: the picture to write.
         size: width and height of the window in points; the picture may have more pixels.
         timeout: seconds to wait for the viewer.
-        at: where in the run, 0 to 1 of the timeline that the page opens on; None: as it opens,
-            which is at the end.
+        at: where in the run, 0 to 1 of the timeline that the page opens on.
 
     Returns:
         `png`.
 
     Raises:
+        FileNotFoundError, NoGraphics, RuntimeError: as of ``HeadlessViewer``.
+    """
+    with HeadlessViewer(path, size=size, timeout=timeout) as viewer:
+        viewer.seek(at)
+        Path(png).write_bytes(viewer.settled_picture())
+    return Path(png)
+
+
+class HeadlessViewer:
+    """The viewer without a screen, with a recording open in it and its time at rest; a context manager.
+
+    Args:
+        path: a `.rrd` file.
+        size: width and height of the window in points.
+        timeout: seconds until everything is given up.
+
+    Attributes:
+        client: of rerun, for what isn't offered here.
+        timeline: that the page opened on.
+        start, end: of that, as its integers.
+
+    Raises (on entering):
         FileNotFoundError: no such recording, or no viewer.
         NoGraphics: no Vulkan driver; Mesa's software driver will do
             (Debian: `apt-get install mesa-vulkan-drivers`).
         RuntimeError: the viewer failed or took longer than `timeout`.
     """
-    source = _existing(path)
-    if not vulkan_drivers():
-        raise NoGraphics(
-            "no Vulkan driver found: a headless picture needs one, for example Mesa's lavapipe "
-            "(apt-get install mesa-vulkan-drivers)"
-        )
-    port = _free_port()
-    with tempfile.TemporaryDirectory() as home:
-        command = [str(viewer_binary()), str(source.resolve()), "--headless"]
-        command += ["--bind", LOOPBACK, "--port", str(port)]
-        command += ["--window-size", f"{size[0]}x{size[1]}"]
+
+    def __init__(self, path: Path, *, size: tuple[int, int] = (1600, 900), timeout: float = 120.0) -> None:
+        self._path = _existing(path)
+        self._size = size
+        self._deadline = time.monotonic() + timeout
+        self.client: Any = None
+        self.timeline = ""
+        self.start = self.end = 0
+
+    def __enter__(self) -> Self:
+        if not vulkan_drivers():
+            raise NoGraphics(
+                "no Vulkan driver found: a headless picture needs one, for example Mesa's lavapipe "
+                "(apt-get install mesa-vulkan-drivers)"
+            )
+        self._home = tempfile.TemporaryDirectory()
+        self._port = _free_port()
+        command = [str(viewer_binary()), str(self._path.resolve()), "--headless"]
+        command += ["--bind", LOOPBACK, "--port", str(self._port)]
+        command += ["--window-size", f"{self._size[0]}x{self._size[1]}"]
         # A home of its own: none of the user's settings.
+        home = self._home.name
         environment = os.environ | QUIET
         environment |= {"HOME": home, "XDG_CONFIG_HOME": home, "XDG_DATA_HOME": home}
-        log = Path(home) / "viewer.log"
-        with log.open("wb") as output:
-            process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
+        self._log = Path(home) / "viewer.log"
+        with self._log.open("wb") as output:
+            self.process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
         try:
-            picture = _picture(process, port, time.monotonic() + timeout, at)
-        except _Failed as failure:
-            said = log.read_text(errors="replace").strip()[-800:]
-            if "No graphics adapter" in said:
-                raise NoGraphics(f"the Vulkan driver doesn't work: {said}") from None
-            raise RuntimeError(f"the viewer made no picture: {failure}. It said: {said}") from None
-        finally:
-            process.terminate()
-            process.wait()
-    Path(png).write_bytes(picture)
-    return Path(png)
+            self._open()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
 
+    def __exit__(self, *_: object) -> None:
+        self.process.terminate()
+        self.process.wait()
+        self._home.cleanup()
 
-class _Failed(Exception):
-    """Why there is no picture."""
+    def seek(self, share: float) -> None:
+        """Go to a place in the run, 0 to 1, and stay there."""
+        self.seek_tick(self.start + round(share * (self.end - self.start)))
 
+    def seek_tick(self, tick: int) -> None:
+        """Go to a time of the timeline, as its integer, and stay there."""
+        # Integers of any timeline pass through `sequence` as they are.
+        self.client.set_time(self.timeline, sequence=tick, play_state="paused")
 
-def _picture(process: subprocess.Popen[bytes], port: int, deadline: float, at: float | None) -> bytes:
-    """PNG of the window once the recording is there and the picture no longer changes.
+    def picture(self) -> bytes:
+        """PNG of the window as it is."""
+        return bytes(self.client.take_screenshot())
 
-    The viewer's own --screenshot-to fires after a few frames, before the plots have been read.
-    """
-    from rerun.experimental import ViewerClient
+    def settled_picture(self) -> bytes:
+        """PNG of the window once it no longer changes: plots are read, and the opening notes have gone."""
+        settled, last = time.monotonic() + 4.0, b""
+        while time.monotonic() < self._deadline:
+            time.sleep(0.4)
+            picture = self.picture()
+            if picture == last and time.monotonic() > settled:
+                return picture
+            last = picture
+        raise self._failure("its picture never came to rest")
 
-    client: ViewerClient | None = None
-    sought = False
-    settled = 0.0  # when the notes that the viewer opens with have gone
-    last = b""
-    while time.monotonic() < deadline:
-        if process.poll() is not None:
-            raise _Failed(f"it ended with exit code {process.returncode}")
-        time.sleep(0.4)
-        try:
-            client = client or ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
-            state = client.get_state()
-        except Exception as problem:  # not listening yet; the client has no error of its own kind
-            last = b""
-            reason = str(problem)
-            client = None
-            if time.monotonic() + 1 > deadline:
-                raise _Failed(f"no answer in time ({reason})") from None
-            continue
-        opened = [r for r in state.recordings if r.current_timeline and r.current_time is not None]
-        if state.loading or not opened:
-            continue
-        if not sought:
-            if at is not None:
-                line = next(t for t in opened[0].timelines if t.name == opened[0].current_timeline)
-                start, end = line.start or 0, line.end or 0
-                # Integers of any timeline pass through `sequence` as they are.
-                client.set_time(line.name, sequence=start + round(at * (end - start)), play_state="paused")
-            sought, settled = True, time.monotonic() + 4.0
-            continue
-        picture = client.take_screenshot()
-        if picture == last and time.monotonic() > settled:
-            return picture
-        last = picture
-    raise _Failed("it took too long")
+    def _open(self) -> None:
+        """Wait until the recording is there.
+
+        The viewer's own --screenshot-to fires after a few frames, before the plots have been read.
+        """
+        from rerun.experimental import ViewerClient
+
+        reason = "no answer in time"
+        while time.monotonic() < self._deadline:
+            if self.process.poll() is not None:
+                raise self._failure(f"it ended with exit code {self.process.returncode}")
+            time.sleep(0.2)
+            try:
+                self.client = self.client or ViewerClient.connect(
+                    f"rerun+http://{LOOPBACK}:{self._port}/proxy"
+                )
+                state = self.client.get_state()
+            except Exception as problem:  # not listening yet; the client has no error of its own kind
+                reason, self.client = f"no answer in time ({problem})", None
+                continue
+            opened = [r for r in state.recordings if r.current_timeline and r.current_time is not None]
+            if not state.loading and opened:
+                found = next(t for t in opened[0].timelines if t.name == opened[0].current_timeline)
+                self.timeline, self.start, self.end = found.name, found.start or 0, found.end or 0
+                self.seek(0.0)
+                return
+        raise self._failure(reason)
+
+    def _failure(self, what: str) -> Exception:
+        said = self._log.read_text(errors="replace").strip()[-800:]
+        if "No graphics adapter" in said:
+            return NoGraphics(f"the Vulkan driver doesn't work: {said}")
+        return RuntimeError(f"the viewer made no picture: {what}. It said: {said}")
 
 
 def vulkan_drivers() -> list[Path]:

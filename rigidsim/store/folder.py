@@ -166,6 +166,21 @@ class RunFolder:
         finally:
             os.close(descriptor)
 
+    @property
+    def at_work(self) -> bool:
+        """Whether a process is at work here, as far as can be told."""
+        try:
+            descriptor = os.open(self.path, os.O_RDONLY)
+        except OSError:
+            return False
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+        finally:
+            os.close(descriptor)
+        return False
+
     def _unwritable(self, error: OSError) -> RunFolderError:
         return RunFolderError(
             f"{self.path}: can't be written: {error.strerror or error}; choose another {OUT}"

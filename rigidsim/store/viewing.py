@@ -40,14 +40,14 @@ def view(run: Shown, folder: RunFolder | None, *, web: bool = False) -> int:
         The viewer's exit code; 130 after Ctrl-C.
 
     Raises:
-        RunFolderError: the timeline can't be drawn, or no viewer is installed.
+        RunFolderError: the timeline can't be drawn, no viewer is installed, or there is no screen for it.
     """
-    from rigidsim.look.viewer import open_viewer
+    from rigidsim.look.viewer import NoDisplay, open_viewer
 
     with drawn(run, folder) as timeline:
         try:
             return open_viewer(timeline, web=web)
-        except FileNotFoundError as error:
+        except (FileNotFoundError, NoDisplay) as error:
             raise RunFolderError(str(error)) from None
 
 

@@ -324,6 +324,58 @@ def test_view(web: bool, config: Config, rigidsim_command: Command, monkeypatch:
     assert Path("runs/free/timeline.rrd").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["runs/free", "--png", "x.jpg"], "--png: given x.jpg; a name that ends in .png is allowed"),
+        (["runs/free", "--gif", "nowhere/x.gif"], "in a folder that isn't there; make it first"),
+        (["runs/free", "--gif", "x.gif", "--web"], "--web opens the viewer, --png, --gif and --mp4 draw"),
+        (["runs/free", "--seconds", "3"], "--seconds is for --gif and --mp4"),
+        (["runs/free", "--member", "2"], "--member is for one sweep: give its folder"),
+        (["runs/free", "runs/none"], "no run here"),
+    ],
+)
+def test_what_cannot_be_viewed_is_said(
+    arguments: list[str], message: str, config: Config, rigidsim_command: Command
+) -> None:
+    rigidsim_command("run", config())
+    result = rigidsim_command("view", *arguments)
+    assert result.exit_code == 2
+    no_traceback(result)
+    assert message in result.stderr
+
+
+def test_runs_and_members_of_a_sweep_are_viewed_side_by_side(
+    config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rerun.chunk import RrdReader
+
+    names: list[set[str]] = []
+
+    def pretend(path: Path, *, web: bool) -> int:
+        names.append({chunk.entity_path for chunk in RrdReader(path).stream()})
+        return 0
+
+    monkeypatch.setattr(viewer, "open_viewer", pretend)
+    rigidsim_command("run", config(), "--set", 'name="other"')
+    text = (
+        Path(config()).read_text()
+        + "\n[sweep]\naxes.'initial.angular_velocity[0]' = {values = [0.1, 0.2, 0.3]}\n"
+    )
+    Path("swept.toml").write_text(text)
+    rigidsim_command("run", config())
+    assert rigidsim_command("view", "runs/free", "runs/other").exit_code == 0
+    assert rigidsim_command("sweep", "swept.toml", "--out", "sweeps").exit_code == 0
+    refused = rigidsim_command("view", "sweeps/free")
+    assert refused.exit_code == 2
+    assert "choose members of it with --member N" in refused.stderr
+    result = rigidsim_command("view", "sweeps/free", "--member", "0", "--member", "2")
+    assert result.exit_code == 0, result.output
+    for entities in names:
+        assert {"/run0/scene/body", "/run1/scene/body", r"/plots/drift/difference\ 1"} <= entities
+    assert len(names) == 2
+
+
 def test_schema_describes_every_table(config: Config, rigidsim_command: Command) -> None:
     result = rigidsim_command("schema")
     assert result.exit_code == 0

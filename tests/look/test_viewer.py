@@ -59,6 +59,7 @@ def test_viewer_listens_on_this_machine_only_and_sends_no_statistics(
             return 7
 
     monkeypatch.setattr(subprocess, "Popen", Process)
+    monkeypatch.setenv("DISPLAY", ":0")
     assert viewer.open_viewer(tmp_path / "t.rrd") == 7
     assert viewer.open_viewer(tmp_path / "t.rrd", web=True) == 7
     for command in commands:

@@ -1,0 +1,169 @@
+"""Several runs side by side: their bodies, their plots in common ones, how far their attitudes are apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.clock import Clock, build_clock
+from rigidsim.look.drawn import DrawnRun
+from rigidsim.look.page import legible
+from rigidsim.look.plots import Plot, Series
+from rigidsim.look.recording import CHUNK, recording_to
+from rigidsim.look.thinning import AnyTable, thin, thinned_indices
+
+if TYPE_CHECKING:
+    from rigidsim.look.rows import Table
+
+MOST = 6
+"""Runs that are shown beside one another."""
+ROWS = 20_000
+"""Of each run."""
+COLORS = ((92, 148, 235), (240, 190, 60), (104, 190, 110), (225, 115, 190), (80, 200, 215), (235, 140, 80))
+_FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
+
+
+def write_comparison(named: Sequence[tuple[str, AnyTable]], path: Path, *, rows: int = ROWS) -> int:
+    """Write several datasets as one recording on one clock, their first stages side by side.
+
+    Args:
+        named: datasets with the names that they are to have on the screen; two to ``MOST``.
+        path: the file; it is whole when this returns.
+        rows: of each, at most.
+
+    Returns:
+        The number of rows written.
+
+    Raises:
+        ValueError: another number of datasets, or as of ``timeline.write_timeline``.
+        OSError: the file can't be written, or there is no room for it.
+    """
+    if not 2 <= len(named) <= MOST:
+        raise ValueError(f"given {len(named)} runs; 2 to {MOST} can be seen side by side")
+    shown = [(name, dataset, thin(dataset, rows)) for name, dataset in named]
+    seconds = [np.asarray(table["time"].values, dtype=np.float64) for _, _, table in shown]
+    clock = build_clock(np.unique(np.concatenate(seconds)))
+    drawn = []
+    for number, (name, dataset, table) in enumerate(shown):
+        steps = thinned_indices(dataset.sizes["time"], rows)
+        run = DrawnRun.of(dataset, table, steps, clock=_part(clock, seconds[number]))
+        drawn.append(_named(run, name, number))
+    apart = attitude_differences([(name, table) for name, _, table in shown])
+    with recording_to(path, " and ".join(name for name, _ in named), sum(map(len, seconds))) as recording:
+        from rigidsim.look.blueprint import build_comparison
+
+        recording.start(build_comparison(drawn, clock, apart))
+        for run in drawn:
+            run.draw_static(recording.stream, legend=run is drawn[0])
+            for start in range(0, len(run.seconds), CHUNK):
+                run.draw_rows(recording.stream, slice(start, min(start + CHUNK, len(run.seconds))))
+        if apart is not None:
+            drawn[0].draw_plots(recording.stream, [apart])
+    return sum(map(len, seconds))
+
+
+def _part(clock: Clock, seconds: NDArray[np.float64]) -> Clock:
+    """The clock of all, for the times of one."""
+    whole = np.asarray(clock.ticks * clock.seconds_per_tick)
+    places = np.clip(np.searchsorted(whole, seconds - 0.5 * clock.seconds_per_tick), 0, len(whole) - 1)
+    return replace(clock, ticks=clock.ticks[places])
+
+
+def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
+    """A run under entities and titles of its own; its leading plots alone."""
+    root, title = f"run{number}", legible(name)
+    stages = [
+        replace(stage, root=f"{root}/{stage.root}", title=f"{title}: {stage.title}")
+        for stage in run.picture.stages[:1]
+    ]
+    plots = []
+    for plot in run.plots:
+        if plot.place == "more":
+            continue
+        series = [
+            replace(
+                one,
+                name=f"{root} {one.name}",
+                labels=[f"{title}: {label}" for label in one.labels],
+                colors=[_shade(COLORS[number], k) for k in range(len(one.labels))],
+            )
+            for one in plot.series
+        ]
+        plots.append(replace(plot, series=series))
+    pages = {f"{root}_{key}": text for key, text in run.pages.items() if key == "Summary"}
+    picture = replace(run.picture, stages=stages, planes=[])
+    return replace(run, picture=picture, plots=plots, planes=[], states=[], pages=pages)
+
+
+def _shade(color: tuple[int, int, int], number: int) -> tuple[int, int, int]:
+    """The colour of a run, brighter for its second curve and darker for its third."""
+    part = (1.0, 0.62, 1.35, 0.8)[number % 4]
+    red, green, blue = (min(round(part * x), 255) for x in color)
+    return red, green, blue
+
+
+def attitude_differences(named: Sequence[tuple[str, Table]]) -> Plot | None:
+    """log10 of the angle (rad) between the first run's attitude and each other's, at the first run's times.
+
+    Between the samples of another run its quaternions are interpolated on the arc. None where the first has
+    no attitude, or no other has one at its times.
+    """
+    from rigidsim.look.signals import values
+
+    (first_name, first), *others = named
+    base = values(first, "quaternion")
+    if base is None:
+        return None
+    times = np.asarray(first["time"].values, dtype=np.float64)
+    base = base / np.linalg.norm(base, axis=1, keepdims=True)
+    series = []
+    for number, (name, table) in enumerate(others):
+        quaternion = values(table, "quaternion")
+        if quaternion is None:
+            continue
+        theirs = _at(times, np.asarray(table["time"].values, dtype=np.float64), quaternion)
+        angle = angle_between(base, theirs)
+        if not np.isfinite(angle).any():
+            continue
+        label = f"{legible(name)} from {legible(first_name)}"
+        curve = np.log10(np.maximum(angle, _FLOOR))[:, None]
+        series.append(Series(f"difference {number + 1}", [label], [COLORS[number + 1]], curve))
+    title = "Angle between the attitudes [rad], log10"
+    return Plot("difference", title, "drift", series) if series else None
+
+
+def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angle (rows,), rad, of the rotation from one attitude to another, (rows, 4) unit quaternions each.
+
+    From the chord, so that small angles keep their digits: an arc cosine would lose those below 1e-8.
+    """
+    chord = np.minimum(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
+    return np.asarray(4 * np.arcsin(np.clip(chord / 2, 0.0, 1.0)))
+
+
+def _at(
+    times: NDArray[np.float64], theirs: NDArray[np.float64], quaternion: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Unit quaternions at some times: of a sample where there is one, on the arc between two, else nan."""
+    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    after = np.clip(np.searchsorted(theirs, times), 0, len(theirs) - 1)
+    exact = theirs[after] == times
+    before = np.maximum(after - 1, 0)
+    width = theirs[after] - theirs[before]
+    share = np.where(width > 0, (times - theirs[before]) / np.where(width > 0, width, 1.0), 0.0)
+    a, b = unit[before], unit[after]
+    b = b * np.where(np.einsum("ij,ij->i", a, b) < 0, -1.0, 1.0)[:, None]
+    arc = np.arccos(np.clip(np.einsum("ij,ij->i", a, b), -1.0, 1.0))
+    sine = np.sin(arc)
+    small = sine < 1e-9
+    left = np.where(small, 1 - share, np.sin((1 - share) * arc) / np.where(small, 1.0, sine))
+    right = np.where(small, share, np.sin(share * arc) / np.where(small, 1.0, sine))
+    found = left[:, None] * a + right[:, None] * b
+    found = np.where(exact[:, None], unit[after], found)
+    outside = (times < theirs[0]) | (times > theirs[-1])
+    return np.asarray(np.where(outside[:, None], np.nan, found))

@@ -1,0 +1,81 @@
+"""A recording of rerun written to a file: strictly, with its layout, and never on a full disk."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rigidsim.look.page import legible
+from rigidsim.scene.records import dataclass
+
+CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
+_ROW_BYTES = 600  # at most: some twenty variables
+_FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
+
+
+@dataclass
+class Recording:
+    """A recording that is being written.
+
+    Attributes:
+        stream: of rerun.
+    """
+
+    stream: Any
+    path: Path
+    name: str
+
+    def start(self, blueprint: Any) -> None:
+        """Open the file, with its layout."""
+        self.stream.save(self.path, default_blueprint=blueprint)
+        self.stream.send_recording_name(legible(self.name))
+
+
+@contextmanager
+def recording_to(path: Path, name: str, rows: int) -> Iterator[Recording]:
+    """A recording that is whole when the block ends.
+
+    Args:
+        rows: that will be written, at most.
+
+    Raises:
+        RuntimeError: the environment variable RERUN switches recording off.
+        OSError: there is no room for it.
+    """
+    import rerun as rr
+
+    check_room(path, rows)
+    with strict():
+        # The context manager finishes the file: without it there is no footer.
+        with rr.RecordingStream("rigidsim") as stream:
+            if not rr.is_enabled(stream):
+                raise RuntimeError("RERUN is set to off in the environment: unset it")
+            yield Recording(stream, path, name)
+
+
+@contextmanager
+def strict() -> Iterator[None]:
+    """Errors of the rerun API as exceptions, for the length of the block only.
+
+    Otherwise wrong lengths, shapes and times are dropped with a warning.
+    """
+    from rerun.error_utils import set_strict_mode, strict_mode
+
+    before = strict_mode()
+    set_strict_mode(True)
+    try:
+        yield
+    finally:
+        set_strict_mode(before)
+
+
+def check_room(path: Path, rows: int) -> None:
+    """Refuse before rerun finds the disk full: then it may wait for ever."""
+    room, needed = shutil.disk_usage(path.parent).free, _FIRST_BYTES + _ROW_BYTES * rows
+    if room < needed:
+        missing = f"it may need {needed / 1e6:.1f} MB, and {room / 1e6:.1f} MB are free"
+        raise OSError(errno.ENOSPC, missing, str(path))

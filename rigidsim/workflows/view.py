@@ -1,0 +1,167 @@
+"""``rigidsim view``: one run or several in the viewer, a running one as it goes on, or drawn to a file."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigidsim.errors import RigidsimError, RunFolderError
+from rigidsim.store import atomic
+from rigidsim.store.run import Run, SavedRun, open_run
+from rigidsim.store.sweep_folder import is_sweep
+from rigidsim.store.viewing import drawn
+
+if TYPE_CHECKING:
+    import xarray
+
+Told = Callable[[int, int], None]
+
+
+def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[str, Run]]:
+    """Runs with the names that they are to have on the screen, each different.
+
+    Args:
+        paths: run folders; with ``members`` the folder of one sweep.
+        members: of the sweep, which are run by themselves for it.
+
+    Raises:
+        RunFolderError: no run there, or a sweep without members chosen, or members of what is no sweep.
+        ConfigError: there is no such member.
+    """
+    if members:
+        return _members(paths, members)
+    sweeps = [path for path in paths if is_sweep(path)]
+    if sweeps:
+        raise RunFolderError(
+            f"{sweeps[0]}: is a sweep; choose members of it with --member N (repeatable, counted from 0); "
+            "rigidsim plot draws a variable over its axes"
+        )
+    runs = [open_run(path) for path in paths]
+    names = [run.outcome.name for run in runs]
+    if len(set(names)) < len(names):
+        names = [run.place for run in runs]
+    return list(zip(names, runs, strict=True))
+
+
+def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, Run]]:
+    from rigidsim.store.sweep_run import open_sweep
+    from rigidsim.workflows.read import parse
+    from rigidsim.workflows.run import run
+    from rigidsim.workflows.sweep_members import single_member
+
+    if len(paths) != 1 or not is_sweep(paths[0]):
+        raise RunFolderError("--member is for one sweep: give its folder (runs/NAME), and no other run")
+    folder = open_sweep(paths[0]).folder
+    experiment = parse(folder.config.read_text(), source=str(folder.config))
+    chosen = list(dict.fromkeys(members))
+    return [(f"member {member}", run(single_member(experiment, member), out=None)) for member in chosen]
+
+
+def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
+    """Open runs in the viewer, side by side where they are several, and wait until it is closed.
+
+    A single run that another process is working on is followed: the picture grows with what is saved.
+
+    Returns:
+        The viewer's exit code; 130 after Ctrl-C.
+
+    Raises:
+        RunFolderError: a timeline can't be drawn, no viewer is installed, or there is no screen for it.
+    """
+    from rigidsim.look.viewer import NoDisplay, open_viewer
+
+    (_, first), *others = named
+    if not others and isinstance(first, SavedRun) and first.folder.at_work:
+        return _follow(first, web=web)
+    if not others:
+        return first.view(web=web)
+    with recording_of(named) as timeline:
+        try:
+            return open_viewer(timeline, web=web)
+        except (FileNotFoundError, NoDisplay) as error:
+            raise RunFolderError(str(error)) from None
+
+
+def render(
+    named: Sequence[tuple[str, Run]], target: Path, *, seconds: float | None = None, told: Told | None = None
+) -> Path:
+    """Draw runs to a PNG picture, or a GIF or MP4 film, without a screen.
+
+    Args:
+        seconds: that a film lasts.
+        told: of its progress, frames done and in all.
+
+    Raises:
+        RunFolderError: it can't be drawn or written; the message says what is to be installed.
+    """
+    from rigidsim.look import film
+    from rigidsim.look.viewer import NoGraphics
+
+    with recording_of(named) as timeline, _new(target) as new:
+        try:
+            film.render(timeline, new, seconds=seconds or film.SECONDS, told=told)
+        except (FileNotFoundError, NoGraphics, film.NoEncoder, RuntimeError, ValueError) as error:
+            raise RunFolderError(f"{target}: can't be drawn: {error}") from None
+    return target
+
+
+@contextmanager
+def _new(target: Path) -> Iterator[Path]:
+    """A file of the target's suffix that takes its place once it is whole."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
+            new = Path(scratch) / f"new{target.suffix}"
+            yield new
+            with atomic.replacing(target) as placed:
+                placed.write_bytes(new.read_bytes())
+    except OSError as error:
+        raise RunFolderError(f"{target}: can't be written: {error.strerror or error}") from None
+
+
+@contextmanager
+def recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
+    """The recording of a run, or one of several side by side that goes when the block ends.
+
+    Raises:
+        RunFolderError: it can't be drawn.
+    """
+    if len(named) == 1:
+        run = named[0][1]
+        with drawn(run, run.folder if isinstance(run, SavedRun) else None) as timeline:
+            yield timeline
+        return
+    from rigidsim.look.comparison import write_comparison
+
+    with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch, ExitStack() as opened:
+        datasets = [(name, opened.enter_context(run.dataset)) for name, run in named]
+        path = Path(scratch) / "timeline.rrd"
+        try:
+            write_comparison(datasets, path)
+        except (OSError, RuntimeError, ValueError) as error:
+            raise RunFolderError(f"side by side: {getattr(error, 'strerror', None) or error}") from None
+        yield path
+
+
+def _follow(run: SavedRun, *, web: bool) -> int:
+    from rigidsim.look import live
+    from rigidsim.look.viewer import NoDisplay
+
+    try:
+        return live.follow(lambda: so_far(run), web=web)
+    except (FileNotFoundError, NoDisplay, RuntimeError) as error:
+        raise RunFolderError(str(error)) from None
+
+
+def so_far(run: SavedRun) -> tuple[xarray.Dataset | None, bool]:
+    """What is saved of a run now, None before its first segment, and whether it goes on."""
+    going_on = run.folder.at_work
+    try:
+        return open_run(run.folder.path).opened(indexed=False), going_on
+    except RigidsimError:
+        # nothing is saved yet, or segments are just becoming the dataset: the next look finds it
+        if going_on:
+            return None, True
+        raise

@@ -1,0 +1,102 @@
+"""Several runs in one recording, and a run that grows while it is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+pytest.importorskip("rerun")
+
+import rerun as rr
+
+from rigidsim.look import viewer
+from rigidsim.look.comparison import MOST, angle_between, write_comparison
+from rigidsim.look.live import LiveRecording
+
+Build = Callable[..., xarray.Dataset]
+Read = Callable[[Path, str], dict[str, np.ndarray]]
+
+
+def test_runs_side_by_side_share_a_clock_and_show_how_far_they_are_apart(
+    symmetric_top: Build, read_back: Read, tmp_path: Path
+) -> None:
+    one, other = symmetric_top(count=1001), symmetric_top(count=501)  # each second time of the first
+    apart = 1e-9
+    turned = other["quaternion"].values @ _turn_about_z(apart).T
+    other = other.assign(quaternion=(("time", "quaternion_component"), turned))
+    assert write_comparison([("a", one), ("b", other)], tmp_path / "t.rrd") == 1502
+    first, second = (read_back(tmp_path / "t.rrd", f"/run{k}/scene/body") for k in (0, 1))
+    assert (len(first["time"]), len(second["time"])) == (1001, 501)
+    np.testing.assert_array_equal(first["time"][::2], second["time"])
+    difference = read_back(tmp_path / "t.rrd", r"/plots/drift/difference\ 1")["Scalars:scalars"]
+    at_samples = 10 ** difference[::2]
+    # a chord of unit quaternions is known to a few units in the last place of 1
+    np.testing.assert_allclose(at_samples, apart, rtol=0, atol=1e-14)
+    # between samples the other's is interpolated: the arc misses by (rate dt)^2 / 8 of a turn at most
+    assert (10 ** difference[1::2]).max() < (2 * 0.04) ** 2 / 8
+
+
+def _turn_about_z(angle: float) -> np.ndarray:
+    """What a quaternion w x y z becomes with a rotation about Z after it."""
+    c, s = np.cos(angle / 2), np.sin(angle / 2)
+    return np.array([[c, 0, 0, -s], [0, c, -s, 0], [0, s, c, 0], [s, 0, 0, c]])
+
+
+def test_angles_between_attitudes_keep_their_digits() -> None:
+    one = np.array([[1.0, 0, 0, 0]])
+    for angle in (1e-12, 1e-6, 0.3, 3.0):
+        other = np.array([[np.cos(angle / 2), 0, 0, np.sin(angle / 2)]])
+        assert angle_between(one, other)[0] == pytest.approx(angle, rel=1e-12)
+        assert angle_between(one, -other)[0] == pytest.approx(angle, rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, MOST + 1])
+def test_too_few_and_too_many_runs_are_refused(symmetric_top: Build, tmp_path: Path, count: int) -> None:
+    runs = [(str(k), symmetric_top(count=11)) for k in range(count)]
+    with pytest.raises(ValueError, match=f"given {count} runs; 2 to {MOST}"):
+        write_comparison(runs, tmp_path / "t.rrd")
+    assert not (tmp_path / "t.rrd").exists()
+
+
+def test_a_run_that_goes_on_is_sent_once_and_as_a_whole(
+    symmetric_top: Build, read_back: Read, tmp_path: Path
+) -> None:
+    whole = symmetric_top(count=901)
+    with rr.RecordingStream("rigidsim") as stream:
+        stream.save(tmp_path / "t.rrd")
+        recording = LiveRecording(stream)
+        recording.update(whole.isel(time=slice(0, 0)))
+        assert recording.rows == 0
+        for end in (300, 300, 640, 901):
+            recording.update(whole.isel(time=slice(0, end)))
+            assert recording.rows == end  # none twice: the scales of this motion never change
+    rows = read_back(tmp_path / "t.rrd", "/scene/body")
+    np.testing.assert_array_equal(rows["step"], np.arange(901))
+    wanted = whole["quaternion"].values[:, [1, 2, 3, 0]]
+    np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
+
+
+def test_a_growing_motion_is_sent_again_where_its_scales_change(symmetric_top: Build, tmp_path: Path) -> None:
+    whole = symmetric_top(count=200)
+    rates = whole["angular_velocity"] * np.linspace(1, 5, 200)[:, None]
+    growing = whole.assign(angular_velocity=(whole["angular_velocity"].dims, rates.values))
+    with rr.RecordingStream("rigidsim") as stream:
+        stream.save(tmp_path / "t.rrd")
+        recording = LiveRecording(stream)
+        recording.update(growing.isel(time=slice(0, 100)))
+        recording.update(growing)
+    assert recording.rows == 300
+
+
+def test_without_a_display_it_is_said_what_to_do(
+    symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "t.rrd").write_bytes(b"")
+    monkeypatch.setattr(viewer, "has_display", lambda: False)
+    for started in (lambda: viewer.open_viewer(tmp_path / "t.rrd"), viewer.start_empty):
+        with pytest.raises(viewer.NoDisplay, match=r"--web serves .* --png, --gif or --mp4 FILE"):
+            started()

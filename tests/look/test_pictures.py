@@ -1,0 +1,151 @@
+"""Ready scenes in the real viewer, without a screen: nothing fails, and body and trails are in the picture.
+
+Skipped where there is no Vulkan driver (Mesa's software driver will do).
+"""
+
+from __future__ import annotations
+
+import io
+import time
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rerun")
+
+import rigidsim
+from rigidsim.look.drawn import DrawnRun
+from rigidsim.look.recording import recording_to
+from rigidsim.look.thinning import thin, thinned_indices
+from rigidsim.look.timeline import write_timeline
+from rigidsim.look.viewer import HeadlessViewer, NoGraphics, vulkan_drivers
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"),
+]
+
+CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.toml"))
+ROWS = 3000
+
+
+@pytest.fixture(params=CONFIGS, ids=lambda path: path.stem)
+def run(request: pytest.FixtureRequest) -> rigidsim.Run:
+    return rigidsim.run(rigidsim.load(request.param), out=None)
+
+
+def opened(path: Path) -> HeadlessViewer:
+    try:
+        return HeadlessViewer(path, size=(1200, 700)).__enter__()
+    except NoGraphics as reason:
+        pytest.skip(str(reason))
+
+
+def space_picture(viewer: HeadlessViewer, share: float) -> np.ndarray:
+    """The leading view in space, (height, width, 3), once it no longer changes."""
+    from matplotlib.image import imread
+
+    views = [view for view in viewer.client.get_state().views if view.view_class == "3D"]
+    leading = next((v for v in views if v.origin.startswith("/scene")), views[0])
+    viewer.seek(share)
+    before = b""
+    for _ in range(40):
+        time.sleep(0.25)
+        now = bytes(viewer.client.take_screenshot(leading.view_id))
+        if now == before:
+            break
+        before = now
+    return np.asarray(imread(io.BytesIO(before))[..., :3], dtype=np.float64)
+
+
+def test_a_ready_scene_is_seen_whole(run: rigidsim.Run, tmp_path: Path) -> None:
+    """No view reports a fault; what body, arrows and trails add to the empty stage is in the frame."""
+    with run.dataset as dataset:
+        write_timeline(dataset, tmp_path / "full.rrd", rows=ROWS)
+        _write_empty(dataset, tmp_path / "empty.rrd")
+    pictures = []
+    for name in ("full", "empty"):
+        viewer = opened(tmp_path / f"{name}.rrd")
+        try:
+            pictures.append(space_picture(viewer, 0.6))
+            if name == "full":
+                faults = [(v.name, r.summary) for v in viewer.client.get_state().views for r in v.reports]
+                assert faults == []
+        finally:
+            viewer.__exit__()
+    full, empty = pictures
+    added = np.abs(full - empty).max(axis=2) > 0.08
+    assert added.mean() > 0.004  # some hundred points of the screen
+    rows, columns = np.nonzero(added)
+    height, width = added.shape
+    # the title stands above; nothing reaches the frame, which would be cut
+    assert columns.min() > 2
+    assert columns.max() < width - 3
+    assert rows.max() < height - 3
+
+
+def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
+    """The same stage without body, arrows and trails."""
+    shown = thin(dataset, ROWS)
+    drawn = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], ROWS))
+    with recording_to(path, "empty", len(drawn.seconds)) as recording:
+        recording.start(drawn.blueprint())
+        stages = [
+            replace(stage, meshes=[], points=np.zeros((0, 3)), arrows=[], trails=[], axis_length=0.0)
+            for stage in drawn.picture.stages
+        ]
+        bare = replace(drawn, picture=replace(drawn.picture, stages=stages))
+        bare.draw_static(recording.stream)
+        bare.draw_rows(recording.stream, slice(0, len(drawn.seconds)))
+
+
+def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path) -> None:
+    config = next(path for path in CONFIGS if path.stem == "intermediate_axis")
+    with rigidsim.run(rigidsim.load(config), out=None).dataset as dataset:
+        write_timeline(dataset, tmp_path / "t.rrd")
+        quaternion = dataset["quaternion"].values
+        seconds = dataset["time"].values
+    from rigidsim.look.solids import rotation_matrix
+
+    viewer = opened(tmp_path / "t.rrd")
+    try:
+        assert (viewer.start, viewer.end) == (0, round(seconds[-1] * 1e9))
+        for row in (0, 1, 777, 6000, 12000):
+            viewer.seek_tick(round(seconds[row] * 1e9))
+            time.sleep(0.3)
+            graph = viewer.client.get_transform_graph(include_transforms=True, edge_filter="temporal")
+            edge = next(e for e in graph["edges"] if e["child"] == "tf#/scene/body")
+            shown = np.array(edge["source"]["parent_from_child"])[:3, :3]
+            # float32 quaternions: half a unit in the last place, twice in each entry
+            np.testing.assert_allclose(shown, rotation_matrix(quaternion[row]), rtol=0, atol=1e-6)
+    finally:
+        viewer.__exit__()
+
+
+def test_films_have_moving_frames(tmp_path: Path) -> None:
+    from PIL import Image
+
+    from rigidsim.look import film
+
+    config = next(path for path in CONFIGS if path.stem == "heavy_top_fast")
+    with rigidsim.run(rigidsim.load(config), out=None).dataset as dataset:
+        write_timeline(dataset, tmp_path / "t.rrd", rows=ROWS)
+    told: list[tuple[int, int]] = []
+    film.render(tmp_path / "t.rrd", tmp_path / "t.gif", seconds=0.5, told=lambda *now: told.append(now))
+    assert told == [(k, 6) for k in range(1, 7)]
+    with Image.open(tmp_path / "t.gif") as picture:
+        frames = []
+        for number in range(picture.n_frames):
+            picture.seek(number)
+            frames.append(np.asarray(picture.convert("RGB"), dtype=float))
+    assert len(frames) == 6
+    assert all(np.abs(b - a).max() > 60 for a, b in pairwise(frames))
+    film.render(tmp_path / "t.rrd", tmp_path / "t.png")
+    with Image.open(tmp_path / "t.png") as picture:
+        assert picture.size == film.SIZE
+    pytest.importorskip("imageio_ffmpeg")
+    film.render(tmp_path / "t.rrd", tmp_path / "t.mp4", seconds=0.5)
+    assert (tmp_path / "t.mp4").read_bytes()[4:8] == b"ftyp"
