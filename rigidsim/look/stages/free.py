@@ -139,7 +139,7 @@ def _poinsot(dataset: Table, subject: Subject, radii: Array, rates: Array, body:
             lines.append(Line(f"plane/{name}{k + 4}", FAINT, points, SPACE, 0.7, 0.45))
     # With L downwards, as books show it: the plane is the floor that the ellipsoid rolls on.
     eye = -along * 0.55 + first * 1.35 + second * 0.9
-    distance = 2.2 * max(size, 1.0) * 1.12
+    distance = 2.2 * max(size, 1.0) * 1.2
     eye = eye / np.linalg.norm(eye) * distance
     center = 0.35 * floor
     return Stage(
