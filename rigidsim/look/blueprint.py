@@ -6,8 +6,7 @@ Imports rerun when it is loaded, so load it only where a timeline is written.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -17,18 +16,15 @@ from rerun.blueprint.components import LinkAxis
 from rigidsim.look.clock import Clock
 from rigidsim.look.drawing import OLDER, fades, trail_path, trail_stride
 from rigidsim.look.plots import Plot
-from rigidsim.look.plotting import LEGEND_LINE, legend_lines, legend_of, plane_path, plane_reach, plot_path
+from rigidsim.look.plotting import LEGEND_LINE, legend_lines, plane_path, plane_reach, plot_path
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
-
-if TYPE_CHECKING:
-    from rigidsim.look.drawn import DrawnRun
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
 TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
 TRAIL_ROWS = 1500  # at most in a sliding trail, and never more than a fifth of the run
 RECENT = 0.3  # of a sliding trail: its bright part
-_PIXELS = 800.0  # about the height of the page
+PIXELS = 800.0  # about the height of the page
 _DARK = (18, 20, 26)
 
 
@@ -60,26 +56,26 @@ def build_blueprint(
     """
     narrow = len(stages) > 1
     spaces: list[rrb.View | rrb.Container] = [
-        _space_view(stage, clock, narrow=narrow, subject=subject) for stage in stages
+        space_view(stage, clock, narrow=narrow, subject=subject) for stage in stages
     ]
-    figures = [_plane_view(plane) for plane in planes]
-    beside = [_tabs(figures)] if figures else []
+    figures = [plane_view(plane) for plane in planes]
+    beside = [tabs(figures)] if figures else []
     shares = [3.0] * len(spaces) + [1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
     texts: list[rrb.View] = [rrb.TextDocumentView(origin=f"/{page.lower()}", name=page) for page in pages]
-    more = [_plot_view(plot) for plot in plots if plot.place == "more"]
+    more = [plot_view(plot) for plot in plots if plot.place == "more"]
     height = 30.0 + 24.0 * legend_lines(legend)
     left = rrb.Vertical(
         scene,
-        _legend_view(legend),
-        _tabs(texts),
-        row_shares=[_PIXELS * 0.7 - height, height, _PIXELS * 0.3],
+        legend_view(legend),
+        tabs(texts),
+        row_shares=[PIXELS * 0.7 - height, height, PIXELS * 0.3],
     )
-    right: list[rrb.View | rrb.Container] = [_plot_view(plot) for plot in plots if plot.place == "leading"]
+    right: list[rrb.View | rrb.Container] = [plot_view(plot) for plot in plots if plot.place == "leading"]
     heights = [3.0] * len(right)
-    small = [_plot_view(plot) for plot in plots if plot.place == "drift"]
+    small = [plot_view(plot) for plot in plots if plot.place == "drift"]
     if small or more:
-        right.append(_tabs([*small, *more]))
+        right.append(tabs([*small, *more]))
         heights.append(1.8)
     if states:
         right.append(rrb.StateTimelineView(origin="/states", name="Events"))
@@ -93,58 +89,17 @@ def build_blueprint(
         content,
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        _time_panel(clock, turns, following=following),
+        time_panel(clock, turns, following=following),
     )
 
 
-def build_comparison(runs: Sequence[DrawnRun], clock: Clock, difference: Plot | None) -> rrb.Blueprint:
-    """The layout for runs side by side.
-
-    Args:
-        runs: each with one stage, under names of its own.
-        clock: of all times.
-        difference: how far their attitudes are apart, where that is known.
-    """
-    spaces = [_space_view(run.picture.stages[0], run.clock, narrow=True, subject=run.subject) for run in runs]
-    legend = legend_of(runs[0].picture.stages)
-    height = 30.0 + 24.0 * legend_lines(legend)
-    texts = [
-        rrb.TextDocumentView(origin=f"/{page.lower()}", name=run.picture.stages[0].title.split(":")[0])
-        for run in runs
-        for page in run.pages
-    ]
-    half = -(-len(spaces) // 2)
-    scene = (
-        rrb.Horizontal(*spaces)
-        if len(spaces) <= 3
-        else rrb.Vertical(rrb.Horizontal(*spaces[:half]), rrb.Horizontal(*spaces[half:]))
-    )
-    shares = [_PIXELS * 0.7 - height, height, _PIXELS * 0.3]
-    left = rrb.Vertical(scene, _legend_view(legend), _tabs(texts), row_shares=shares)
-    common: dict[str, list[Plot]] = {}
-    for run in runs:
-        for plot in run.plots:
-            common.setdefault(plot.key, []).append(plot)
-    joined = [
-        replace(same[0], series=[one for plot in same for one in plot.series]) for same in common.values()
-    ]
-    views = [] if difference is None else [_plot_view(difference)]
-    views += [_plot_view(plot) for plot in joined if plot.place == "leading"][: 4 - len(views)]
-    views += [_plot_view(plot) for plot in joined if plot.place == "drift"]
-    turns = max(run.turns for run in runs)
-    return rrb.Blueprint(
-        rrb.Horizontal(left, rrb.Vertical(*views), column_shares=[5, 3.4]),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        _time_panel(clock, turns, following=False),
-    )
-
-
-def _tabs(views: Sequence[rrb.View]) -> rrb.View | rrb.Container:
+def tabs(views: Sequence[rrb.View]) -> rrb.View | rrb.Container:
+    """Views behind tabs, where they are several."""
     return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
 
 
-def _time_panel(clock: Clock, turns: float, *, following: bool) -> rrb.TimePanel:
+def time_panel(clock: Clock, turns: float, *, following: bool) -> rrb.TimePanel:
+    """The time panel: at the start, playing, at a speed that shows the motion."""
     span = float(abs(clock.ticks[-1] - clock.ticks[0])) or 1.0
     screen = min(max(TURN_SECONDS * turns, 10.0), SCREEN_SECONDS)
     return rrb.TimePanel(
@@ -158,7 +113,8 @@ def _time_panel(clock: Clock, turns: float, *, following: bool) -> rrb.TimePanel
     )
 
 
-def _space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | None) -> rrb.Spatial3DView:
+def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | None) -> rrb.Spatial3DView:
+    """A view of one stage."""
     eye = camera(stage, narrow=narrow, subject=subject)
     count = len(clock.ticks)
     rows = max(min(TRAIL_ROWS, count // 5), 2)
@@ -200,7 +156,8 @@ def _window(clock: Clock, rows: int, until: int) -> list[rr.VisibleTimeRange]:
     ]
 
 
-def _plane_view(plane: Plane) -> rrb.Spatial2DView:
+def plane_view(plane: Plane) -> rrb.Spatial2DView:
+    """A view of one plane figure."""
     size = 1.35 * plane_reach(plane)
     middle = np.zeros(2)
     return rrb.Spatial2DView(
@@ -213,7 +170,8 @@ def _plane_view(plane: Plane) -> rrb.Spatial2DView:
     )
 
 
-def _legend_view(legend: Sequence[tuple[str, Color]]) -> rrb.Spatial2DView:
+def legend_view(legend: Sequence[tuple[str, Color]]) -> rrb.Spatial2DView:
+    """A view of what the colours mean."""
     lines = legend_lines(legend)
     return rrb.Spatial2DView(
         origin="/legend",
@@ -223,7 +181,8 @@ def _legend_view(legend: Sequence[tuple[str, Color]]) -> rrb.Spatial2DView:
     )
 
 
-def _plot_view(plot: Plot) -> rrb.TimeSeriesView:
+def plot_view(plot: Plot) -> rrb.TimeSeriesView:
+    """A view of one plot."""
     # Drifts grow upwards along time: their legend stays out of the way below.
     corner = rrb.Corner2D.RightBottom if plot.place == "drift" else rrb.Corner2D.LeftTop
     return rrb.TimeSeriesView(

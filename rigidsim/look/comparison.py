@@ -55,7 +55,7 @@ def write_comparison(named: Sequence[tuple[str, AnyTable]], path: Path, *, rows:
         drawn.append(_named(run, name, number))
     apart = attitude_differences([(name, table) for name, _, table in shown])
     with recording_to(path, " and ".join(name for name, _ in named), sum(map(len, seconds))) as recording:
-        from rigidsim.look.blueprint import build_comparison
+        from rigidsim.look.comparison_page import build_comparison
 
         recording.start(build_comparison(drawn, clock, apart))
         for run in drawn:
