@@ -34,6 +34,7 @@ STUDIES = (
     "spectral_lines",
     "hyperion",
     "satellite_stability",
+    "averaged_motions",
 )
 
 

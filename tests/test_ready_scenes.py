@@ -12,6 +12,8 @@ from support import CONFIGS, EPSILON, amplification, angle_between, cases, law, 
 import rigidsim
 
 ATTITUDE = 'output.record=["angular_velocity", "quaternion"]'
+AVERAGED = [path for path in CONFIGS if rigidsim.load(path).config.model.reduced]
+CONFIGS = [path for path in CONFIGS if path not in AVERAGED]
 NAMES = [path.stem for path in CONFIGS]
 UPRIGHT = ("sleeping", "earth")  # start in the singularity of zxz; xyz is regular there
 # one of each kind in each suite, all in the long one: free, in Euler angles, tops, gradients, flights
@@ -49,6 +51,22 @@ def test_all_invariants_hold_and_the_attitude_is_right(path: Path, runs: Path) -
     accuracy = run.summary["accuracy"]
     assert largest_error(run, path) <= 3 * accuracy["estimated_attitude_error"]
     assert (accuracy["amplification"] > 1) == (path.stem in UNSTABLE)
+
+
+@pytest.mark.parametrize("path", AVERAGED, ids=[path.stem for path in AVERAGED])
+def test_averaged_scenes_say_how_far_they_are_from_the_full_motion(path: Path, runs: Path) -> None:
+    run = run_config(path, runs)
+    assert run.status == "finished"
+    assert run.summary["warnings"] == []
+    for name, row in run.summary["invariants"].items():
+        # rounding and a tolerance of 1024 epsilon as a random walk
+        assert row["bound"] == 50 * 2.0**-42 * np.sqrt(run.summary["cost"]["steps"])
+        assert 0 <= row["largest_drift"] <= row["bound"], name
+    modelling = run.summary["modelling"]
+    assert len(modelling["windows"]) == 3
+    # second order in the nutation that was averaged away: some 1e-5 rad, or 1e-10 of the precession's
+    # 2 pi a turn, and first order in the precession's rate over the spin's, 1e-7 of it
+    assert 1e-10 < modelling["momentum_axis"] < 2 * np.pi * 1e-6
 
 
 def assert_invariants_hold(run: rigidsim.Run) -> None:

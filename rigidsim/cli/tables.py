@@ -11,13 +11,16 @@ from rigidsim.cli.understood import understood
 from rigidsim.cli.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import TimeWords, span_text
-from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Summary
+from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Modelling, Summary
 from rigidsim.store.understood import Body, Span, Start
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from rigidsim.workflows.check import Checked
+
+
+_YEAR = 365.25 * 86400  # s
 
 
 def size(count: float) -> str:
@@ -102,7 +105,8 @@ def _print_ended(summary: Summary, on: Page) -> None:
     on.line("drifts", "relative to: " + _scales(summary.invariants))
     if summary.hold_invariants:
         on.line("held", "put back: what the drift would have been; held drifts are no independent check")
-    _print_accuracy(summary.accuracy, on)
+    _print_accuracy(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
+    _print_modelling(summary.modelling, on)
     for number, name in enumerate(summary.events):
         on.line("" if number else "events", _event(summary, name))
     if summary.undefined_samples:
@@ -164,19 +168,41 @@ def _without(row: list[Any], place: int) -> list[Any]:
     return [cell for n, cell in enumerate(row) if n != place]
 
 
-def _print_accuracy(accuracy: Accuracy, on: Page) -> None:
+def _print_modelling(found: Modelling | None, on: Page) -> None:
+    """How far a reduced model is from the full one."""
+    if found is None:
+        return
+    if found.momentum_axis is None:
+        on.line("averaged", f"modelling error {found.how}")
+        return
+    text = f"momentum's direction within {found.momentum_axis:.1e} rad of the full model's"
+    if found.figure_axis is not None:
+        text += f", figure axis within {found.figure_axis:.1e} rad"
+    on.line("averaged", text)
+    if not found.whole and found.growth is not None and found.oscillation is not None:
+        span = found.windows[0].end - found.windows[0].start
+        text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
+        text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * _YEAR:.1e} rad/yr"
+        on.line("", text)
+    if not found.short_period:
+        on.line("", "[model] short_period = true adds the nutation back that averaging removed")
+
+
+def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
     if accuracy.chosen:
         on.line("chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
     estimate = accuracy.estimated_attitude_error
     if accuracy.certified is not None:
         asked = "" if accuracy.requested is None else f", {accuracy.requested:.1e} asked for"
         text = f"certified to {accuracy.certified:.1e} rad{asked} ({accuracy.how}, "
-        on.line("attitude", f"{text}{accuracy.times_compared} times)")
+        on.line(what, f"{text}{accuracy.times_compared} times)")
     elif estimate is not None:
         factor = accuracy.amplification or 1.0
         unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 else ""
         size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
-        on.line("attitude", size if estimate < math.pi else "unknown at the end")
+        if what == "axis":
+            size = f"momentum's direction integrated to about {estimate:.1e} rad at the end{unstable}"
+        on.line(what, size if estimate < math.pi else "unknown at the end")
         share = accuracy.examined_share
         if share is not None and share < 1 and estimate < math.pi:
             seen = f"the growth of errors was followed over the first {100 * share:.2g} % of the run"

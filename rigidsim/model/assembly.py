@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import heyoka as hy
 
+from rigidsim.model.averaged.states import averaged_states
 from rigidsim.model.canonical import MOMENTA, CanonicalStates, canonical_states, hamilton_equations
 from rigidsim.model.equations import (
     flight_equations,
@@ -51,6 +52,10 @@ def assemble_states(
         ConfigError: a load without a potential in the canonical formulation.
     """
     requirements, numbers = plan.requirements, plan.numbers
+    if plan.average is not None:
+        return averaged_states(
+            plan.scene, plan.average, plan.loads, plan.scaling, numbers, plan.orbit_tags, number
+        )
     canonical = None
     if requirements.canonical:
         canonical = canonical_states(plan.scene, plan.scaling, numbers, number)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import field
 from functools import cached_property
+from typing import Any
 
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.records import dataclass
 
@@ -19,6 +21,34 @@ class Mechanics(Kinematics):
     """Kinematics with all loads that act: what observables and invariants are written against."""
 
     loads: list[Load] = field(default_factory=list)
+
+    @property
+    def turning_rate(self) -> Any | None:
+        """Bound of the rate (mpf, rad/s) at which axes turn where rotations are averaged over
+        (``rigidsim.model.averaged``); None elsewhere.
+        """
+        return None
+
+    @property
+    def averaged(self) -> bool:
+        """Whether they are."""
+        return self.turning_rate is not None
+
+    def tells(self, name: str) -> bool:
+        """Whether the motion carries as much as an observable of this name takes, as far as ``needs`` can't
+        say.
+        """
+        return True
+
+    @property
+    def figure_space(self) -> list[Symbolic]:
+        """A vector along the figure axis, space axes."""
+        return apply(self.matrix, [as_factor(self.number(x)) for x in self.scene.figure.pole])
+
+    @property
+    def spin_space(self) -> list[Symbolic]:
+        """A vector along the angular velocity, space axes."""
+        return apply(self.matrix, self.rates)
 
     @cached_property
     def _torques(self) -> list[list[Term]]:

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.averaged.average import Average, average_of
+from rigidsim.model.averaged.states import WHY, refuse_untold
 from rigidsim.model.load import Load
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
@@ -14,6 +16,7 @@ from rigidsim.model.orbital_frame import corotating_orbit
 from rigidsim.model.paired_products import pairs_products
 from rigidsim.model.parity import refuse_odd_loads
 from rigidsim.model.planar import Plane, asked_plane, gradient_plane
+from rigidsim.model.reference_plane import refuse_without_plane
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
 from rigidsim.model.table_states import TablePlace, places_of
@@ -37,6 +40,7 @@ class ModelPlan:
         surfaces: on which the equations change.
         plane: that the motion stays in, where its formulation is planar.
         tables: where the states and parameters of orbits by a table are.
+        average: that the motion is, where rotations are averaged over.
     """
 
     scene: Scene
@@ -50,6 +54,7 @@ class ModelPlan:
     surfaces: Surfaces
     plane: Plane | None = None
     tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
+    average: Average | None = None
 
     @property
     def wide(self) -> bool:
@@ -78,6 +83,8 @@ def plan_model(
     if extra_loads:
         scene = replace(scene, loads=(*scene.loads, *extra_loads))
     loads: list[Load] = [*UniformGravity.of(scene), *scene.loads]  # type: ignore[list-item]
+    if scene.config.model.reduced:
+        return _averaged(scene, loads)
     requirements = choose_requirements(scene, loads)
     requirements, plane = _planar(scene, loads, requirements)
     if scaling is None and like is not None:
@@ -88,10 +95,7 @@ def plan_model(
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if requirements.canonical or plane is not None:
         scaling = replace(scaling, rates=(0, 0, 0))
-    tags: dict[KeplerOrbit, str] = {}
-    for number, load in enumerate(scene.loads, start=1):
-        if getattr(load, "orbit", None) is not None:
-            tags.setdefault(load.orbit, str(number))  # type: ignore[attr-defined]
+    tags = _orbit_tags(scene)
     surfaces, tables = surfaces_of(scene), _tables(scene)
     if tables and surfaces.found:
         what = (
@@ -119,6 +123,41 @@ def plan_model(
 def _tables(scene: Scene) -> dict[TabulatedOrbit, TablePlace]:
     tables = [(str(number), getattr(load, "table", None)) for number, load in enumerate(scene.loads, start=1)]
     return places_of([(tag, table) for tag, table in tables if table is not None])
+
+
+def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
+    tags: dict[KeplerOrbit, str] = {}
+    for number, load in enumerate(scene.loads, start=1):
+        if getattr(load, "orbit", None) is not None:
+            tags.setdefault(load.orbit, str(number))  # type: ignore[attr-defined]
+    return tags
+
+
+def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
+    """Of a motion averaged over its rotation, and maybe over its sources' orbits."""
+    average = average_of(scene, loads)
+    record = scene.config.output.record
+    refuse_untold(average, record)
+    refuse_without_plane(scene, loads)
+    left_out = [("attitude", f'[model] level = "{average.level}" averages over the rotation')]
+    if average.over_orbits:
+        left_out.append(("anomalies", "the torques are averaged over the orbits"))
+    requirements = Requirements(
+        average.level, False, False, record, {"attitude": WHY[average.level]}, left_out
+    )
+    scaling = replace(choose_scaling(scene), rates=(0, 0, 0))
+    return ModelPlan(
+        scene,
+        loads,
+        requirements,
+        scaling,
+        scaled_numbers(scene, scaling),
+        _orbit_tags(scene),
+        None,
+        False,
+        surfaces_of(scene),
+        average=average,
+    )
 
 
 def _planar(

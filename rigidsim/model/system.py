@@ -126,7 +126,11 @@ class System:
 
     @cached_property
     def rate_bound(self) -> Any:
-        """Upper bound of the absolute angular velocity, rad/s (mpf)."""
+        """Upper bound of the absolute angular velocity, rad/s (mpf); of the momentum's turning where
+        rotations are averaged over.
+        """
+        if self.plan.average is not None:
+            return self.plan.average.rate_bound
         return largest_of(largest_rates(self.scene, self.scaling.drive))
 
     # --- states ---------------------------------------------------------------------------------------------

@@ -43,6 +43,7 @@ from rigidsim.scene.fields import (
     refuse,
 )
 from rigidsim.scene.frame_table import Frame
+from rigidsim.scene.model_table import Model
 from rigidsim.scene.point_mass_table import PointMassBody
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.sweep_table import SweepTable
@@ -340,6 +341,7 @@ class Config(ConfigTable):
         default_factory=Frame, description="what the axes of space are, and what angles count from"
     )
     time: Time = Field(description="how long, and where the samples lie")
+    model: Model = Field(default_factory=Model, description="how much of the motion is resolved")
     integrator: Integrator = Field(
         default_factory=Integrator, description="how accurately, and in which variables"
     )

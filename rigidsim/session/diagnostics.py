@@ -21,6 +21,7 @@ from rigidsim.store.summary import Caution, WarningCode
 
 if TYPE_CHECKING:
     from rigidsim.accuracy.estimate import Estimate
+    from rigidsim.accuracy.modelling import ModellingError
 
 NEAR_SINGULAR = 1e-3
 """Factor from which Euler angles lose digits to their singularity."""
@@ -33,12 +34,14 @@ class Diagnostics:
 
     Attributes:
         estimate: of the errors at the end; None where none was asked for, or the run hasn't ended.
+        modelling: what a reduced model leaves out; None for the full one, and where it wasn't measured.
     """
 
     prepared: InitialValueProblem
     progress: Progress
     statistics: SampleStatistics
     estimate: Estimate | None = None
+    modelling: ModellingError | None = None
 
     @property
     def drift_bound(self) -> float:
@@ -76,6 +79,12 @@ class Diagnostics:
         )
         return replace(self, estimate=found)
 
+    def modelled(self, trail: Trail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
+        """With the error of a reduced model, arguments as of ``estimated``."""
+        from rigidsim.accuracy.modelling import measure_modelling
+
+        return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
+
     def cautions(self) -> list[Caution]:
         """Reasons not to trust the result; empty for a sound run."""
         return [
@@ -84,6 +93,7 @@ class Diagnostics:
             *self._digits(),
             *self._joining(),
             *self._undefined(),
+            *self._modelling(),
         ]
 
     @property
@@ -130,6 +140,16 @@ class Diagnostics:
             code,
             f"{what} at the end, so its digits are gone{self._since(found)}; choose a higher precision or a "
             "nearer end",
+        )
+
+    def _modelling(self) -> Iterator[Caution]:
+        found = self.modelling
+        if found is None or found.momentum <= UNCERTAIN:
+            return
+        yield Caution(
+            WarningCode.MODEL_UNCERTAIN,
+            f'[model] level = "{found.level}" leaves the momentum\'s direction uncertain by about '
+            f"{found.momentum:.2g} rad at the end; choose a less averaged level, or a nearer end",
         )
 
     def _joining(self) -> Iterator[Caution]:

@@ -26,7 +26,9 @@ class Observer:
         """Called between chunks, at most some tens of times per second."""
 
     def phase(self, name: str) -> None:
-        """A new phase begins: "integrate", "lyapunov", "estimate", "dataset", "timeline", "certify"."""
+        """A new phase begins: "integrate", "lyapunov", "estimate", "modelling", "dataset", "timeline" or
+        "certify".
+        """
 
     def nothing_left(self, why: str) -> None:
         """The run to be resumed had ended for good before, with these words; nothing was done."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 NOTHING_LEFT = "nothing is left to do: {}; --until prolongs a finished run to a later end"
 PHASES = {
     "lyapunov": "Lyapunov exponents",
+    "modelling": "full model beside",
     "dataset": "writing dataset.h5",
     "timeline": "drawing timeline.rrd",
     "certify": "certifying",

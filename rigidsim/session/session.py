@@ -117,6 +117,11 @@ class Session:
                         lambda: not interruption.requested,
                     )
                 clock.next("estimate")
+                if prepared.system.plan.average is not None and progress.status is Status.FINISHED:
+                    self.observer.phase("modelling")
+                    with suppress(KeyboardInterrupt):
+                        found = found.modelled(recorder.trail, lambda: not interruption.requested)
+                    clock.next("modelling")
                 if interruption.requested:
                     progress.status = Status.INTERRUPTED
                     recorder.save(loop.position())

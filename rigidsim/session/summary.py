@@ -29,6 +29,8 @@ from rigidsim.store.summary import (
     EventTimes,
     Invariant,
     Lyapunov,
+    Modelling,
+    ModellingWindow,
     Summary,
     as_fields,
 )
@@ -87,6 +89,7 @@ def summarise(
         hold_invariants=prepared.holds_invariants,
         invariants=_invariants(found, initial),
         accuracy=_accuracy(found),
+        modelling=_modelling(found),
         lyapunov=_lyapunov(found, spectrum),
         body=body_of(scene),
         start=start_of(scene),
@@ -223,6 +226,41 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         "(tolerance/2) sqrt(steps) |w| t / sqrt 3; 1 for a stable motion",
         certified=None,
         how=_NOT_CERTIFIED,
+    )
+
+
+def _modelling(found: Diagnostics) -> Modelling | None:
+    average = found.prepared.system.plan.average
+    if average is None:
+        return None
+    known, output = found.modelling, found.prepared.scene.config.output
+    if known is None:
+        why = "the run has not ended, or the full model can't be followed"
+        why = why if output.estimate else "[output] estimate = false"
+        return Modelling(level=average.level, short_period=average.short_period, how=f"not measured: {why}")
+    return Modelling(
+        level=average.level,
+        short_period=average.short_period,
+        momentum_axis=known.momentum,
+        figure_axis=known.figure,
+        growth=known.growth,
+        oscillation=known.oscillation,
+        whole=known.whole,
+        how=known.how,
+        cpu_seconds=known.cpu_seconds,
+        windows=tuple(
+            ModellingWindow(
+                start=window.start,
+                end=window.end,
+                steps=window.steps,
+                momentum_axis=window.momentum,
+                figure_axis=window.figure,
+                growth_along=window.growth[0],
+                growth_across=window.growth[1],
+                doubt=window.doubt,
+            )
+            for window in known.windows
+        ),
     )
 
 

@@ -43,9 +43,12 @@ def attitude_chords(system: System) -> AttitudeChords | None:
     attitude, names = system.mechanics.attitude, system.states
     if attitude is None:
         return None
-    if all(x in system.variables for x in attitude.quaternion):
+    if attitude.quaternion and all(x in system.variables for x in attitude.quaternion):
         places = [system.variables.index(x) for x in attitude.quaternion]
         return AttitudeChords(lambda states: states[places], 2.0)
+    if system.plan.average is not None:  # a unit vector
+        axis = [names.index(name) for name in attitude.names]
+        return AttitudeChords(lambda states: states[axis], 1.0)
     held = [names.index(name) for name in attitude.names] if attitude.orbital is None else []
     if held and attitude.kind == "rotation_matrix":
         return AttitudeChords(lambda states: states[held], math.sqrt(0.5))

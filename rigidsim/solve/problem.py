@@ -41,6 +41,9 @@ rad; from 8.97 to 9 in single and from 22.83 to 23 in 80 bits, which cut off nea
 errors of 9 standard errors over 1e5 rad, and growth like t^0.6. Where less than this part of an order is
 gained by rounding up, "auto" is this many bits below epsilon: another order, at least."""
 
+_BITS_OF_AVERAGES = 53, 10
+"""Precisions from so many bits on have a looser tolerance for averaged motions, by so many bits."""
+
 
 @dataclass(frozen=True)
 class InitialValueProblem:
@@ -130,6 +133,8 @@ def prepare_scene(
         step_control = _auto(precision) if step_control is None else step_control
         check_start(scene)
         system = build_system(scene, precision.number, loads)
+        if system.plan.average is not None and asked == "auto" and tolerance is None:
+            step_control = _auto_of_averages(precision)
         _refuse_spectrum(system)
         _refuse_spectrum_by_table(system)
         if loads:
@@ -174,6 +179,15 @@ def _auto(precision: Precision) -> Scalar | None:
     """None for the epsilon itself."""
     bits = _auto_bits(float(precision.epsilon))
     return precision.number(mpmath.ldexp(precision.epsilon, -bits)) if bits else None
+
+
+def _auto_of_averages(precision: Precision) -> Scalar | None:
+    """What is averaged away is far above the epsilon of double precision, and a step moves the direction by
+    1e-6 rad at most: some bits less make steps cheaper by half.
+    """
+    if precision.bits < _BITS_OF_AVERAGES[0]:
+        return _auto(precision)
+    return precision.number(mpmath.ldexp(precision.epsilon, _BITS_OF_AVERAGES[1]))
 
 
 def _check_tolerance(tolerance: Scalar | None, precision: Precision) -> None:
@@ -287,6 +301,8 @@ def double_twin(prepared: InitialValueProblem) -> System:
     about the motion itself, such as its stability.
     """
     config = prepared.scene.config
+    if prepared.system.plan.average is not None:
+        return prepared.system.rounded(precision_of("double").number)
     own = prepared.system.requirements.formulation
     formulation = own if own in ("rates", "planar") else "quaternion"
     record = ["angular_velocity"] if formulation == "rates" else ["quaternion"]

@@ -47,6 +47,7 @@ class WarningCode(Enum):
     EPHEMERIS_OF_EARTH = "ephemeris_of_earth"
     NEVER_HAPPENS = "never_happens"
     TIME_WITHOUT_UNIT = "time_without_unit"
+    MODEL_UNCERTAIN = "model_uncertain"
     UNDEFINED = "undefined"
 
 
@@ -158,6 +159,53 @@ class Accuracy(Part):
     forecast: FiniteNumber | None = None
 
 
+class ModellingWindow(Part):
+    """Where the full model ran beside a reduced one; see ``rigidsim.accuracy.modelling``.
+
+    Attributes:
+        start, end: seconds.
+        steps: of the full model.
+        momentum_axis, figure_axis: largest distances between both models' directions, with what averaging
+            removed added back, rad; None where a figure axis points nowhere on average.
+        growth_along, growth_across: of the former, along and across the precession, rad/s.
+        doubt: by how much the growth of the window's parts differs, rad/s.
+    """
+
+    start: FiniteNumber
+    end: FiniteNumber
+    steps: StrictInt
+    momentum_axis: FiniteNumber
+    figure_axis: FiniteNumber | None
+    growth_along: FiniteNumber
+    growth_across: FiniteNumber
+    doubt: FiniteNumber
+
+
+class Modelling(Part):
+    """How far a reduced model is from the full one, apart from numerical errors.
+
+    Attributes:
+        level: of the model.
+        short_period: whether what averaging removed is added back in what is recorded.
+        momentum_axis, figure_axis: largest distances of the directions recorded from the full model's, until
+            the end of the run, rad; None where they weren't measured, or a figure axis points nowhere.
+        growth: of the distance, rad/s; oscillation: what it is without, rad.
+        whole: whether the full model was followed to the end.
+        how: it was found, or why it wasn't.
+    """
+
+    level: Annotated[Text, Claim()]
+    short_period: Annotated[StrictBool, Claim()]
+    momentum_axis: FiniteNumber | None = None
+    figure_axis: FiniteNumber | None = None
+    growth: FiniteNumber | None = None
+    oscillation: FiniteNumber | None = None
+    whole: StrictBool = False
+    how: Text = ""
+    cpu_seconds: FiniteNumber | None = None
+    windows: tuple[ModellingWindow, ...] = ()
+
+
 class Lyapunov(Part):
     """The spectrum of the motion, 1/s, with what it says of the run's digits."""
 
@@ -256,6 +304,7 @@ class Summary(Brief):
     hold_invariants: Annotated[StrictBool, Claim()] = False
     invariants: dict[Text, Invariant]
     accuracy: Accuracy
+    modelling: Modelling | None = None
     lyapunov: Lyapunov | None = None
     body: Annotated[Body, Claim()]
     start: Annotated[Start | None, Claim()] = None

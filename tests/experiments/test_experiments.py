@@ -19,7 +19,14 @@ from experiments import all as everything  # noqa: E402
 from experiments import closed_forms, common, measure  # noqa: E402
 from experiments.common import Check  # noqa: E402
 
-SLOW = {"flip_period", "heavy_top_regimes", "hyperion", "luni_solar_precession", "precession_and_nutation"}
+SLOW = {
+    "averaged_motions",
+    "flip_period",
+    "heavy_top_regimes",
+    "hyperion",
+    "luni_solar_precession",
+    "precession_and_nutation",
+}
 SLOW |= {"spectral_lines"}
 
 

@@ -27,9 +27,9 @@ from rigidsim.model.observables.observable import (
 )
 from rigidsim.model.observables.scene_subject import is_planet
 from rigidsim.model.observables.steadiness import steady_directions
-from rigidsim.model.observables.vectors import figure_told, in_body, plane_told, unit
+from rigidsim.model.observables.vectors import figure_told, plane_told, unit
 from rigidsim.model.reference_plane import reference_plane
-from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.registry import register_observable
 from rigidsim.scene.space_axes import ECLIPTIC, OBLIQUITY
@@ -39,12 +39,12 @@ AXIS = ("axis",)
 
 def figure_axis(m: Mechanics) -> list[Symbolic]:
     """Unit vector, space axes."""
-    return unit(apply(m.matrix, in_body(m, m.scene.figure.pole)))
+    return unit(m.figure_space)
 
 
 def spin_axis(m: Mechanics) -> list[Symbolic]:
     """w / |w|, space axes."""
-    return unit(apply(m.matrix, m.rates))
+    return unit(m.spin_space)
 
 
 def momentum_axis(m: Mechanics) -> list[Symbolic]:

@@ -34,7 +34,13 @@ WORK = "work"
 
 
 def _torque_free(m: Mechanics) -> str | None:
-    return None if m.torque else "no torque acts"
+    return None if m.torque or m.averaged else "no torque acts"
+
+
+def _momentum_kept(m: Mechanics) -> str | None:
+    if m.averaged:
+        return "averaged over the free rotation, a gravity gradient has no torque along the momentum"
+    return _torque_free(m)
 
 
 def _conservative(m: Mechanics) -> str | None:
@@ -159,7 +165,7 @@ _BUILT_IN: tuple[Observable, ...] = (
     Observable(
         "angular_momentum_norm", (), "kg m2 s-1", "norm of the angular momentum",
         lambda m: [hy.sqrt(hy.sum([x * x for x in m.momentum_body]))], same_unit(MOMENTUM, 1), "", (),
-        _torque_free, momentum_scale,
+        _momentum_kept, momentum_scale,
     ),
     Observable(
         "angular_momentum_vertical", (), "kg m2 s-1", "angular momentum along the vertical",

@@ -129,7 +129,7 @@ class Observable:
 
     def available(self, m: Mechanics) -> bool:
         """Whether the scene has all that it needs."""
-        return self.needed(m) and self.absent(m) is None
+        return m.tells(self.name) and self.needed(m) and self.absent(m) is None
 
     def needed(self, m: Mechanics) -> bool:
         """Whether the scene has what ``needs`` names."""

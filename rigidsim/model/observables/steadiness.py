@@ -75,6 +75,8 @@ def _bounds(m: Mechanics) -> _Bounds | None:
 def steady_directions(m: Mechanics) -> Steady | None:
     """Of angles of the figure, spin and momentum axes, which advance by nothing."""
     found, away = _bounds(m), plane_drift(m.scene, m.loads)
+    if m.turning_rate is not None and away is not None:
+        return Steady([constant(0.0)] * 3, float(m.turning_rate + away), 0.0)
     if found is None or away is None:
         return None
     # the spin leaves the momentum by no more than the ratio of moments times what the figure axis does

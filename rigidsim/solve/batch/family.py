@@ -45,6 +45,7 @@ class Alone(Enum):
     KEY = "what is swept is not a number of the body, the start, a load or a parameter"
     UNTRACEABLE = "the equations depend on what is swept in a way that can't be told beforehand"
     FAMILIES = f"the members need more than {MOST_FAMILIES} different systems of equations"
+    AVERAGED = "averages over the rotation are worked out for each body by itself"
     RANGE = "a coefficient is outside the range of double precision"
 
 
@@ -62,6 +63,8 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
         return Alone.HELD
     if integrator.formulation in ("euler_angles", "canonical"):
         return Alone.CHART
+    if config.model.reduced:
+        return Alone.AVERAGED
     return Alone.LYAPUNOV if config.output.lyapunov else None
 
 

@@ -1,0 +1,1 @@
+"""Random bodies and orbits whose averaged motions are held against the full ones."""

@@ -1,0 +1,1 @@
+"""Motions averaged over the body's rotation and over the sources' orbits, under gravity gradients."""

@@ -1,0 +1,191 @@
+"""Whether an average applies: what kinds of scenes have one, and which frequencies forbid it.
+
+Averaging over the rotation fails where a combination i g + j l + k n of the body's precession and wobble (see
+``free_motion``) with a source's mean motion is slow enough for its angle to librate or to dwell. With the
+harmonic's part U of the potential energy the angle obeys phi'' = -(c U) sin phi with c about (|i| + |j|)^2
+over the least moment, so that within 2 sqrt(c U) of zero it librates (Chirikov 1979), and it swings the
+momentum by U / (L nu) elsewhere.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.look.readable_time import span_text
+from rigidsim.model.averaged.sources import Source
+from rigidsim.model.averaged.spectrum import BodySpectrum
+from rigidsim.model.load import Load
+from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.scene.model_table import ORBIT_AVERAGED
+from rigidsim.scene.scene import Scene
+
+LIBRATION = 2.0
+"""Times the half-width of libration that a combination of frequencies must stay from zero: motions near the
+separatrix dwell, and the widths of neighbouring resonances add up."""
+SWING = 0.05
+"""Largest angle (rad) by which what is averaged away may swing the momentum or the figure axis: errors are of
+second order in it, so that a percent of the precession is the most that can be hoped for beyond."""
+_ASKS = re.compile(": (leave it out|set it to false|remove them)$")
+_WEAK = 1e-7  # of the largest harmonic
+
+
+def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
+    """Look whether a scene is of the kind that has averages.
+
+    Raises:
+        ConfigError: with what stands against it.
+    """
+    config, level = scene.config, scene.config.model.level
+    integrator = config.integrator
+    against: str | None = None
+    if scene.free_flight:
+        against = "the body has a position and flies"
+    elif not loads:
+        against = "no torque acts, so that the direction of the angular momentum rests"
+    elif max(scene.body.principal_moments) == min(scene.body.principal_moments):
+        against = "no gradient has a torque on a body whose moments are all the same"
+    elif strange := [load.title for load in loads if not isinstance(load, GravityGradient)]:
+        against = f"{strange[0]} is no gravity gradient"
+    elif any(load.table is not None for load in loads if isinstance(load, GravityGradient)):
+        against = "an orbit by a table of elements isn't averaged yet; give elements with their rates"
+    elif all(w == 0 for w in scene.angular_velocity):
+        against = "the body starts at rest"
+    elif integrator.formulation != "auto":
+        against = (
+            f'[integrator] formulation = "{integrator.formulation}" carries every rotation: leave it out'
+        )
+    elif integrator.method != "taylor":
+        against = f'[integrator] method = "{integrator.method}" is of the full motion: leave it out'
+    elif integrator.hold_invariants is True:
+        against = "[integrator] hold_invariants = true is for the full motion's: set it to false"
+    elif integrator.accuracy is not None or integrator.accuracy_position is not None:
+        against = "[integrator] accuracy is the attitude's, which needs every rotation"
+    elif config.events:
+        against = "[[events]] read the full state: remove them"
+    elif config.output.lyapunov:
+        against = "[output] lyapunov is of the full motion: set it to false"
+    elif level == ORBIT_AVERAGED:
+        series = [load for load in loads if isinstance(load, GravityGradient) and load.ephemeris]
+        if series:
+            against = "the source of an ephemeris has no elements to average over"
+            raise _refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
+    if against is not None:
+        raise _refused(level, against)
+
+
+def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source]) -> None:
+    """Look whether the motion's frequencies are far enough apart.
+
+    Raises:
+        ConfigError: names the resonance, or what is too fast.
+    """
+    for source in sources:
+        _refuse_resonance(scene, spectrum, source)
+        _refuse_forced(scene, spectrum, source)
+    if scene.config.model.level == ORBIT_AVERAGED:
+        for source in sources:
+            _refuse_slow_orbit(scene, spectrum, source)
+
+
+def separatrix_refused(level: str) -> ConfigError:
+    """For a body about its intermediate axis."""
+    return _refused(
+        level,
+        "the body turns about its intermediate axis, where its wobble takes forever and nothing averages",
+    )
+
+
+def swing_of(spectrum: BodySpectrum, source: Source) -> float:
+    """By how much what averaging over the rotation leaves out swings the momentum, rad."""
+    sizes = np.where(spectrum.oscillating, np.abs(spectrum.harmonics), 0.0)
+    rates = np.where(spectrum.oscillating, np.abs(spectrum.frequencies), 1.0)
+    strongest = float(source.strength) * source.nearest
+    return strongest * float((sizes / rates).sum()) / float(spectrum.motion.momentum)
+
+
+def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> None:
+    found = np.flatnonzero(spectrum.oscillating.ravel())
+    if not len(found):
+        return
+    sizes = np.abs(spectrum.harmonics).ravel()[found]
+    keep = sizes > _WEAK * max(float(x) for x in spectrum.motion.moments)
+    found, sizes = found[keep], sizes[keep]
+    if not len(found):
+        return
+    i, j = (orders.ravel()[found] for orders in spectrum.orders)
+    body = spectrum.frequencies.ravel()[found]
+    orbit = source.harmonics
+    k = np.flatnonzero(orbit > _WEAK * orbit.max())
+    least = min(float(x) for x in spectrum.motion.moments if x > 0)
+    energy = float(source.strength) * sizes[:, None] * orbit[None, k]
+    width = 2 * np.sqrt((np.abs(i) + np.abs(j))[:, None] ** 2 * energy / least)
+    rate = np.abs(np.abs(body[:, None]) - k[None, :] * source.motion)
+    swing = energy / (float(spectrum.motion.momentum) * np.maximum(rate, 1e-300))
+    slow = LIBRATION * width + 2 * source.slow_rate
+    worst = np.unravel_index(int(np.argmax(slow / np.maximum(rate, 1e-300))), rate.shape)
+    if rate[worst] < slow[worst] or swing.max() > SWING:
+        if not rate[worst] < slow[worst]:
+            worst = np.unravel_index(int(np.argmax(swing)), rate.shape)
+        at = int(i[worst[0]]), int(j[worst[0]]), int(k[worst[1]])
+        raise _refused(
+            scene.config.model.level,
+            f"{_combination(spectrum, at, float(body[worst[0]]))} of the body's precession g and wobble l "
+            f"and of the mean motion n of [[loads]] number {source.number} is only "
+            f"{float(rate[worst]):.3g} rad/s, once in {_period(float(rate[worst]))}, where its angle "
+            f"librates within {float(width[worst]):.3g} rad/s: a resonance, which no average may pass over",
+        )
+
+
+def _combination(spectrum: BodySpectrum, orders: tuple[int, int, int], body: float) -> str:
+    """Of frequencies, such as "2 g - 2 l - 3 n"; for a symmetric body g alone turns its tensor."""
+    i, j, k = orders
+    signed = -k if body > 0 else k
+    terms = [(i, "g"), (j, "l"), (signed, "n")]
+    told = [f"{'+' if c > 0 else '-'} {abs(c) if abs(c) != 1 else ''}{name}" for c, name in terms if c]
+    return " ".join(told).removeprefix("+ ")
+
+
+def _refuse_forced(scene: Scene, spectrum: BodySpectrum, source: Source) -> None:
+    """The figure axis follows the momentum only if the torque changes slowly beside the free motion."""
+    motion, orbit = spectrum.motion, source.harmonics
+    k = np.arange(len(orbit))
+    g = spectrum.rates[0]
+    torque = float(source.strength) * max(float(max(motion.moments) - min(motion.moments)), 0.0)
+    forced = torque * orbit / (float(motion.momentum) * np.maximum(np.abs(g - k * source.motion), 1e-300))
+    forced[orbit < _WEAK * orbit.max()] = 0.0
+    most = int(np.argmax(forced))
+    if forced[most] > SWING:
+        raise _refused(
+            scene.config.model.level,
+            f"the torque of [[loads]] number {source.number} bends the rotation by {forced[most]:.2g} rad, "
+            f"since the body precesses freely at {g:.3g} rad/s and the source goes round at "
+            f"{source.motion:.3g} rad/s; up to {SWING} rad is allowed",
+        )
+
+
+def _refuse_slow_orbit(scene: Scene, spectrum: BodySpectrum, source: Source) -> None:
+    if source.motion == 0:
+        return
+    context, motion = scene.context, spectrum.motion
+    rate = float(abs(source.secular_strength(context) * motion.excess / motion.momentum))
+    if rate > SWING * source.motion or source.slow_rate > SWING * source.motion:
+        what = "the momentum precesses" if rate >= source.slow_rate else "node and periapsis move"
+        raise _refused(
+            scene.config.model.level,
+            f"{what} by {max(rate, source.slow_rate) / source.motion:.2g} rad for each radian that the "
+            f"source of [[loads]] number {source.number} goes round; up to {SWING} is allowed",
+            'choose "spin_averaged"',
+        )
+
+
+def _period(rate: float) -> str:
+    return span_text(2 * np.pi / rate) if rate > 0 else "forever"
+
+
+def _refused(level: str, against: str, remedy: str = 'choose level = "full"') -> ConfigError:
+    joined = f", or {remedy}" if _ASKS.search(against) else f"; {remedy}"
+    return ConfigError(Problem("[model] level", f'given "{level}", but {against}{joined}'))

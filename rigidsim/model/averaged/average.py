@@ -1,0 +1,202 @@
+"""An averaged motion: what it averages over, its constants, and where it starts.
+
+The start of the full motion is a point of a nodding, wobbling curve, and the averaged one starts on the
+curve's middle: what averaging leaves out is taken from it, to first order. Otherwise an offset of the
+nutation's size would stay, and change the rate of precession with it (the osculating and mean elements of
+Kinoshita 1977).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigidsim.model.averaged.applies import (
+    refuse_frequencies,
+    refuse_scene,
+    separatrix_refused,
+    swing_of,
+)
+from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
+from rigidsim.model.averaged.orbit_terms import nutation, secular_factor
+from rigidsim.model.averaged.sources import Source, sources_of, unit
+from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
+from rigidsim.model.load import Load
+from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
+from rigidsim.scene.model_table import ORBIT_AVERAGED
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.scene import Scene
+
+_AXIAL = 0.1
+"""Angle (rad) between momentum and the circled axis up to which the latter is said to point somewhere: its
+mean is along the momentum, and the whole angle is part of what averaging leaves out."""
+_ROUNDS = 4  # each gains a factor of the nutation's size
+
+
+@dataclass(frozen=True)
+class Average:
+    """An averaged motion; numbers are mpf, SI.
+
+    Attributes:
+        level: "spin_averaged" or "orbit_averaged".
+        short_period: whether what averaging removed is added back.
+        start: direction of the momentum that it starts with, unit, space axes.
+        energy: of the free rotation, J.
+        swing: angle (rad) by which what averaging over the rotation leaves out swings the momentum.
+        figure: +1 or -1 where the figure axis is the circled one or its opposite and stays near the momentum,
+            0 elsewhere.
+    """
+
+    level: str
+    short_period: bool
+    motion: FreeMotion
+    sources: Sequence[Source]
+    start: Vector
+    energy: Any
+    swing: float
+    figure: int
+
+    @property
+    def over_orbits(self) -> bool:
+        """Whether it averages over the sources' orbits as well."""
+        return self.level == ORBIT_AVERAGED
+
+    def rate(self, source: Source) -> Any:
+        """3 (G M / a^3) excess / L (mpf, 1/s): see ``rigidsim.model.averaged.orbit_terms``."""
+        return source.strength * self.motion.excess / self.motion.momentum
+
+    @property
+    def rate_bound(self) -> Any:
+        """Of the momentum's turning, rad/s (mpf)."""
+        return sum(abs(self.rate(source)) * source.nearest for source in self.sources)
+
+    def shear(self, context: Any) -> Any:
+        """By how much an angle across the precession changes the rate along it, 1/s (mpf), at the start: of
+        k/2 (1 - e^2)^(-3/2) |n x s|^2 summed over the sources.
+        """
+        total = context.zero
+        for source in self.sources:
+            size, square = abs(self.rate(source)) / 2, context.one
+            if source.orbit is not None:
+                size *= 2 * secular_factor(context, source.orbit)
+                across = cross(source.orbit.normal(context), self.start)
+                square = dot(across, across)
+            total += size * square
+        return total
+
+    def tilt(self, context: Any) -> float:
+        """Largest angle between the momentum and the circled axis, rad."""
+        return float(self.motion.tilt(context))
+
+
+def average_of(scene: Scene, loads: Sequence[Load]) -> Average:
+    """The averaged motion that a scene's ``[model] level`` asks for.
+
+    Raises:
+        ConfigError: an average that doesn't apply, with the reason and what to do.
+    """
+    refuse_scene(scene, loads)
+    gradients = [load for load in loads if isinstance(load, GravityGradient)]
+    context, body, table = scene.context, scene.body, scene.config.model
+    matrix = attitude.rotation_matrix(scene.quaternion)
+    momentum = apply(body.inertia, scene.angular_velocity)
+    sources = sources_of(scene, gradients)
+    try:
+        motion = free_motion(context, body, momentum)
+        spectrum = body_spectrum(motion)
+        refuse_frequencies(scene, spectrum, sources)
+        vector = apply(matrix, momentum)
+        removed = _left_out_at_start(scene, spectrum, sources, unit(context, vector))
+        vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
+        motion = free_motion(context, body, momentum, norm(context, vector))
+    except Separatrix:
+        raise separatrix_refused(table.level) from None
+    start = unit(context, vector)
+    found = Average(
+        table.level,
+        table.short_period,
+        motion,
+        sources,
+        start,
+        dot(momentum, scene.angular_velocity) / 2,
+        sum(swing_of(spectrum, source) for source in sources),
+        _figure(scene, motion),
+    )
+    if found.over_orbits:
+        start = _mean_over_orbits(scene, found)
+        found = Average(
+            found.level, found.short_period, motion, sources, start, found.energy, found.swing, found.figure
+        )
+    return found
+
+
+def _figure(scene: Scene, motion: FreeMotion) -> int:
+    along = dot(scene.figure.pole, motion.axes[2])
+    if abs(abs(along) - 1) > negligible(scene.context) or motion.tilt(scene.context) > _AXIAL:
+        return 0
+    return 1 if along > 0 else -1
+
+
+def _left_out_at_start(
+    scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source], direction: Vector
+) -> np.ndarray:
+    """What averaging over the rotation leaves out of the momentum at the start, kg m^2/s, space axes."""
+    space = _frame(np.array([float(x) for x in direction]))
+    body = np.array([[float(x) for x in row] for row in attitude.rotation_matrix(scene.quaternion)])
+    principal = np.array([[float(x) for x in axis] for axis in spectrum.motion.axes]).T
+    phases = spectrum.phases(space @ body @ principal)
+    _, integral = spectrum.tensors(*phases)
+    integral = space.T @ integral @ space
+    total = np.zeros(3)
+    for source in sources:
+        pull = source.pull(scene.context, scene.start)
+        if pull is not None:
+            product = float(source.strength) * pull @ integral
+            # r x (I r) summed over a, b of r_a r_b e_a x I e_b
+            total += [
+                product[1, 2] - product[2, 1],
+                product[2, 0] - product[0, 2],
+                product[0, 1] - product[1, 0],
+            ]
+    return total
+
+
+def _frame(z: np.ndarray) -> np.ndarray:
+    """Rows: right-handed axes with z last."""
+    z = z / np.linalg.norm(z)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(z, x), z])
+
+
+def osculating(scene: Scene, average: Average, mean: Sequence[Any], time: Any) -> Vector:
+    """The momentum's direction with the nutation of the orbits' periods, unit (mpf).
+
+    Args:
+        mean: as the averaged motion carries it.
+        time: seconds (mpf).
+    """
+    context = scene.context
+    found = list(mean)
+    for source in average.sources if average.over_orbits else ():
+        if source.orbit is not None:
+            place = source.place(context, time)
+            more = nutation(
+                context, context, source.orbit, place, average.rate(source), list(mean), lambda x: x
+            )
+            found = [x + y for x, y in zip(found, more, strict=True)]
+    return unit(context, found)
+
+
+def _mean_over_orbits(scene: Scene, average: Average) -> Vector:
+    """The mean direction s of which s + nutation(s) is the start."""
+    context, start = scene.context, average.start
+    mean = start
+    for _ in range(_ROUNDS):
+        seen = osculating(scene, average, mean, scene.start)
+        mean = unit(context, [m + x - y for m, x, y in zip(mean, start, seen, strict=True)])
+    return mean

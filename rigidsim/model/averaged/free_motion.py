@@ -1,0 +1,188 @@
+"""The free rotation that a torque is averaged over: its mean inertia tensor and its two frequencies.
+
+A free body's angular momentum L rests in space while the body turns about it: one of its principal axes, the
+one that L circles in the body, precesses about L with the mean rate g and nods with the polhode's period
+2 pi / l. With I3 the moment of that axis, I2 the intermediate moment and I1 the remaining one,
+
+    m = L / |L| = (M1 cn u, M2 sn u, M3 dn u),  u = p (t - t0),  parameter k^2
+
+in the body (Landau & Lifshitz, Mechanics, section 37), and
+
+    <cn^2> = (E - k'^2 K) / (k^2 K),   <sn^2> = (K - E) / (k^2 K),   <dn^2> = E / K,
+    l = pi p / (2 K),   g = L / I3 + L (1/I1 - 1/I3) Pi(n, k^2) / K,   n = I3 (I2 - I1) / (I1 (I2 - I3)).
+
+Averaged over both angles the tensor is axisymmetric about L, so that the torque of a distant body is that of
+an axisymmetric one whose C - A is (3 <m . I m> - tr I) / 2 (Chernousko 1963; Cochran 1972).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rigidsim.scene.arithmetic import Matrix, Vector, dot, negligible
+from rigidsim.scene.body import RigidBody
+from rigidsim.scene.records import dataclass
+
+
+class Separatrix(Exception):
+    """The body turns about its intermediate axis, or on the way from and to it."""
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """A free rotation; numbers are mpf, SI.
+
+    Attributes:
+        momentum: size of the angular momentum.
+        moments: I1, I2, I3 as above.
+        axes: their axes, unit, body axes, right-handed, with a positive part of L along the third.
+        parameter: k^2; 0 for a symmetric body, and for a rotation about a principal axis.
+        squares: means of the squared parts of m along the axes.
+        amplitudes: |M1|, |M2|, |M3|.
+        precession_rate, wobble_rate: g and l, rad/s; l is 0 where the tensor doesn't show it.
+    """
+
+    momentum: Any
+    moments: Vector
+    axes: Matrix
+    parameter: Any
+    squares: Vector
+    amplitudes: Vector
+    precession_rate: Any
+    wobble_rate: Any
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the first two moments are the same."""
+        return bool(self.wobble_rate == 0)
+
+    @property
+    def excess(self) -> Any:
+        """(3 <m . I m> - tr I) / 2, which stands for C - A of an axisymmetric body in principal rotation."""
+        mean = dot(self.moments, self.squares)
+        return (3 * mean - sum(self.moments[1:], self.moments[0])) / 2
+
+    def tilt(self, context: Any) -> Any:
+        """Largest angle between L and the third axis, rad."""
+        first, second, third = self.amplitudes
+        return context.atan2(max(first, second), third)
+
+    @property
+    def transverse(self) -> Any:
+        """The moment that says how far the third axis stands from L under a steady torque N: that times
+        (s x N) / L^2 (see ``offset``), for rotations near that axis.
+
+        A for a symmetric body; else from I1 w1' = (I2 - I3) w2 w3 + N1 and so on with a torque that turns
+        backwards in the body, averaged over the turn.
+        """
+        a, b, c = self.moments
+        if a == b:
+            return a
+        return (4 * a * b - c * (a + b)) / (2 * (a + b - c))
+
+
+def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = None) -> FreeMotion:
+    """The free motion of a body.
+
+    Args:
+        momentum: angular momentum, body axes (mpf); not zero.
+        size: of the momentum where it is to be another one, in the same direction in the body.
+
+    Raises:
+        Separatrix: neither of the axes of extreme moment is circled by L.
+    """
+    tiny = negligible(context)
+    length = context.sqrt(dot(momentum, momentum))
+    moments, axes, symmetric = _ordered(context, body, momentum, length)
+    if dot(axes[2], momentum) < 0:  # half a turn about the second
+        axes = [[-x for x in axes[0]], axes[1], [-x for x in axes[2]]]
+    parts = [dot(axis, momentum) / length for axis in axes]
+    size = length if size is None else size
+    if symmetric:
+        return _symmetric(context, moments, axes, parts, size)
+    first, second, third = moments
+    # (L^2 - 2 E I) / L^2 for the moments of the third and the first axis
+    of_third = sum(x * x * (1 - third / i) for x, i in zip(parts[:2], moments[:2], strict=True))
+    of_first = sum(x * x * (1 - first / i) for x, i in zip(parts[1:], moments[1:], strict=True))
+    parameter = of_third * (first - second) / (of_first * (third - second))
+    if not parameter < 1 - tiny:
+        raise Separatrix
+    amplitudes = [
+        context.sqrt(abs(of_third * first / (first - third))),
+        context.sqrt(abs(of_third * second / (second - third))),
+        context.sqrt(abs(of_first * third / (third - first))),
+    ]
+    complete, cosines, sines, deltas = _means(context, parameter)
+    squares = [a * a * x for a, x in zip(amplitudes, (cosines, sines, deltas), strict=True)]
+    pace = size * context.sqrt(abs(of_first * (third - second) / (first * second * third)))
+    n = third * (second - first) / (first * (second - third))
+    turning = context.ellippi(n, parameter) / complete
+    return FreeMotion(
+        size,
+        moments,
+        axes,
+        parameter,
+        squares,
+        amplitudes,
+        size / third + size * (1 / first - 1 / third) * turning,
+        context.pi * pace / (2 * complete),
+    )
+
+
+def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tuple[Vector, Matrix, bool]:
+    """Moments and axes, the circled axis last, and whether the body is symmetric about it."""
+    tiny = max(body.principal_moments) * negligible(context)
+    order = sorted(range(3), key=lambda i: body.principal_moments[i])
+    moments = [body.principal_moments[i] for i in order]
+    axes = [list(body.principal_axes[i]) for i in order]
+    least, middle, most = moments
+    if middle - least <= tiny:
+        picked = (0, 1, 2)
+    elif most - middle <= tiny:
+        picked = (1, 2, 0)
+    else:
+        along = [dot(axis, momentum) / length for axis in axes]
+        # L^2 - 2 E I2, whose sign says which axis is circled
+        beyond = along[0] ** 2 * (1 - middle / least) + along[2] ** 2 * (1 - middle / most)
+        if abs(beyond) <= negligible(context):
+            raise Separatrix
+        picked = (0, 1, 2) if beyond > 0 else (2, 1, 0)
+    symmetric = middle - least <= tiny or most - middle <= tiny
+    chosen = [axes[i] for i in picked]
+    a, b, c = chosen
+    handed = dot([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], c)
+    if handed < 0:
+        chosen[0] = [-x for x in chosen[0]]
+    return [moments[i] for i in picked], chosen, symmetric
+
+
+def _symmetric(context: Any, moments: Vector, axes: Matrix, parts: Vector, size: Any) -> FreeMotion:
+    across = context.sqrt(parts[0] ** 2 + parts[1] ** 2)
+    half = across**2 / 2
+    return FreeMotion(
+        size,
+        [moments[0], moments[0], moments[2]],
+        axes,
+        context.zero,
+        [half, half, parts[2] ** 2],
+        [across, across, parts[2]],
+        size / moments[0],
+        context.zero,
+    )
+
+
+def _means(context: Any, parameter: Any) -> tuple[Any, Any, Any, Any]:
+    """K, <cn^2>, <sn^2>, <dn^2>; (K - E) / k^2 loses as many digits as k^2 is small."""
+    before = context.prec
+    try:
+        if parameter != 0:
+            context.prec = before + max(0, -context.mag(parameter)) + 10
+        if parameter == 0 or context.prec > 20 * before:
+            half = context.one / 2
+            return context.pi / 2, half, half, context.one
+        first, second = context.ellipk(parameter), context.ellipe(parameter)
+        sines = (first - second) / (parameter * first)
+        found = first, 1 - sines, sines, second / first
+    finally:
+        context.prec = before
+    return +found[0], +found[1], +found[2], +found[3]

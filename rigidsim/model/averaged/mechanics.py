@@ -1,0 +1,331 @@
+"""What an averaged motion tells of a body: directions of its axes in space, and no rotation about them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.averaged.average import Average
+from rigidsim.model.averaged.orbit_terms import OrbitPlace, nutation, plane_vectors, second_order
+from rigidsim.model.averaged.sources import Source
+from rigidsim.model.ephemeris import source_position
+from rigidsim.model.kinematics import seconds
+from rigidsim.model.load import Load, Term
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.orbit_states import OrbitStates
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.two_part import as_factor
+from rigidsim.scene.arithmetic import cross, dot
+from rigidsim.scene.epochs import J2000
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.records import dataclass
+
+DIRECTION = ["sx", "sy", "sz"]
+"""States: the momentum's direction, space axes; its mean where nothing is added back."""
+TOLD = (
+    "angular_momentum",
+    "angular_momentum_norm",
+    "energy",
+    "figure_axis",
+    "spin_axis",
+    "momentum_axis",
+    "right_ascension",
+    "declination",
+    "obliquity",
+    "node_longitude",
+)
+"""Observables that an averaged motion has."""
+
+
+@dataclass(frozen=True)
+class AveragedMechanics(Mechanics):
+    """Mechanics of an averaged motion; ``rates`` are those at which the momentum turns, in space axes."""
+
+    average: Average | None = None
+
+    @property
+    def turning_rate(self) -> Any:
+        """See ``Mechanics``."""
+        return self.of.rate_bound
+
+    def tells(self, name: str) -> bool:
+        """See ``Mechanics``."""
+        return name in TOLD
+
+    @property
+    def conserves_energy(self) -> bool:
+        """It is no question here: the energy of the free rotation is a constant."""
+        return False
+
+    @property
+    def of(self) -> Average:
+        """What is averaged."""
+        return self.carried(self.average)
+
+    # --- equations ------------------------------------------------------------------------------------------
+
+    @property
+    def direction(self) -> list[Symbolic]:
+        """The states."""
+        return list(hy.make_vars(*DIRECTION))
+
+    @cached_property
+    def derivatives(self) -> list[Symbolic]:
+        """Of the states, per internal unit of time."""
+        s = self.direction
+        if self.of.over_orbits:
+            parts = [self._secular(source) for source in self.of.sources]
+            return cross([hy.sum([part[i] for part in parts]) for i in range(3)], s)
+        pull = self._pull(s)
+        if self.of.figure == 0:
+            return cross(pull, s)
+        # the torque acts on the circled axis, which stands off from the momentum by d = -a s x s': to second
+        # order that is (G - a G^2 + 2 a (s . G s) G) s x s for a pull G s
+        context = self.scene.context
+        moment = self.of.motion.transverse / self.of.motion.momentum
+        a = as_factor(self.number(context.ldexp(moment, -self.scaling.time)))
+        factor = 1.0 + 2.0 * (a * dot(s, pull))
+        bent = [factor * g - a * again for g, again in zip(pull, self._pull(pull), strict=True)]
+        return cross(bent, s)
+
+    def _secular(self, source: Source) -> list[Symbolic]:
+        """-(k/2) (1 - e^2)^(-3/2) (n . s) n and what second order adds, or the pull of a source at rest."""
+        context, s = self.scene.context, self.direction
+        if source.orbit is None:
+            return self._pull_of(source, s)
+        normal = self.orbit(source.orbit).normal
+        unit = context.ldexp(context.one, self.scaling.time)
+        size = source.secular_strength(context) * self.of.motion.excess / self.of.motion.momentum
+        factor = as_factor(self.number(-size * unit)) * dot(normal, s)
+        second = self._second_order(source, normal, unit)
+        return [factor * x + y for x, y in zip(normal, second, strict=True)]
+
+    def _second_order(self, source: Source, normal: list[Symbolic], unit: Any) -> list[Symbolic]:
+        """grad K of ``rigidsim.model.averaged.orbit_terms``."""
+        orbit, s = source.orbit, self.direction
+        assert orbit is not None
+        context = self.scene.context
+        steady, across = second_order(float(orbit.eccentricity))
+        size = self.of.rate(source) ** 2 / (4 * orbit.mean_motion) * unit
+        z = dot(normal, s)
+        factor = self.number(size * context.mpf(across)) * (1.0 - 3.0 * (z * z))
+        gradient = [factor * x for x in normal]
+        if orbit.circular or not orbit.fixed_plane:  # where the pericentre moves, the rest is periodic
+            return gradient
+        at = source.place(context, self.scene.start)
+        p, t = ([as_factor(self.number(c)) for c in vector] for vector in (at.pericentre, at.across))
+        x, y = dot(p, s), dot(t, s)
+        more = self.number(size * context.mpf(steady))
+        towards = zip(gradient, normal, p, t, strict=True)
+        return [g + more * ((x * x - y * y) * n + 2.0 * (z * (x * a - y * b))) for g, n, a, b in towards]
+
+    def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
+        """The sum of k (a/r)^3 (s . r) r over the sources, per internal unit of time: s' is that times s."""
+        parts = [self._pull_of(source, s) for source in self.of.sources]
+        return [hy.sum([part[i] for part in parts]) for i in range(3)]
+
+    def _pull_of(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
+        orbit = source.orbit
+        if orbit is not None:
+            return self._pull_in_plane(source, orbit, s)
+        direction, inverse = self._seen(source)
+        factor = self._strength(source) * dot(direction, s)
+        if inverse is not None:
+            factor = factor * inverse**3
+        return [factor * x for x in direction]
+
+    def _strength(self, source: Source) -> Symbolic:
+        context = self.scene.context
+        return as_factor(self.number(self.of.rate(source) * context.ldexp(context.one, self.scaling.time)))
+
+    def _pull_in_plane(self, source: Source, orbit: KeplerOrbit, s: list[Symbolic]) -> list[Symbolic]:
+        """The same in the orbit's plane, whose node may turn: fewer products."""
+        tilt_c, tilt_s = self._turned(orbit.inclination, 0)
+        node_c, node_s = self._turned(orbit.ascending_node, orbit.node_rate)
+        first = node_c * s[0] + node_s * s[1]
+        second = node_c * s[1] - node_s * s[0]
+        raised = tilt_c * second + tilt_s * s[2]
+        x, y, inverse = self._in_plane(orbit)
+        factor = self._strength(source) * (x * first + y * raised)
+        if inverse is not None:
+            factor = factor * inverse**5
+        along, up = factor * x, factor * y
+        level = tilt_c * up
+        return [node_c * along - node_s * level, node_s * along + node_c * level, tilt_s * up]
+
+    def _in_plane(self, orbit: KeplerOrbit) -> tuple[Symbolic, Symbolic, Symbolic | None]:
+        """Position over a, from the node, and a/r where it varies."""
+        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
+        if orbit.circular:
+            return hy.cos(mean), hy.sin(mean), None
+        context, e = self.scene.context, orbit.eccentricity
+        anomaly = hy.kepE(hy.expression(self.number(e)), mean)
+        c, sine = hy.cos(anomaly), hy.sin(anomaly)
+        x, y = c - self.number(e), self.number(context.sqrt(1 - e * e)) * sine
+        w_c, w_s = self._turned(orbit.periapsis, orbit.periapsis_rate)
+        return w_c * x - w_s * y, w_s * x + w_c * y, 1.0 / (1.0 - self.number(e) * c)
+
+    def _seen(self, source: Source) -> tuple[list[Symbolic], Symbolic | None]:
+        """Unit vector to a source, space axes, and a/r where it varies."""
+        context, load = self.scene.context, source.load
+        if load.position is not None:
+            length = context.sqrt(dot(load.position, load.position))
+            return [as_factor(self.number(x / length)) for x in load.position], None
+        if load.ephemeris is not None:
+            time = seconds(self)
+            if load.epoch is not None and load.epoch != J2000:
+                time = time + self.number(ExactNumber(load.epoch.since_j2000()).at(context))
+            place = source_position(load.ephemeris, time)
+            return place.direction, place.inverse_distance
+        assert source.orbit is not None
+        seen = self.orbit(source.orbit)
+        return seen.direction, None if source.orbit.circular else seen.inverse_distance
+
+    def orbit(self, orbit: KeplerOrbit) -> OrbitStates:
+        """As functions of time: a phase that loses digits as time goes on moves the direction by that times
+        the nutation, and a torque without states of its own lets steps be longer by a factor of two.
+        """
+        at = self._place(orbit)
+        if orbit.circular:
+            inverse, x, y = hy.expression(1.0), at.cosine, at.sine
+        else:
+            context, e = self.scene.context, orbit.eccentricity
+            inverse = 1.0 / (1.0 - self.number(e) * at.cosine)
+            x = (at.cosine - self.number(e)) * inverse
+            y = self.number(context.sqrt(1 - e * e)) * at.sine * inverse
+        direction = [x * p + y * t for p, t in zip(at.pericentre, at.across, strict=True)]
+        return OrbitStates(StateBlock([], [], []), direction, self._normal(orbit), inverse)
+
+    def _moving(self, angle: Any, rate: Any) -> Symbolic:
+        """An angle that advances uniformly."""
+        start = hy.expression(self.number(angle))
+        if rate == 0:
+            return start
+        unit = self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
+        return start + self.number(rate * unit) * hy.time
+
+    def _turned(self, angle: Any, rate: Any) -> tuple[Symbolic, Symbolic]:
+        """Its cosine and sine."""
+        if rate == 0:
+            context = self.scene.context
+            return as_factor(self.number(context.cos(angle))), as_factor(self.number(context.sin(angle)))
+        moving = self._moving(angle, rate)
+        return hy.cos(moving), hy.sin(moving)
+
+    def _normal(self, orbit: KeplerOrbit) -> list[Symbolic]:
+        c, s = self._turned(orbit.inclination, 0)
+        node_c, node_s = self._turned(orbit.ascending_node, orbit.node_rate)
+        return [node_s * s, -(node_c * s), c]
+
+    def _place(self, orbit: KeplerOrbit) -> OrbitPlace:
+        """Where a source is on its orbit."""
+        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
+        e = hy.expression(self.number(orbit.eccentricity))
+        anomaly = mean if orbit.circular else hy.kepE(e, mean)
+        vectors = plane_vectors(
+            self._turned(orbit.inclination, 0),
+            self._turned(orbit.ascending_node, orbit.node_rate),
+            self._turned(orbit.periapsis, orbit.periapsis_rate),
+        )
+        return OrbitPlace(hy.cos(anomaly), hy.sin(anomaly), *vectors)
+
+    def _offset(self, s: list[Symbolic], turning: list[Symbolic]) -> list[Symbolic]:
+        """Of the circled axis from the momentum; ``turning`` per internal unit of time."""
+        context = self.scene.context
+        moment = self.of.motion.transverse / self.of.motion.momentum
+        factor = as_factor(self.number(context.ldexp(-moment, -self.scaling.time)))
+        return [factor * x for x in cross(s, turning)]
+
+    # --- what is recorded -----------------------------------------------------------------------------------
+
+    @cached_property
+    def _axes(self) -> tuple[list[Symbolic], list[Symbolic], list[Symbolic]]:
+        """Directions of momentum, figure and spin axis, about of unit length, space axes."""
+        mean = self.direction
+        lost = [hy.expression(float("nan"))] * 3
+        momentum, sign = mean, self.of.figure
+        if not self.of.short_period:
+            figure = [float(sign) * x for x in mean] if sign else lost
+            return mean, figure, mean
+        if self.of.over_orbits:
+            for source in self.of.sources:
+                if source.orbit is not None:
+                    more = nutation(
+                        hy,
+                        self.scene.context,
+                        source.orbit,
+                        self._place(source.orbit),
+                        self.of.rate(source),
+                        mean,
+                        self.number,
+                    )
+                    momentum = [x + y for x, y in zip(momentum, more, strict=True)]
+        if not sign:
+            return momentum, lost, momentum
+        away = self._offset(momentum, cross(self._pull(momentum), momentum))
+        motion = self.of.motion
+        ratio = self.number(1 - motion.moments[2] / motion.transverse)
+        figure = [float(sign) * (x + d) for x, d in zip(momentum, away, strict=True)]
+        spin = [x + ratio * d for x, d in zip(momentum, away, strict=True)]
+        return momentum, figure, spin
+
+    @cached_property
+    def momentum_space(self) -> list[Symbolic]:
+        """Angular momentum, space axes."""
+        context = self.scene.context
+        size = self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
+        return [size * x for x in self._axes[0]]
+
+    @cached_property
+    def momentum_body(self) -> list[Symbolic]:
+        """As ``momentum_space`` without what is added back, of which nothing but the size is told."""
+        context = self.scene.context
+        size = self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
+        return [size * x for x in self.direction]
+
+    @property
+    def figure_space(self) -> list[Symbolic]:
+        """See ``Mechanics``; NaN where the figure axis points nowhere on average."""
+        return self._axes[1]
+
+    @property
+    def spin_space(self) -> list[Symbolic]:
+        """See ``Mechanics``."""
+        return self._axes[2]
+
+    @cached_property
+    def rates(self) -> list[Symbolic]:
+        """At which the momentum turns, space axes."""
+        return self.derivatives
+
+    @cached_property
+    def rotational_energy(self) -> Symbolic:
+        """Of the free rotation: a constant."""
+        context = self.scene.context
+        return hy.expression(self.number(context.ldexp(self.of.energy, -self.scaling.energy)))
+
+    # --- loads ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def torque(self) -> list[Term]:
+        """None that body axes would tell."""
+        return []
+
+    @cached_property
+    def turning(self) -> list[Load]:
+        """All of them."""
+        return list(self.loads)
+
+    @cached_property
+    def potential_energy(self) -> Symbolic | None:
+        """None is told."""
+        return None
+
+    @cached_property
+    def power(self) -> Symbolic | None:
+        """On average there is none."""
+        return None

@@ -1,0 +1,126 @@
+"""The sources of an averaged torque: on Kepler orbits, at fixed places, or of an ephemeris."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigidsim.model.averaged.orbit_terms import OrbitPlace, plane_vectors, secular_factor
+from rigidsim.model.averaged.spectrum import orbit_harmonics
+from rigidsim.model.ephemeris import MEAN_DISTANCE
+from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.scene import Scene
+
+_DAY = 86400.0
+_SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
+"""Sidereal period (days) and eccentricity, by which averages over the Earth's spin are judged."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One of them.
+
+    Attributes:
+        number: of its ``[[loads]]``, from 1.
+        strength: 3 G M / a^3 (mpf, 1/s^2), a being the semi-major axis, the distance, or the mean one.
+    """
+
+    number: int
+    load: GravityGradient
+    strength: Any
+
+    @property
+    def orbit(self) -> KeplerOrbit | None:
+        """That it moves on; None for others."""
+        return self.load.orbit
+
+    @property
+    def motion(self) -> float:
+        """Mean motion, rad/s; 0 for a source at rest."""
+        if self.load.ephemeris is not None:
+            return 2 * math.pi / (_SERIES[self.load.ephemeris][0] * _DAY)
+        return 0.0 if self.orbit is None else abs(float(self.orbit.mean_motion))
+
+    @property
+    def eccentricity(self) -> float:
+        """Of its orbit; 0 for a source at rest."""
+        if self.load.ephemeris is not None:
+            return _SERIES[self.load.ephemeris][1]
+        return 0.0 if self.orbit is None else float(self.orbit.eccentricity)
+
+    @property
+    def slow_rate(self) -> float:
+        """Of node and periapsis together, rad/s."""
+        if self.orbit is None:
+            return 0.0
+        return abs(float(self.orbit.node_rate)) + abs(float(self.orbit.periapsis_rate))
+
+    @property
+    def harmonics(self) -> np.ndarray:
+        """Sizes of (a/r)^3 r r^T's harmonics of the mean motion, the mean first."""
+        return np.ones(1) if self.motion == 0 else orbit_harmonics(self.eccentricity)
+
+    @property
+    def nearest(self) -> float:
+        """(a/r)^3 where it is nearest."""
+        return float((1 - self.eccentricity) ** -3)
+
+    def secular_strength(self, context: Any) -> Any:
+        """3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2), of an orbit."""
+        assert self.orbit is not None
+        return self.strength * secular_factor(context, self.orbit)
+
+    def place(self, context: Any, time: Any) -> OrbitPlace:
+        """Where it is on its orbit, numbers (mpf)."""
+        orbit = self.orbit
+        assert orbit is not None
+        anomaly = orbit.eccentric_anomaly(context, time)
+        angles = (
+            orbit.inclination,
+            orbit.ascending_node + orbit.node_rate * time,
+            orbit.periapsis + orbit.periapsis_rate * time,
+        )
+        tilt, node, periapsis = ((context.cos(x), context.sin(x)) for x in angles)
+        return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *plane_vectors(tilt, node, periapsis))
+
+    def pull(self, context: Any, time: Any) -> np.ndarray | None:
+        """(a/r)^3 r r^T (3, 3) at a time; None where only a series tells it."""
+        if self.load.position is not None:
+            length = norm(context, self.load.position)
+            direction = np.array([float(x / length) for x in self.load.position])
+            return np.outer(direction, direction)
+        if self.orbit is None:
+            return None
+        e, at = float(self.orbit.eccentricity), self.place(context, time)
+        c, s = float(at.cosine), float(at.sine)
+        x, y = c - e, math.sqrt(1 - e * e) * s
+        radius = math.hypot(x, y)
+        along, across = (np.array([float(v) for v in vector]) for vector in (at.pericentre, at.across))
+        direction = (x * along + y * across) / radius
+        return np.outer(direction, direction) / radius**3
+
+
+def sources_of(scene: Scene, loads: Sequence[GravityGradient]) -> list[Source]:
+    """All of a scene, with their strengths."""
+    context, found = scene.context, []
+    for number, load in enumerate(loads, start=1):
+        if load.orbit is not None:
+            distance = load.orbit.semi_major_axis
+        elif load.position is not None:
+            distance = norm(context, load.position)
+        else:
+            distance = context.mpf(MEAN_DISTANCE[str(load.ephemeris)])
+        found.append(Source(number, load, 3 * load.gravitational_parameter / distance**3))
+    return found
+
+
+def unit(context: Any, vector: Vector) -> Vector:
+    """Divided by its length."""
+    length = norm(context, vector)
+    return [x / length for x in vector]

@@ -1,0 +1,76 @@
+"""The states of an averaged motion, and what it can and can't tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import heyoka as hy
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.averaged.average import Average
+from rigidsim.model.averaged.mechanics import DIRECTION, TOLD, AveragedMechanics
+from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.load import Load
+from rigidsim.model.numbers import Rounder, ScaledNumbers
+from rigidsim.model.scaling import Scaling
+from rigidsim.model.state_blocks import StateBlock
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.scene import Scene
+
+_OF_FIGURE = ("figure_axis",)
+WHY = {
+    "spin_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
+    "rotation: its size and the energy stay as they are",
+    "orbit_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
+    "rotation and over the sources' orbits: its size and the energy stay as they are",
+}
+
+
+def refuse_untold(average: Average, record: Sequence[str] | None) -> None:
+    """Look whether what is recorded can be had.
+
+    Raises:
+        ConfigError: names what needs every rotation.
+    """
+    for name in record or ():
+        if name in _OF_FIGURE and not average.figure:
+            why = "the body tumbles, so that its figure axis points nowhere on average; record momentum_axis "
+            why += "instead"
+        elif name not in TOLD:
+            why = f'needs every rotation, which [model] level = "{average.level}" averages over'
+        else:
+            continue
+        what = f'given "{name}": {why}; choose level = "full" to have it'
+        raise ConfigError(Problem("[output] record", what))
+
+
+def averaged_states(
+    scene: Scene,
+    average: Average,
+    loads: Sequence[Load],
+    scaling: Scaling,
+    numbers: ScaledNumbers,
+    orbit_tags: Mapping[KeplerOrbit, str],
+    number: Rounder,
+) -> tuple[AveragedMechanics, list[StateBlock]]:
+    """The mechanical quantities of an averaged motion, and its states."""
+    s = list(hy.make_vars(*DIRECTION))
+    attitude = AttitudeStates(
+        average.level,
+        DIRECTION,
+        [],
+        list(average.start),
+        [],
+        [],
+        "state",
+        defect=(
+            "momentum_axis_norm",
+            "norm of the momentum's direction",
+            hy.sqrt(hy.sum([x * x for x in s])),
+        ),
+    )
+    m = AveragedMechanics(
+        scene, scaling, numbers, s, attitude, None, None, None, number, orbit_tags,
+        loads=list(loads), average=average,
+    )  # fmt: skip
+    return m, [StateBlock(DIRECTION, m.derivatives, average.start, why=WHY[average.level])]

@@ -1,0 +1,34 @@
+"""``[model]``: how much of the motion is resolved."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, StrictBool
+
+from rigidsim.scene.fields import ConfigTable
+
+FULL, SPIN_AVERAGED, ORBIT_AVERAGED = "full", "spin_averaged", "orbit_averaged"
+REDUCED = (SPIN_AVERAGED, ORBIT_AVERAGED)
+"""Levels that carry the momentum's direction alone, the more averaged the later."""
+
+
+class Model(ConfigTable):
+    """``[model]``: every rotation, or the motion averaged over it, or over the sources' orbits as well."""
+
+    level: Literal["full", "spin_averaged", "orbit_averaged"] = Field(
+        default="full",
+        description="full resolves every rotation; spin_averaged carries the direction of the angular "
+        "momentum under torques averaged over the body's free rotation; orbit_averaged averages over the "
+        "sources' orbits as well",
+    )
+    short_period: StrictBool = Field(
+        default=False,
+        description="add back, to first order, what averaging removed: the nutation with the orbits' "
+        "periods, and the figure and spin axes' distance from the angular momentum",
+    )
+
+    @property
+    def reduced(self) -> bool:
+        """Whether anything is averaged."""
+        return self.level in REDUCED

@@ -1,0 +1,131 @@
+"""Averaged runs against the full one, end to end: how near they are, and whether they say so."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from support import config, run_text
+
+import rigidsim
+
+FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
+BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"
+START = f'angular_velocity = [0, 0, {SPIN}]\neuler_angles = [0.3, "35 deg", 0]'
+LOAD = f"""kind = "gravity_gradient"
+gravitational_parameter = 1
+orbit = {{semi_major_axis = 1, eccentricity = {ECCENTRICITY}, inclination = "10 deg", ascending_node = 1}}"""
+TIME = "end = 100\nsamples = 301"
+RECORD = 'record = ["momentum_axis", "figure_axis", "spin_axis", "obliquity", "node_longitude", "energy"]'
+RATE = 3 * FLATTENING / SPIN * (1 - ECCENTRICITY**2) ** -1.5 / 2  # k/2 of a mean motion of 1
+LEVELS = [
+    ("spin_averaged", False),
+    ("spin_averaged", True),
+    ("orbit_averaged", False),
+    ("orbit_averaged", True),
+]
+
+
+def text(level: str, *, short_period: bool = False, time: str = TIME, estimate: bool = False) -> str:
+    model = f'[model]\nlevel = "{level}"\nshort_period = {str(short_period).lower()}'
+    return config(BODY, START, LOAD, time, "", RECORD, model)
+
+
+@pytest.fixture(scope="module")
+def full() -> rigidsim.Run:
+    return run_text(text("full"))
+
+
+@pytest.fixture(scope="module")
+def reduced() -> dict[tuple[str, bool], rigidsim.Run]:
+    return {(level, more): run_text(text(level, short_period=more)) for level, more in LEVELS}
+
+
+def apart(one: rigidsim.Run, other: rigidsim.Run, name: str) -> float:
+    difference = one.dataset[name].values - other.dataset[name].values
+    return float(np.linalg.norm(difference, axis=1).max())
+
+
+Both = dict[tuple[str, bool], rigidsim.Run]
+
+
+def test_each_level_is_as_near_as_its_order(full: rigidsim.Run, reduced: Both) -> None:
+    precessed = 2 * RATE * 100  # at most
+    # nearest: (1 - e)^-3
+    nodding = 2 * RATE * (1 - ECCENTRICITY) ** -3
+    errors = {key: apart(run, full, "momentum_axis") for key, run in reduced.items()}
+    # the torque at the figure axis' true place: third order in the precession's rate over the spin's
+    assert errors["spin_averaged", False] < precessed * (nodding / SPIN) ** 1.5
+    assert errors["spin_averaged", False] == errors["spin_averaged", True]
+    # third order in the nutation, whose size is nodding / n, and n / w of what a rotation leaves
+    assert errors["orbit_averaged", True] < 10 * precessed * (nodding**2 + nodding / SPIN)
+    # and without what was averaged away the nutation is there: not small, not larger
+    assert 0.05 * nodding < errors["orbit_averaged", False] < nodding
+    assert errors["orbit_averaged", True] < 0.05 * errors["orbit_averaged", False]
+
+
+def test_figure_and_spin_axes_stand_off_as_they_do(full: rigidsim.Run, reduced: Both) -> None:
+    """By (A / L) s x s', and the start adds a free nutation of that size."""
+    offset = 2 * RATE * (1 - ECCENTRICITY) ** -3 / SPIN
+    run = reduced["spin_averaged", True]
+    for name in ("figure_axis", "spin_axis"):
+        assert apart(run, full, name) < 2 * offset
+    # against which the mean is not right by more than it: seen where the full run starts, without nutation
+    stands = run.dataset["figure_axis"].values - run.dataset["momentum_axis"].values
+    assert 0.1 * offset < np.linalg.norm(stands, axis=1).max() < 2 * offset
+    mean = reduced["spin_averaged", False]
+    same = mean.dataset["figure_axis"].values - mean.dataset["momentum_axis"].values
+    assert np.abs(same).max() <= 4 * np.finfo(float).eps  # both are divided by their length
+
+
+def test_angles_are_the_same_observables(full: rigidsim.Run, reduced: Both) -> None:
+    run = reduced["orbit_averaged", True]
+    for name in ("obliquity", "node_longitude"):
+        assert run.dataset[name].dims == full.dataset[name].dims
+        assert run.dataset[name].attrs["units"] == "rad"
+        error = np.abs(run.dataset[name].values - full.dataset[name].values).max()
+        # longitudes are angles over sin(25 deg) at least
+        assert error < apart(run, full, "momentum_axis") * 4 + 8 * RATE / SPIN * 2
+    energy = run.dataset["energy"].values
+    assert (energy == energy[0]).all()
+    assert energy[0] == pytest.approx(SPIN**2 / 2, rel=1e-15)
+
+
+def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
+    for level, more in (("spin_averaged", True), ("orbit_averaged", True), ("orbit_averaged", False)):
+        run = run_text(text(level, short_period=more), estimate=True)
+        found = run.summary["modelling"]
+        assert (found["level"], found["short_period"]) == (level, more)
+        true = apart(run, full, "momentum_axis")
+        assert true <= found["momentum_axis"] <= 10 * true
+        assert apart(run, full, "figure_axis") <= found["figure_axis"]
+        assert run.summary["accuracy"]["estimated_attitude_error"] < 1e-9  # of the integration: apart from it
+
+
+@pytest.mark.slow
+def test_windows_tell_what_becomes_of_a_long_run() -> None:
+    """Twenty times as long as the windows: a beginning, a middle and an end."""
+    run = run_text(text("orbit_averaged", short_period=True, time="end = 4000\nsamples = 81"), estimate=True)
+    found = run.summary["modelling"]
+    assert not found["whole"]
+    begins = [window["start"] for window in found["windows"]]
+    assert begins == pytest.approx([0, 2000, 3950], abs=60)
+    true = run_text(text("full", time="end = 4000\nsamples = 81"))
+    assert apart(run, true, "momentum_axis") <= found["momentum_axis"]
+    assert found["momentum_axis"] <= 10 * apart(run, true, "momentum_axis")
+
+
+def test_a_run_that_is_told_not_to_look_says_so() -> None:
+    run = run_text(text("orbit_averaged"))
+    assert "momentum_axis" not in run.summary["modelling"]
+    assert "estimate = false" in run.summary["modelling"]["how"]
+
+
+def test_more_digits_are_kept_from_text_to_dataset() -> None:
+    given = text("orbit_averaged", time="end = 100\nsamples = 3")
+    exact = run_text(given, 'integrator.precision="quadruple"')
+    double = run_text(given)
+    assert "momentum_axis_lo" in exact.dataset
+    assert 0 < apart(exact, double, "momentum_axis") < 1e-10
+    assert math.isclose(float(np.linalg.norm(exact.dataset["momentum_axis"].values[-1])), 1, rel_tol=1e-15)
