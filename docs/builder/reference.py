@@ -264,9 +264,10 @@ def python_page() -> str:
         "# Python\n\nWhat `import rigidsim` offers, and what loads and observables of your own are made of. "
         "How they are used: [from Python](../howto/python.md), [a load](../howto/own_load.md), "
         "[an observable](../howto/own_observable.md).",
-        "## Functions\n\n" + "\n\n".join(_directive("autofunction", _home(name)) for name in functions),
+        "## Functions\n\n"
+        + "\n\n".join(_directive("autofunction", f"rigidsim.{name}") for name in functions),
         "## Runs, experiments and errors\n\n"
-        + "\n\n".join(_directive("autoclass", _home(name), members=True) for name in classes),
+        + "\n\n".join(_directive("autoclass", f"rigidsim.{name}", members=True) for name in classes),
         "## Loads and observables\n\n"
         + "\n\n".join(
             [
@@ -279,12 +280,6 @@ def python_page() -> str:
         ),
     ]
     return "\n\n".join(parts)
-
-
-def _home(name: str) -> str:
-    import rigidsim
-
-    return f"{getattr(rigidsim, name).__module__}.{name}"
 
 
 def _directive(kind: str, name: str, *, members: bool = False) -> str:

@@ -240,37 +240,42 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     for line in plan["equations"]:
         on.say("  " + line, whole=True)
     on.table(["invariant", "holds because"], [[row["name"], row["why"]] for row in plan["invariants"]])
-    on.say(f"recorded   {', '.join(plan['recorded'])}", whole=True)
+    on.line("recorded", ", ".join(plan["recorded"]))
     predicted, pilot = plan["predicted"], plan["pilot"]
     held = ", invariants held" if plan["hold_invariants"] else ""
-    on.say(
-        f"precision  {plan['precision']}, tolerance {plan['tolerance']:.3g}, Taylor order "
-        f"{plan['taylor_order']}{held}"
+    on.line(
+        "settings",
+        f"{plan['precision']} precision, tolerance {plan['tolerance']:.3g}, Taylor order "
+        f"{plan['taylor_order']}{held}",
     )
     if plan["method"] == "closed_form":
-        on.say(f"method     {plan['closed_form']}: no steps are taken")
+        on.line("method", f"{plan['closed_form']}: no steps are taken")
     elif plan["closed_form"] is not None:
-        on.say(f'closed     {plan["closed_form"]}: method = "closed_form" would take no steps')
+        on.line("closed", f'{plan["closed_form"]}: method = "closed_form" would take no steps')
     if plan["accuracy"] is not None:
-        on.say(f"chosen     {plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
-    on.say(
-        f"predicted  {predicted['steps']:.3g} steps of about {span_text(pilot['step'])} "
+        on.line("chosen", f"{plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
+    on.line(
+        "forecast",
+        f"{predicted['steps']:.3g} steps of about {span_text(pilot['step'])} "
         f"(pilot of {pilot['steps']:.0f}), {span_text(predicted['total_seconds'])}, "
         f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
-        f"timeline {size(predicted['timeline_bytes'])}"
+        f"timeline {size(predicted['timeline_bytes'])}",
     )
     for warning in plan["warnings"]:
-        on.say((f"warning    {warning}", "bold red"), whole=True)
+        on.line("warning", warning, "bold red")
     error = predicted["attitude_error_rad"]
     if error is not None and math.isfinite(error):
         factor = predicted["amplification"]
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        on.say(f"accuracy   attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})")
+        on.line(
+            "accuracy", f"attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
+        )
         seen = predicted["growth_seconds"]
         if seen:
-            on.say(
-                f"           if errors go on growing as in the first {span_text(seen)}; what sets in later "
-                "isn't seen here, but by the run"
+            on.line(
+                "",
+                f"if errors go on growing as in the first {span_text(seen)}; what sets in later isn't seen "
+                "here, but by the run",
             )
 
 

@@ -15,8 +15,8 @@ _LONG = 8192
 _HELD = 3.0
 """tolerance sqrt(steps): attitude error with projected invariants, whose growth is that of a random walk.
 Over free bodies and heavy symmetric tops it was 1 to 2 of that at 1e7 rad (``experiments.long_horizon``)."""
-_WORTH = 30.0
-"""Times by which an error has to become smaller for anybody to be bothered with it."""
+_WORTH, _FAR = 30.0, 1000.0
+"""Times by which an error has to become smaller for anybody to be bothered: with a switch, with a method."""
 
 
 def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
@@ -39,6 +39,6 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
         advice.append(Advice(code=AdviceCode.HOLD_INVARIANTS.value, now=now, then=held))
     exact = CLOSED_FORM * float(prepared.precision.epsilon)
     stepped = bool(config.events) or config.output.lyapunov or prepared.holds_invariants
-    if not stepped and now > _WORTH * exact:
+    if not stepped and now > _FAR * exact:
         advice.append(Advice(code=AdviceCode.CLOSED_FORM.value, now=now, then=exact))
     return tuple(advice)

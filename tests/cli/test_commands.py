@@ -166,7 +166,7 @@ def test_plan_explains_and_writes_nothing(config: Config, rigidsim_command: Comm
     assert result.exit_code == 0, result.output
     assert files() == before
     assert "free  3 states, rates" in result.stdout
-    for text in ("Euler's equations", "no attitude", "wx' = ", "no torque acts", "predicted", "order 20"):
+    for text in ("Euler's equations", "no attitude", "wx' = ", "no torque acts", "forecast", "order 20"):
         assert text in result.stdout
 
 
