@@ -122,7 +122,7 @@ def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | N
     for trail in stage.trails:
         path = trail_path(stage, trail)
         # A piece of the older part ends where its row is: it must not stand out over the bright one.
-        stride = trail_stride(trail) if trail.line else 1
+        stride = trail_stride(trail)
         fading = fades(trail, stride)
         shown = round(RECENT * rows) if fading else rows
         overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown, 0))

@@ -25,6 +25,7 @@ OLDER = 16
 SCENE_ROWS = 20_000
 """Rows of arrows and trails, from which on those are thinned whose motion allows it."""
 _STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
+_SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
@@ -184,9 +185,9 @@ def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
 
 
 def strides_of(stage: Stage) -> dict[str, int]:
-    """Rows from one that is drawn to the next, of each arrow and each trail that is a line, by entity."""
+    """Rows from one that is drawn to the next, of each arrow and each trail, by entity."""
     found = {_arrow_path(stage, arrow): still_stride(arrow.vectors) for arrow in stage.arrows}
-    return found | {trail_path(stage, trail): trail_stride(trail) for trail in stage.trails if trail.line}
+    return found | {trail_path(stage, trail): trail_stride(trail) for trail in stage.trails}
 
 
 def stage_columns(
@@ -227,7 +228,7 @@ def stage_columns(
                 yield f"{path}/label", picked, rr.Points3D.columns(positions=tips)
     for trail in stage.trails:
         path = trail_path(stage, trail)
-        yield from _trail_columns(path, trail, rows, strides.get(path, 1))
+        yield from _trail_columns(path, trail, rows, strides[path])
 
 
 def _trail_columns(path: str, trail: Trail, rows: slice, stride: int) -> Iterable[tuple[str, slice, Columns]]:
@@ -241,7 +242,10 @@ def _trail_columns(path: str, trail: Trail, rows: slice, stride: int) -> Iterabl
             strips = _pieces(trail.points, older, stride, OLDER)
             yield f"{path}/older", older, rr.LineStrips3D.columns(strips=strips)
     else:
-        yield f"{path}/recent", rows, rr.Points3D.columns(positions=trail.points[rows].astype(np.float32))
+        picked = _every(rows, stride)
+        if picked.start < rows.stop:
+            positions = trail.points[picked].astype(np.float32)
+            yield f"{path}/recent", picked, rr.Points3D.columns(positions=positions)
     if trail.head:
         yield f"{path}/head", rows, rr.Points3D.columns(positions=trail.points[rows].astype(np.float32))
 
@@ -268,18 +272,20 @@ def trail_stride(trail: Trail) -> int:
     count = len(trail.points)
     if count <= SCENE_ROWS:
         return 1
+    if not trail.line:  # a cloud of points needs no more of them
+        return -(-count // SCENE_ROWS)
     middle = trail.points - np.nanmean(trail.points, axis=0)
     radius = float(np.nanmax(np.abs(middle))) if np.isfinite(middle).any() else 0.0
     for stride in (16, 8, 4, 2):
         chords = np.abs(trail.points[stride::stride] - trail.points[:-stride:stride]).max(axis=1)
-        if np.isfinite(chords).all() and float(np.percentile(chords, 99)) <= 0.03 * radius:
+        if np.isfinite(chords).all() and float(np.percentile(chords, 99)) <= _SMOOTH * radius:
             return stride
     return 1
 
 
 def fades(trail: Trail, stride: int) -> bool:
     """Whether a trail has an older part that is darker: a long one of a fast motion is heavy as it is."""
-    return trail.line and (stride > 1 or len(trail.points) <= SCENE_ROWS)
+    return trail.line and (stride > 2 or len(trail.points) <= SCENE_ROWS)
 
 
 def _every(rows: slice, stride: int) -> slice:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 ROWS = 100_000
 POLL_SECONDS = 1.0
 _ANSWER_SECONDS = 20.0
+_CLOSING_SECONDS = 3.0
 
 
 class LiveRecording:
@@ -112,6 +113,13 @@ def follow(
         return process.wait()
     except KeyboardInterrupt:
         return 130
+    except RuntimeError:
+        # sent while the viewer was being closed
+        try:
+            return process.wait(timeout=_CLOSING_SECONDS)
+        except subprocess.TimeoutExpired:
+            pass
+        raise
     finally:
         process.terminate()
         process.wait()

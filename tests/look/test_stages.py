@@ -236,7 +236,7 @@ def test_long_trails_and_arrows_are_thinned_only_where_nothing_is_lost() -> None
     assert still_stride(fast) == 1
     assert still_stride(slow[:SCENE_ROWS]) == 1
     assert trail_stride(trail("t", (1, 2, 3), slow)) == 16
-    assert trail_stride(trail("t", (1, 2, 3), fast)) == 1
+    assert trail_stride(trail("t", (1, 2, 3), fast)) == 1  # 33 points a turn
 
 
 def test_what_the_scene_is_about_is_plotted_first_and_in_readable_units(symmetric_top: Build) -> None:

@@ -225,7 +225,9 @@ def _facing(normals: Array, leading: Array | None) -> tuple[float, float]:
     tried = [(e, a) for e in np.deg2rad((20.0, 30.0, 42.0)) for a in np.deg2rad(np.arange(0.0, 360.0, 15.0))]
     directions = np.array([direction_of(*angles) for angles in tried])
     shown = np.abs(normals @ directions.T)
-    score = shown.mean(axis=0) + 0.5 * np.minimum(shown[0], 0.6) - 0.5 * (directions @ along) ** 2
+    # about 55 degrees from the arrow neither it nor the circles about it are seen end on
+    score = shown.mean(axis=0) + 0.5 * np.minimum(shown[0], 0.6)
+    score -= 1.2 * (np.abs(directions @ along) - 0.57) ** 2 if along.any() else 0.0
     elevation, azimuth = tried[int(score.argmax())]
     return float(elevation), float(azimuth)
 
