@@ -27,7 +27,7 @@ if not __package__:  # as a script
 
 import numpy as np
 
-from experiments.common import Check, main, new_figure, save, tidy
+from experiments.common import BLUE, ORANGE, Check, main, new_figure, save, tidy
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import sweep
 
@@ -108,7 +108,7 @@ def study(full: bool, out: Path) -> list[Check]:
     apart = float(np.abs(grown - rate)[measured].max())
     gyroscopic = stable & (roll < 0)
     source = "DeBra & Delp 1961"
-    _figure(values, grown, out)
+    _figure(values, grown, rate, out)
     return [
         Check("stable satellites that tumble", wrong[0], 0, 0.5, "1", source, "absolute"),
         Check("unstable satellites that stay", wrong[1], 0, 0.5, "1", source, "absolute"),
@@ -118,9 +118,9 @@ def study(full: bool, out: Path) -> list[Check]:
     ]  # fmt: skip
 
 
-def _figure(values: np.ndarray, grown: np.ndarray, out: Path) -> None:
-    figure = new_figure(6.4, 5.4)
-    axes = figure.subplots()
+def _figure(values: np.ndarray, grown: np.ndarray, rate: np.ndarray, out: Path) -> None:
+    figure = new_figure(10.5, 5.0)
+    axes, beside = figure.subplots(1, 2, width_ratios=[1.25, 1])
     edges = (-1, 1)
     cut = np.clip(grown, 0, 40)
     shown = axes.imshow(cut, origin="lower", extent=(*edges, *edges), interpolation="nearest")
@@ -131,6 +131,13 @@ def _figure(values: np.ndarray, grown: np.ndarray, out: Path) -> None:
     title = f"Growth of a displacement over {ORBITS} orbits; white: DeBra & Delp 1961"
     tidy(axes, "k_R = (C - A) / B  (A yaw, B roll, C pitch)", "k_Y = (C - B) / A", title)
     axes.grid(False)
+    told = rate < 40
+    beside.plot(rate[told], grown[told], ".", color=BLUE, markersize=4)
+    line = np.array([0, 40])
+    beside.plot(line, line, color=ORANGE)
+    beside.fill_between(line, line - PLAIN, line + PLAIN, color=ORANGE, alpha=0.15, linewidth=0)
+    tidy(beside, "r T of the linear motion", "ln of the largest growth", "One dot a satellite; band: allowed")
+    beside.set(xlim=(-1, 40), ylim=(0, 42))
     save(figure, out, NAME)
 
 

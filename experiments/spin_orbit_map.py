@@ -103,12 +103,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, help="folder that keeps the map; none by default")
     arguments = parser.parse_args(argv)
     with tempfile.TemporaryDirectory(prefix="rigidsim-map-") as temporary:
-        checks = study(arguments, arguments.out or Path(temporary))
+        checks = compared(arguments, arguments.out or Path(temporary))
     print(table(checks, "spin_orbit_map"))
     return int(not all(check.passed for check in checks))
 
 
-def study(arguments: argparse.Namespace, out: Path) -> list[Check]:
+def compared(arguments: argparse.Namespace, out: Path) -> list[Check]:
     """Both sides, then cells again."""
     side = math.isqrt(arguments.cells)
     rounds = [once(side, arguments.workers, out) for _ in range(arguments.rounds)]

@@ -26,6 +26,7 @@ SLOW = {
     "hyperion",
     "luni_solar_precession",
     "precession_and_nutation",
+    "satellite_stability",
 }
 SLOW |= {"spectral_lines"}
 
