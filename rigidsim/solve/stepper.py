@@ -25,12 +25,27 @@ from rigidsim.solve.precision import Precision, Scalar
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
-LONGEST_STEP = 2.0**30
+_LONGEST_STEP = 2.0**30
+_SPARE_BITS = 24  # of a type's exponents, for the states of order one themselves and what sums make of them
 _MOST_TO_WHOLE_TIME = 1000  # steps
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
 _HOPELESS_STEPS = 1e15  # to the last sample; at the fastest pace they would take years
 _TINY_STEPS = 32  # one after the other, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
+
+
+def longest_step(order: int, number: type) -> float:
+    """Bound of all steps, internal units.
+
+    Events are found on a step's polynomials, scaled by the powers of its size up to the order: where those
+    overflow, as 2^30 to the 10th does in single precision, heyoka finds none and says nothing of it.
+
+    Args:
+        number: type of the states.
+    """
+    if not issubclass(number, np.floating):  # quadruple and beyond: of far more than a thousand exponents
+        return _LONGEST_STEP
+    return min(_LONGEST_STEP, 2.0 ** ((np.finfo(number).maxexp - _SPARE_BITS) // order))
 
 
 @dataclass(frozen=True)
@@ -107,7 +122,7 @@ class Stepper:
         self._charts = {0: self._integrator}
         far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
-        bounds = (LONGEST_STEP, _LONGEST_FOLLOWED)
+        bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
         self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
         self._longest = self._bounds[0]
         self.steps = 0

@@ -238,14 +238,25 @@ class SwitchedEngines(Stepper):
             if square != 0:
                 state[:] = state - (look.u[j] / square) * gradient
 
-    def _seen(self, j: int, begin: Scalar) -> Scalar | None:
-        """A time shortly after a step's beginning at which an argument has the sign of its side, if any."""
-        end = self._integrator.time
-        for power in range(1, self.precision.bits // 2):
+    def _seen(self, j: int, begin: Scalar, before: np.ndarray) -> Scalar | None:
+        """A time of the latest step at which an argument has the sign of its side, if any.
+
+        Args:
+            before: the state in which the step began.
+        """
+        end, mode = self._integrator.time, self._modes[j]
+        look = self._look(before, begin)
+        known = self._probe.noise(look, j, [before])
+        beside = mode * float(look.u[j]) > known  # of the surface, as the step began
+        some = self.precision.bits // 2
+        for power in range(1, _BISECTIONS * self.precision.bits):
             then = begin + (end - begin) * self.precision.of_double(2.0**-power)
-            if self._modes[j] * float(self._values(self._integrator.update_d_output(then), then)[j]) > 0:
+            value = mode * float(self._values(self._integrator.update_d_output(then), then)[j])
+            if value > 0:
                 return then
-        return None
+            if power >= some and (beside or abs(value) <= known):  # nearer than that it is on the surface
+                break
+        return begin if beside else None
 
     def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
         """A root that the engine missed."""

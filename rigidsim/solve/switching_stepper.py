@@ -197,7 +197,7 @@ class SwitchingStepper(SwitchedEngines):
             look = self._look(after, end)
             if -mode * float(look.u[j]) <= self._probe.noise(look, j, states):
                 continue
-            inside = self._seen(j, begin)
+            inside = self._seen(j, begin, before)
             if inside is None:
                 return begin, j, -mode
             return self._bisected(j, inside, end), j, -mode

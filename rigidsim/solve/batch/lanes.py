@@ -17,7 +17,7 @@ import numpy as np
 from rigidsim.solve.batch.lane_results import Found, Lanes
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
-from rigidsim.solve.stepper import LONGEST_STEP
+from rigidsim.solve.stepper import longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, at the same places always."""
@@ -86,6 +86,7 @@ class BatchEngine:
             self._integrator = self._compiled()
         else:
             self._integrator = _engines.get(described, self._compiled)
+        self._longest = longest_step(self._integrator.order, np.float64)
 
     def _compiled(self) -> Any:
         system, width = self._system, self.width
@@ -194,7 +195,7 @@ class BatchEngine:
         while any(member != _IDLE for member in inside):
             self._log.clear()
             most = _until_next(moments, inside, targets, begun, taken, most_steps)
-            integrator.propagate_until(target, max_steps=most, max_delta_t=LONGEST_STEP)
+            integrator.propagate_until(target, max_steps=most, max_delta_t=self._longest)
             outcomes = integrator.propagate_res
             high, low = (np.array(part) for part in integrator.dtime)
             moments = high.tolist()
@@ -268,7 +269,7 @@ class BatchEngine:
                 found = np.array(integrator.state)[None]
             else:
                 grid = part if known else np.vstack([begin, part])
-                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=LONGEST_STEP)
+                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=self._longest)
                 outcomes = integrator.propagate_res[:count]
                 taken += [now[3] for now in outcomes]
                 arrived[:] = [now[0] == _ARRIVED for now in outcomes]
