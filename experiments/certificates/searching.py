@@ -32,7 +32,8 @@ _TOLERANCES: dict[str, tuple[float | None, ...]] = {
 def truth_setting(
     experiment: Experiment, setting: Setting, scene: RandomScene, against: Kind | None = None
 ) -> Setting:
-    """Twelve digits and more beyond the accuracy, and another precision or method than the certificate's.
+    """Twelve digits and more beyond the accuracy, ten beyond the run's own tolerance (which is far below the
+    accuracy where the motion lets errors grow), and another precision or method than the certificate's.
 
     Args:
         setting: of the run that is judged.
@@ -47,7 +48,8 @@ def truth_setting(
         return Setting("quadruple", 1e-30)
     if setting.bits <= 53 and scene.accuracy >= _TIGHT:
         return Setting("quadruple", 1e-26)
-    return Setting(digits, scene.accuracy * 1e-12)
+    own = 2.0 ** -(setting.bits - 1) if setting.tolerance is None else setting.tolerance
+    return Setting(digits, min(scene.accuracy * 1e-12, own * 1e-10))
 
 
 class Search:
