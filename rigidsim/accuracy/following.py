@@ -111,6 +111,12 @@ def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool
     if part < 1 and not _waypoints(course, part, margins):
         part = max(part, min(1.0, margins.all_steps / course.steps))
     found, tight = _follow(course, part, TOLERANCE, margins, go_on)
+    if found.windows and found.spread.whole and not _same_states(course.prepared) and go_on():
+        # what sets in between windows, or shows in none: quaternions follow it, which lose less than momenta
+        twin = _follow(course, _affordable_by_twin(course, margins), TOLERANCE, margins, go_on)
+        spread = twin[0].spread
+        if _suspicious(spread, course.start, course.carried, margins.most_power):
+            found, tight = twin
     spread, steps = found.spread, course.steps
     far = spread.whole and not tight and steps < margins.tight_steps and bool(spread.times)
     far = far and margins.drifted < max(leading(spread, course.carried)) < margins.gone * course.lost
@@ -137,9 +143,20 @@ def _affordable(course: Course, margins: Margins) -> float:
         if course.steps > (margins.canonical_steps if canonical else margins.all_steps):
             # windows, which nothing else can look at
             return max(margins.own_steps, budget / (NEIGHBOURS + 1))
+    return _of_double(course, budget, margins)
+
+
+def _of_double(course: Course, budget: float, margins: Margins) -> float:
+    """Steps of the run that may be followed in double precision by code that is compiled for it."""
     passes = "x" in course.prepared.system.states and course.uneven > margins.uneven
     least = margins.passing_steps if passes else margins.all_steps
-    return max(least, (budget - margins.unrolling) / margins.lane)
+    more = 1.0 if _same_states(course.prepared) else margins.charts
+    return more * max(least, (budget - margins.unrolling) / margins.lane)
+
+
+def _affordable_by_twin(course: Course, margins: Margins) -> float:
+    """The part of a run in double precision that its twin in quaternions may follow."""
+    return min(1.0, _of_double(course, margins.share * course.steps, margins) / course.steps)
 
 
 def _follow(

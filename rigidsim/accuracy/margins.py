@@ -27,6 +27,8 @@ class Margins:
             windows can only be looked at by the run's own integrator, at a tenth of that speed;
             ``most_own_steps``: that it takes at most; ``canonical_steps``: likewise of canonical runs that
             are followed whole, since what momenta lose beside the singularity isn't known well elsewhere.
+        charts: steps in Euler angles and their momenta over those of quaternions, by which such runs are
+            followed.
         uneven: longest step of a flight over its shortest, from which it passes something closely.
         share: of the run's cost that may be spent, where errors grow as those of stable motions do.
         lane: cost of a step of all neighbours, unrolled, over one of the run in double precision;
@@ -63,6 +65,7 @@ class Margins:
     own_steps: int = 3_000
     most_own_steps: int = 20_000
     canonical_steps: int = 10_000
+    charts: float = 2.5
     uneven: float = 10.0
     share: float = 0.05
     lane: float = 0.5
