@@ -25,7 +25,7 @@ from rigidsim.solve.precision import Precision, Scalar
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
-_LONGEST_STEP = 2.0**30
+_LONGEST_BITS = 30
 _SPARE_BITS = 24  # of a type's exponents, for the states of order one themselves and what sums make of them
 _MOST_TO_WHOLE_TIME = 1000  # steps
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
@@ -44,8 +44,8 @@ def longest_step(order: int, number: type) -> float:
         number: type of the states.
     """
     if not issubclass(number, np.floating):  # quadruple and beyond: of far more than a thousand exponents
-        return _LONGEST_STEP
-    return min(_LONGEST_STEP, 2.0 ** ((np.finfo(number).maxexp - _SPARE_BITS) // order))
+        return 2.0**_LONGEST_BITS
+    return 2.0 ** min(_LONGEST_BITS, (np.finfo(number).maxexp - _SPARE_BITS) // order)
 
 
 @dataclass(frozen=True)

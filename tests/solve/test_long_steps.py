@@ -1,0 +1,76 @@
+"""Steps of motions whose series end, which could be as long as anything: what happens within is found."""
+
+from __future__ import annotations
+
+import heyoka as hy
+import numpy as np
+import pytest
+from support import run_text
+
+from rigidsim.solve.stepper import longest_step
+
+THROWN = """
+name = "thrown"
+[body]
+principal_moments = [1, 1, 1]
+mass = 1
+[initial]
+angular_velocity = [0, 0, 0]
+position = [0, 0, 10]
+velocity = [1, 0, 3]
+[[loads]]
+kind = "uniform_gravity"
+acceleration = [0, 0, -10]
+[time]
+end = 3
+samples = 2
+[[events]]
+name = "ground"
+expression = "z"
+"""
+# scene 852 of seed 5 of the campaign, in round numbers; its natural step is as long as it is let to be
+KINKED = """
+name = "kinked"
+[body]
+principal_moments = [3, 3, 3]
+[initial]
+angular_velocity = [0, 0, 0.026]
+[[loads]]
+kind = "torque"
+components = ["0", "0", "3e-6*sqrt((t - 241)^2)"]
+[time]
+end = 1738
+samples = 3
+"""
+
+
+@pytest.mark.parametrize("precision", ["single", "double", "extended", "quadruple"])
+def test_a_body_without_spin_is_seen_to_hit_the_ground(precision: str) -> None:
+    run = run_text(THROWN, f'integrator.precision="{precision}"')
+    # 10 + 3 t - 5 t^2 = 0
+    exact = (3 + np.sqrt(209)) / 10
+    assert run.summary["events"] == {"ground": 1}
+    epsilon = max(float(np.finfo(np.float32 if precision == "single" else np.float64).eps), 0.0)
+    assert run.summary["event_times"]["ground"]["first"] == pytest.approx(exact, rel=4 * epsilon)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("formulation", ["euler_angles", "quaternion"])
+def test_a_kink_far_within_a_long_step_is_one_of_its_ends(precision: str, formulation: str) -> None:
+    run = run_text(KINKED, f'integrator.precision="{precision}"', f'integrator.formulation="{formulation}"')
+    # 3 w' = 3e-6 |t - 241|
+    late, end = 241.0, 1738.0
+    exact = 0.026 + 1e-6 * (late**2 + (end - late) ** 2) / 2
+    epsilon = np.finfo(np.float32 if precision == "single" else np.float64).eps
+    rounding = 16 * epsilon * np.sqrt(max(run.summary["cost"]["steps"], 1))
+    assert run.dataset.angular_velocity.values[-1, 2] == pytest.approx(exact, rel=rounding)
+    without = 0.026 + 1e-6 * end * (end / 2 - late)  # had it been stepped over
+    assert abs(without - exact) > 0.04 * exact
+
+
+@pytest.mark.parametrize("number", [np.float32, np.float64, np.longdouble])
+@pytest.mark.parametrize("order", [2, 10, 20, 40])
+def test_powers_of_the_longest_step_up_to_the_order_are_numbers(number: type, order: int) -> None:
+    longest = longest_step(order, number)
+    assert np.isfinite(number(longest) ** order)
+    assert 1.0 < longest <= longest_step(2, np.longdouble) == longest_step(400, hy.real128) == 2.0**30
