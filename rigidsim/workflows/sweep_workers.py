@@ -1,16 +1,24 @@
-"""Tiles computed by several processes of this machine; a worker that dies costs the tile that it was at."""
+"""Tiles computed by several processes of this machine; a worker that dies costs the tile that it was at.
+
+Workers leave tiles in files and send back no more than their sizes. A process that is killed while it writes
+a long answer into the pipe of a ``ProcessPoolExecutor`` leaves half of it there, for whose other half the
+pool waits for ever; what fits one write (``PIPE_BUF``, at least 512 bytes) arrives whole or not at all.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import signal
+import tempfile
 import threading
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import Any
 
 from rigidsim.errors import StoppedError
@@ -39,22 +47,30 @@ class Workers:
         Raises:
             StoppedError: workers die again and again at the same tile.
         """
+        with tempfile.TemporaryDirectory(prefix="rigidsim-tiles-") as between:
+            yield from self._images(generation, tiles, Path(between))
+
+    def _images(
+        self, generation: Generation, tiles: Sequence[int], between: Path
+    ) -> Iterator[tuple[int, bytes]]:
         waiting = list(reversed(tiles))
         deaths: Counter[int] = Counter()
         while waiting:
-            pool = self._pool(len(waiting))
-            running: dict[Future[bytes], int] = {}
+            pool = self._pool(len(waiting), between)
+            running: dict[Future[int], int] = {}
             try:
                 while waiting or running:
                     while waiting and len(running) < 2 * self._count:  # one ahead for each
                         tile = waiting.pop()
-                        running[pool.submit(tile_image, *task(generation, tile))] = tile
+                        file = between / str(tile)
+                        running[pool.submit(leave_tile, file, *task(generation, tile))] = tile
                     done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
-                    if not done:
-                        _refuse_dead(pool)
                     for future in done:
-                        image = future.result()
-                        yield running.pop(future), image
+                        future.result()
+                        tile = running.pop(future)
+                        file = between / str(tile)
+                        yield tile, file.read_bytes()
+                        file.unlink()
             except BrokenProcessPool:
                 lost = list(running.values())
                 deaths.update(lost)
@@ -63,25 +79,18 @@ class Workers:
             finally:
                 _end(pool)
 
-    def _pool(self, tiles: int) -> ProcessPoolExecutor:
-        context = multiprocessing.get_context("spawn")
+    def _pool(self, tiles: int, between: Path) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(
-            min(self._count, tiles), mp_context=context, initializer=_begin_worker, initargs=(os.getpid(),)
+            min(self._count, tiles),
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_begin_worker,
+            initargs=(os.getpid(), between),
         )
 
 
-def _processes(pool: ProcessPoolExecutor) -> list[Any]:
-    return list((getattr(pool, "_processes", None) or {}).values())
-
-
-def _refuse_dead(pool: ProcessPoolExecutor) -> None:
-    """The pool itself doesn't notice a worker that dies while it sends a tile: it waits for the rest of it.
-
-    Raises:
-        BrokenProcessPool: one has ended.
-    """
-    if not all(process.is_alive() for process in _processes(pool)):
-        raise BrokenProcessPool("a worker died")
+def leave_tile(file: Path, *of: Any) -> int:
+    """Compute a tile (see ``tile_image``) and leave it in a file; its size in bytes."""
+    return file.write_bytes(tile_image(*of))
 
 
 def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
@@ -96,7 +105,7 @@ def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
 
 def _end(pool: ProcessPoolExecutor) -> None:
     """Nobody waits for what is in work."""
-    processes = _processes(pool)
+    processes = list((getattr(pool, "_processes", None) or {}).values())
     pool.shutdown(wait=False, cancel_futures=True)
     for process in processes:
         process.kill()
@@ -104,13 +113,14 @@ def _end(pool: ProcessPoolExecutor) -> None:
         process.join(5)
 
 
-def _begin_worker(parent: int) -> None:
+def _begin_worker(parent: int, between: Path) -> None:
     """Ctrl-C is for the process that started the workers, and they end with it, however it does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(_WATCH_SECONDS)
+        shutil.rmtree(between, ignore_errors=True)  # it was killed, and can't do so itself
         os._exit(1)
 
     threading.Thread(target=watch, name="rigidsim watch", daemon=True).start()

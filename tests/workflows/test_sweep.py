@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import os
+import pickle
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import time
-from multiprocessing.queues import SimpleQueue
+from concurrent.futures.process import _ResultItem
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +30,13 @@ from rigidsim.store.seal import seal
 from rigidsim.store.sweep_folder import SweepFolder
 from rigidsim.store.sweep_generation import Work, ranges_of
 from rigidsim.store.sweep_run import open_sweep
-from rigidsim.workflows import sweep_workers
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import resume_sweep, scanned
 from rigidsim.workflows.sweep import sweep as run_sweep
-from rigidsim.workflows.sweep_members import run_members, sweep_of, tile_image
+from rigidsim.workflows.sweep_members import run_members, sweep_of
 from rigidsim.workflows.sweep_verify import verify_sweep
+from rigidsim.workflows.sweep_ways import task
+from rigidsim.workflows.sweep_workers import leave_tile
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -497,31 +497,14 @@ def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: P
     np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
 
 
-def dies_while_sending(*task: Any) -> bytes:
-    """Of the first worker: the beginning of a result, and death; of all others the tile."""
-    marker = Path(os.environ["DIED_WHILE_SENDING"])
-    try:
-        marker.touch(exist_ok=False)
-    except FileExistsError:
-        return tile_image(*task)
-    queues = [x for x in gc.get_objects() if isinstance(x, SimpleQueue) and hasattr(x, "_writer")]
-    for queue in queues:
-        queue._wlock.acquire()
-        os.write(queue._writer.fileno(), struct.pack("!i", 1000) + b"the first bytes")
-    os.kill(os.getpid(), signal.SIGKILL)
-    raise AssertionError
-
-
-@pytest.mark.slow  # three processes that import everything
-def test_a_worker_that_dies_while_it_sends_a_tile_is_noticed(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("DIED_WHILE_SENDING", str(tmp_path / "died"))
-    monkeypatch.setattr(sweep_workers, "tile_image", dies_while_sending)
-    found = swept(tmp_path, workers=2)
-    assert (tmp_path / "died").exists()
-    expected = open_sweep(folder).dataset.angular_velocity_final
-    np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
+def test_what_a_worker_sends_back_is_one_write(folder: Path, tmp_path: Path) -> None:
+    """One that is killed within a longer answer leaves the pool waiting for the rest of it; writes of
+    up to 512 bytes (POSIX's least ``PIPE_BUF``) are whole.
+    """
+    (generation,) = SweepFolder(open_sweep(folder).folder.path).generations()
+    answer = leave_tile(tmp_path / "tile", *task(generation, 0))
+    assert answer == (tmp_path / "tile").stat().st_size > 512
+    assert len(pickle.dumps(_ResultItem(0, result=answer))) < 512
 
 
 def test_every_kept_quantity_can_be_drawn(folder: Path) -> None:
