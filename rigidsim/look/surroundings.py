@@ -83,6 +83,13 @@ def globe_of(one: dict[str, Any]) -> Globe | None:
     return near if abs(strength / near.gravitational_parameter - 1) < _ALIKE else None
 
 
+def called(globe: Globe | None, unknown: str) -> str:
+    """Who attracts, as it stands in a sentence: ``the Sun``, ``Saturn``, ``the`` and a word for nobody."""
+    if globe is None:
+        return f"the {unknown}"
+    return f"the {globe.name}" if globe.name in ("Sun", "Earth", "Moon") else globe.name
+
+
 def source_path(one: dict[str, Any], seconds: Array) -> Array | None:
     """Where a source is, (rows, 3), m, space axes, from the body; None where that can't be told.
 

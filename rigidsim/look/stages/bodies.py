@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rigidsim.look import signals, surroundings
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages.parts import (
@@ -14,6 +15,7 @@ from rigidsim.look.stages.parts import (
     AXIS_REACH,
     MOMENTUM,
     POLHODE,
+    SOURCE,
     VELOCITY,
     Array,
     Arrow,
@@ -156,6 +158,25 @@ def vectors_of(
     if trails:
         notes.append("trails: bright for the time just passed, dark for the whole run")
     return arrows, trails, notes
+
+
+def source_arrows(dataset: Table, subject: Subject, length: float) -> list[Arrow]:
+    """Directions to what pulls, in space: by their orbits; of an ephemeris by the nadir that was recorded."""
+    arrows = []
+    listed = surroundings.told(dataset, "source")
+    nadir = column(dataset, "nadir", 3)
+    for number, one in enumerate(listed):
+        path = surroundings.source_path(one, signals.seconds(dataset))
+        if path is None and nadir is not None and len(listed) == 1 and subject.attitude is not None:
+            path = np.einsum("tij,tj->ti", subject.attitude, nadir)
+        if path is None:
+            continue
+        way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
+        known = surroundings.globe_of(one)
+        name = surroundings.called(known, str(one.get("ephemeris", "source")))
+        color = known.color if known else SOURCE
+        arrows.append(Arrow(f"source{number}", f"to {name}", color, way, False, f"direction of {name}"))
+    return arrows
 
 
 def eye_at(

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.look.stages.bodies import Subject, vectors_of
-from rigidsim.look.stages.parts import TRACK, Picture, Stage, trail
+from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of
+from rigidsim.look.stages.parts import ARROW_REACH, TRACK, Picture, Stage, trail
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table
@@ -23,6 +23,8 @@ def picture(dataset: Table, subject: Subject) -> Picture:
     arrows, trails, notes = vectors_of(dataset, subject)
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
+    else:
+        arrows += source_arrows(dataset, subject, 0.95 * ARROW_REACH)
     stages = with_track(subject, subject.stage(arrows, trails), notes)
     return Picture("motion of a rigid body", stages, [], ("angular_velocity",), notes)
 

@@ -25,11 +25,9 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     planet = surroundings.globe_of(listed[0])
     arrows, trails, notes = vectors_of(dataset, subject, paths=False)
     close = subject.stage(arrows, trails, "Body, seen in space axes")
-    name = planet.name if planet is not None else "attracting point"
+    name = surroundings.called(planet, "attracting point")
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
-    close.arrows.append(
-        Arrow("nadir", f"to the {name}", SOURCE, 1.35 * down, False, f"direction of the {name}")
-    )
+    close.arrows.append(Arrow("nadir", f"to {name}", SOURCE, 1.35 * down, False, f"direction of {name}"))
     stage = orbit_stage(subject, subject.quaternion, position, planet)
     notes.append(
         f"in the view of the orbit 1 unit = {stage.unit:.6g} m; the body is drawn "

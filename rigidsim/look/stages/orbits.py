@@ -22,7 +22,7 @@ from rigidsim.look.stages.parts import (
     trail,
     viewer_quaternion,
 )
-from rigidsim.look.surroundings import GREY, Globe
+from rigidsim.look.surroundings import GREY, Globe, called
 from rigidsim.look.symbols import globe, graticule
 
 ORBIT_BODY = 0.11  # reach of the enlarged body, in units of the orbit's largest distance
@@ -64,7 +64,7 @@ def orbit_stage(subject: Subject, quaternion: Array | None, position: Array, pla
     camera = Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), np.array([0.0, 0.0, 1.0]))
     stage = Stage(
         root="path",
-        title=f"Orbit about the {name}",
+        title=f"Orbit about {called(planet, 'attracting point')}",
         unit=unit,
         meshes=[mesh.scaled(ORBIT_BODY) for mesh in subject.meshes],
         points=subject.points * ORBIT_BODY,

@@ -13,14 +13,13 @@ import numpy as np
 from rigidsim.look import signals, surroundings
 from rigidsim.look.angle_units import angle_unit
 from rigidsim.look.readable_time import span_text
-from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of
+from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, source_arrows
 from rigidsim.look.stages.parts import (
     BODY,
     FAINT,
     FIGURE,
     PALE,
     POLHODE,
-    SOURCE,
     SPACE,
     VELOCITY,
     Array,
@@ -89,7 +88,7 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     stage.arrows.append(Arrow("figure_axis", "figure axis", FIGURE, 1.45 * pole, False, "figure axis"))
     _orbit_plane(stage)
     _precession(dataset, stage, pole, notes)
-    _sources(dataset, stage, subject.attitude)
+    stage.arrows.extend(source_arrows(dataset, subject, 1.75))
     step = _largest_turn(dataset)
     if step > 1.0:
         notes.append(
@@ -200,26 +199,6 @@ def _precession(dataset: Table, stage: Stage, pole: Array, notes: list[str]) -> 
             words += f": once in {span_text(2 * np.pi / abs(rate), 3)}"
             notes.append(f"the pole's longitude moves by {rate:.6g} rad/s on the mean (straight line)")
     stage.lines.append(Line("precession", PRECESSION, ring, SPACE, 2.0, 1.0, words))
-
-
-def _sources(dataset: Table, stage: Stage, attitude: Array | None) -> None:
-    """Directions to what pulls: by their orbits; of an ephemeris by the nadir that was recorded."""
-    seconds = signals.seconds(dataset)
-    listed = surroundings.told(dataset, "source")
-    for number, one in enumerate(listed):
-        path = surroundings.source_path(one, seconds)
-        nadir = column(dataset, "nadir", 3)
-        if path is None and nadir is not None and len(listed) == 1 and attitude is not None:
-            path = np.einsum("tij,tj->ti", attitude, nadir)
-        if path is None:
-            continue
-        way = path / np.linalg.norm(path, axis=1, keepdims=True)
-        known = surroundings.globe_of(one)
-        name = known.name if known else str(one.get("ephemeris", "source")).title()
-        color = known.color if known else SOURCE
-        stage.arrows.append(
-            Arrow(f"source{number}", f"to the {name}", color, 1.75 * way, False, f"direction of the {name}")
-        )
 
 
 def _pole_planes(dataset: Table, notes: list[str]) -> list[Plane]:

@@ -88,18 +88,18 @@ def _in_local_frame(
     tip = 1.3 * np.einsum("tij,tj->ti", relative, np.broadcast_to(axis, (len(relative), 3)))
     stage = subject.stage([], [], "Body in the local frame")
     solids, lines = horizon(planet, "local")
-    name = planet.name if planet is not None else "source"
+    name = surroundings.called(planet, "source")
     zero = np.zeros(3)
     stage.vectors.extend(
         [
             Vector(
                 "nadir",
-                f"to the {name}",
+                f"to {name}",
                 SOURCE,
                 zero,
                 np.array([0, 0, 1.75]),
                 "local",
-                f"nadir: to the {name}",
+                f"nadir: to {name}",
             ),
             Vector("forward", "forward", FORWARD, zero, np.array([1.75, 0, 0]), "local", "along the orbit"),
             Vector("normal", "normal", NORMAL, zero, np.array([0, -1.6, 0]), "local", "the orbit's normal"),
