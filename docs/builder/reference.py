@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -58,10 +59,18 @@ def config_page() -> str:
 
 
 def _tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Headings and tables, in the order in which a config is written."""
+    """Headings and tables, in the order in which a config is written, then those within tables."""
     defined = schema["$defs"]
-    top = {**schema, "description": "Above all tables, and the tables there are."}
-    yield "The whole file", top
+    yield from _named(schema)
+    shown = {id(node) for _, node in _named(schema)}
+    for name, node in defined.items():
+        if id(node) not in shown:
+            yield _INNER.get(name, re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).capitalize()), node
+
+
+def _named(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The tables that a config names, each load by its kind."""
+    yield "The whole file", {**schema, "description": "Above all tables, and the tables there are."}
     for name, key in schema["properties"].items():
         target = _target(key, schema)
         if name == "loads":
@@ -71,16 +80,15 @@ def _tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
             named = isinstance(key.get("additionalProperties"), Mapping)
             plain = f'[{name}."NAME"]' if named else f"[{name}]"
             yield (f"[[{name}]]" if key.get("type") == "array" else plain), target
-    for heading, name in _INNER:
-        yield heading, defined[name]
 
 
-_INNER = (
-    ("An entry of [body] points", "PointMass"),
-    ("An entry of [body] parts", "Part"),
-    ("orbit of a load", "Orbit"),
-    ("An axis of [sweep] axes", "AxisTable"),
-)
+_INNER = {
+    "PointMass": "An entry of [body] points",
+    "Part": "An entry of [body] parts",
+    "Orbit": "orbit of a load",
+    "AxisTable": "An axis of [sweep] axes",
+}
+"""Headings of tables within tables; others are called by their class."""
 
 
 def _target(key: Mapping[str, Any], schema: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -201,9 +209,7 @@ def _options(command: Any) -> str:
         names = [*parameter.opts, *parameter.secondary_opts]
         argument = parameter.param_type_name == "argument"
         shown = parameter.metavar or names[0].upper() if argument else ", ".join(names)
-        value = (
-            "" if argument or parameter.is_flag else f" {parameter.metavar or parameter.type.name.upper()}"
-        )
+        value = "" if argument or parameter.is_flag else f" {parameter.metavar or 'VALUE'}"
         default = parameter.default
         told = "" if default is None or default is False or callable(default) else code(str(default))
         rows.append([code(shown + value), getattr(parameter, "help", "") or "", told])
