@@ -174,12 +174,12 @@ def _candidates(experiment: Experiment, motion: Motion) -> list[Setting]:
     found: list[Setting] = []
     if integrator.method == "closed_form" or "method" not in given:
         open_ = motion.closed and not charts and not experiment.config.events
-        open_ = open_ and not (integrator.hold_invariants and "hold_invariants" in given)
+        open_ = open_ and not (integrator.hold_invariants is True and "hold_invariants" in given)
         found += [Setting(p, method="closed_form") for p in precisions if p != "extended" and open_]
     if "method" in given and integrator.method == "closed_form":
         return found
     plain = Setting(formulation=formulation if charts else "quaternion")
-    holds = [integrator.hold_invariants] if "hold_invariants" in given else [False, True]
+    holds = [integrator.hold_invariants is True] if "hold_invariants" in given else [False, True]
     looser = 13
     for precision in precisions:
         finest = math.floor(-math.log10(epsilon(precision)))

@@ -94,6 +94,6 @@ def setting_of(experiment: Experiment) -> Setting:
         integrator.precision,
         None if isinstance(tolerance, str) else float(tolerance),
         "quaternion" if integrator.formulation in ("auto", "rates") else integrator.formulation,
-        integrator.hold_invariants,
+        integrator.hold_invariants is True,  # "auto" begins plainly, and does no worse than that
         integrator.method,
     )

@@ -76,13 +76,17 @@ def _print_understood(body: Body | None, start: Start | None, time: Span | None,
         on.line(label, text)
 
 
+def _from_step(step: int | None) -> str:
+    return "" if step is None else f" from step {step:,} on"
+
+
 def _print_ended(summary: Summary, on: Page) -> None:
     _print_understood(summary.body, summary.start, summary.time, on)
     how = f"tolerance {summary.tolerance:.3g}"
     if summary.method == "closed_form":
         how = "in closed form"
     if summary.hold_invariants:
-        how += ", invariants projected"
+        how += ", invariants projected" + _from_step(summary.hold_from_step)
     on.line(
         "model",
         f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
@@ -242,7 +246,7 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     on.table(["invariant", "holds because"], [[row["name"], row["why"]] for row in plan["invariants"]])
     on.line("recorded", ", ".join(plan["recorded"]))
     predicted, pilot = plan["predicted"], plan["pilot"]
-    held = ", invariants held" if plan["hold_invariants"] else ""
+    held = ", invariants held" + _from_step(plan["hold_from_step"]) if plan["hold_invariants"] else ""
     on.line(
         "settings",
         f"{plan['precision']} precision, tolerance {plan['tolerance']:.3g}, Taylor order "

@@ -76,7 +76,7 @@ def pairs_products(
 
 def _loose(integrator: Integrator) -> bool:
     tolerance = integrator.tolerance
-    plain = integrator.formulation == "auto" and not integrator.hold_invariants
+    plain = integrator.formulation == "auto" and integrator.hold_invariants is not True
     plain = plain and integrator.precision != "single"
     return plain and not isinstance(tolerance, str) and float(tolerance) >= _LOOSE
 

@@ -155,10 +155,19 @@ class Integrator(ConfigTable):
         description="Taylor series step by step, or, for a free body or a heavy symmetric top, theta "
         "functions at a cost that doesn't depend on the time",
     )
-    hold_invariants: StrictBool = Field(
+    hold_invariants: StrictBool | Literal["auto"] = Field(
         default=False,
-        description="put what is conserved back as the run goes on: errors of long runs grow far slower",
+        description="put what is conserved back as the run goes on: errors of long runs grow far slower; "
+        "auto: from a fixed count of steps on, so that shorter runs are the plain ones",
     )
+
+    @field_validator("hold_invariants", mode="before")
+    @classmethod
+    def _whether_to_hold(cls, value: Any) -> Any:
+        if isinstance(value, bool) or value == "auto":
+            return value
+        raise refuse(f'given {shown(value)}; true, false or "auto" is allowed')
+
     accuracy: Annotated[Dimensionless, WithJsonSchema(number_schema("rad"))] | None = Field(
         default=None,
         description="attitude error to hold at the end, instead of precision and tolerance; certified",

@@ -311,4 +311,6 @@ def _without_sweep(experiment: Experiment) -> Experiment:
     except (TOMLKitError, ConfigError, KeyError, ValueError):
         same = False
     base = parse(text if same else toml_text(tables), source=experiment.source)
+    if base.config.integrator.hold_invariants == "auto":  # which members of a sweep haven't
+        base = base.having(["integrator.hold_invariants=false"])
     return exchanged(base, given=experiment.given, settings=experiment.settings)

@@ -8,6 +8,7 @@ from typing import Any
 
 from rigidsim.session.timings import Effort
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.projection import LATE
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.store import provenance
@@ -56,6 +57,7 @@ def root_attributes(
         else prepared.closed.title,
         method=scene.config.integrator.method,
         hold_invariants=int(prepared.holds_invariants),
+        hold_from_step=None if prepared.late is None else LATE,
         taylor_order=int(stepper.integrator.order),
         compact_mode=int(prepared.precision.compact or system.wide),
         high_accuracy=0,

@@ -18,6 +18,7 @@ from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.projection import LATE
 from rigidsim.solve.status import Status
 from rigidsim.store.attributes import RootAttributes, Use
 from rigidsim.store.summary import (
@@ -87,6 +88,7 @@ def summarise(
         cost=cost,
         method=scene.config.integrator.method,
         hold_invariants=prepared.holds_invariants,
+        hold_from_step=None if prepared.late is None else LATE,
         invariants=_invariants(found, initial),
         accuracy=_accuracy(found),
         modelling=_modelling(found),

@@ -62,7 +62,8 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     stepper = stepper_of(system, precision, prepared.tolerance, start, log)
     projection = None
     if prepared.holds_invariants:
-        projection = Projection(system, precision, start)
+        projection = Projection(system, precision, start, late=prepared.late is not None)
+        stepper.held_system = prepared.late
     interval = steps_between(precision)
     corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
     countable = not system.turning  # from samples alone nobody can tell what such a load does

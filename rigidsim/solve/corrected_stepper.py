@@ -20,7 +20,7 @@ from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import STEPS_BETWEEN, AngleState, AngleWrapping
 from rigidsim.solve.charts import Charts
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.projection import Projection
+from rigidsim.solve.projection import LATE, Projection
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.trail import Waypoints
@@ -54,7 +54,6 @@ class CorrectedStepper:
 
     Attributes:
         projection: puts invariants back, where asked for.
-        stride: natural steps between corrections.
         whole_times: whether time is a single number at each stride's start. Not where events or switching
             surfaces are looked for: a step back could cross one twice; nor where steps are cut short.
         charts: of a run in Euler angles; None without.
@@ -78,9 +77,8 @@ class CorrectedStepper:
         self.stepper = stepper
         self.wrapping = wrapping
         self.projection = projection
-        self.stride = min(stride, STEPS_BETWEEN) if wrapping.positions else stride
-        if projection is not None:
-            self.stride = min(self.stride, projection_interval)
+        self._plain_stride = min(stride, STEPS_BETWEEN) if wrapping.positions else stride
+        self._held_stride = min(self._plain_stride, projection_interval)
         self.whole_times = not (stepper.has_events or stepper.single_steps or stepper.cuts_steps)
         self._stuck = False
         self.waypoints = Waypoints()
@@ -91,6 +89,12 @@ class CorrectedStepper:
             if self.charts.near(stepper.state):  # no change on the way: it begins there
                 self._change_chart(self.charts)
                 self.charts.changes = 0
+
+    @property
+    def stride(self) -> int:
+        """Natural steps between corrections."""
+        holding = self.projection is not None and self.projection.holding
+        return self._held_stride if holding else self._plain_stride
 
     @property
     def left(self) -> int:
@@ -117,6 +121,8 @@ class CorrectedStepper:
         self.wrapping.angles = boundary.angles
         if self.projection is not None:
             self.projection.memory[...] = boundary.projection
+            if self.stepper.held_system is not None:
+                self.stepper.hold(self.projection.holding)
         if self.charts is not None:
             self.charts.changes = boundary.chart_changes
             self.stepper.use(self.charts.chart)
@@ -184,11 +190,21 @@ class CorrectedStepper:
         if due and self.wrapping.positions:
             self.wrapping.wrap(self.stepper.state)
         if due and self.projection is not None:
-            self.projection.project(self.stepper.state, self.stepper.time)
+            self._project(self.projection)
         if change and self.charts is not None:
             self._change_chart(self.charts)
         if due:
             self._note()
+
+    def _project(self, projection: Projection) -> None:
+        state, time = self.stepper.state, self.stepper.time
+        if projection.holding:
+            projection.project(state, time)
+        elif self.stepper.steps < LATE:
+            projection.observe(state, time)
+        else:
+            projection.begin(state, time)
+            self.stepper.hold(True)
 
     def _note(self) -> None:
         stepper, chart = self.stepper, 0 if self.charts is None else self.charts.chart

@@ -52,6 +52,7 @@ class InitialValueProblem:
     Attributes:
         tolerance: scalar of the precision, or None for its epsilon; "auto" is either of these.
         python_loads: loads given from Python, of which the config knows nothing.
+        late: the system to go on with where invariants are projected from a count of steps on.
         closed: the solution in closed form, where the samples are to come from it.
     """
 
@@ -63,11 +64,12 @@ class InitialValueProblem:
     tolerance: Scalar | None
     python_loads: tuple[Load, ...] = ()
     closed: ClosedForm | None = None
+    late: System | None = None
 
     @property
     def holds_invariants(self) -> bool:
         """Whether invariants are projected along the way."""
-        return self.scene.config.integrator.hold_invariants
+        return self.scene.config.integrator.hold_invariants is True or self.late is not None
 
     @cached_property
     def projected_scalars(self) -> tuple[str, ...]:
@@ -140,11 +142,14 @@ def prepare_scene(
         if loads:
             _refuse_non_finite_start(system, precision)
         closed = _closed_form(scene, system, driven=bool(loads))
-        if scene.config.integrator.hold_invariants:
+        late = None
+        if scene.config.integrator.hold_invariants is True:
             system = projected_system(system, precision)
+        elif scene.config.integrator.hold_invariants and closed is None and _can_hold(system):
+            late = projected_system(system, precision)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
         prepared = InitialValueProblem(
-            experiment, scene, precision, system, clock, step_control, tuple(loads), closed
+            experiment, scene, precision, system, clock, step_control, tuple(loads), closed, late
         )
         if system.requirements.formulation == "canonical":
             double_twin(prepared)  # its stability is a question of the rates, which it doesn't carry itself
@@ -162,6 +167,19 @@ def prepare_scene(
         problem = Problem("config", what)
         raise ConfigError(problem, experiment.source) from None
     return prepared
+
+
+def _can_hold(system: System) -> bool:
+    """Whether ``hold_invariants = "auto"`` means anything: not where nothing is conserved, nor where steps
+    end on switching surfaces, nor with equations that are made for loose tolerances.
+    """
+    if system.switches or system.plan.paired:
+        return False
+    try:
+        projected_invariants(system)
+    except ConfigError:
+        return False
+    return True
 
 
 def auto_tolerance(epsilon: float) -> float:
@@ -221,7 +239,7 @@ def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | 
     if integrator.method != "closed_form":
         return None
     why = None
-    if integrator.hold_invariants:
+    if integrator.hold_invariants is True:
         why = "holds its invariants by itself; set hold_invariants = false"
     elif system.requirements.formulation not in ("rates", "quaternion"):
         why = f'gives rates and quaternions, not {integrator.formulation}; set formulation = "auto"'

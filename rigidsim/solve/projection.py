@@ -33,6 +33,11 @@ from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
+LATE = 8192
+"""Natural steps after which ``hold_invariants = "auto"`` begins to project: some milliseconds of double
+precision, in which errors of rounding are still small; what they did to the phase is known, and taken back. A
+fixed count: a run that is prolonged past it is the run in one go."""
+
 STEPS_BETWEEN = 128
 """Natural steps from one correction to the next, fixed so that bits depend on no clock. Errors grow in
 proportion to it and cost falls: at 128 steps of double precision a correction (7 us) costs a twentieth of
@@ -97,11 +102,14 @@ class Projection:
         memory: all that later corrections depend on, changed in place and part of a checkpoint; float64
             (3 m + 3,): of each projected scalar its residual's integral over time, what was put back, and its
             residual after the latest correction; the time of that and the longest interval so far (internal
-            units), and the count of corrections left out since they were not small. It means the same in
-            another chart.
+            units), and the count of corrections left out since they were not small; where it is ``late``,
+            whether it has begun. It means the same in another chart.
+
+    Args:
+        late: whether it is to look on until it is told to ``begin``.
     """
 
-    def __init__(self, system: System, precision: Precision, start: Scalar) -> None:
+    def __init__(self, system: System, precision: Precision, start: Scalar, *, late: bool = False) -> None:
         self._low, self._high = precision, one_higher(precision)
         wide = system.rounded(self._high.number)
         projected, self.left_out = projected_invariants(wide)
@@ -117,11 +125,33 @@ class Projection:
         self._left = self._array(np.zeros(m))
         self._result = np.zeros(n + 2 * m + 1)
         self._change, self._new_sums = self._result[:n], self._result[n:-1]
-        self.memory = np.zeros(3 * m + 3)
+        self.memory = np.zeros(3 * m + 3 + late)
+        self._late = late
         self._sums, self._then = self.memory[: 2 * m], self.memory[2 * m : 3 * m]
         self._residuals_memory, self._times = self.memory[: 3 * m], self.memory[3 * m :]
-        self._then[:] = self.residuals(precision.array(system.initial))
+        self._then[:] = self._first = self.residuals(precision.array(system.initial))
         self._times[0] = float(start)
+
+    @property
+    def holding(self) -> bool:
+        """Whether it corrects, or looks on."""
+        return not self._late or self._times[3] == 1.0
+
+    def observe(self, state: np.ndarray, time: Scalar) -> None:
+        """Note the residuals of a state before anything is corrected: their integral moves the phase."""
+        now, found = float(time), self.residuals(state)
+        integrals = self._sums[: len(self.names)]
+        integrals += 0.5 * (now - self._times[0]) * (found + self._then)
+        self._then[:] = found
+        self._times[0] = now
+
+    def begin(self, state: np.ndarray, time: Scalar) -> None:
+        """Correct a state for the first time, in place, and from now on."""
+        drifted = self._then - self._first
+        self.project(state, time)
+        self._sums[len(self.names) :] += drifted
+        self._times[1] = 0.0  # what follows comes at intervals far shorter than those of looking on
+        self._times[3] = 1.0
 
     def use(self, chart: int) -> None:
         """Correct in the states of the system (0) or of its partner (1) from now on."""

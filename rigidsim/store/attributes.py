@@ -41,6 +41,7 @@ class RootAttributes(BaseModel):
         attitude_error: announced for the end of the run, rad, where it was estimated.
         recorded: names of what is recorded along time, drifts and residuals apart: where the config names
             none, a later version may record more by default.
+        hold_from_step: natural steps after which invariants are projected; none where that is from the start.
         python_loads: names of classes.
         axes: what the space axes are, where that is known.
         epoch: time 0, where that is known: date, time and scale.
@@ -76,6 +77,7 @@ class RootAttributes(BaseModel):
     integrator: str
     method: Annotated[str | None, Use.SYSTEM] = None
     hold_invariants: Annotated[int | None, Use.SYSTEM] = None
+    hold_from_step: Annotated[int | None, Use.SYSTEM] = None
     taylor_order: Annotated[int, Use.SYSTEM, Use.SETTING, Use.REPEATED]
     compact_mode: Annotated[int, Use.SYSTEM, Use.SETTING, Use.REPEATED]
     high_accuracy: Annotated[int, Use.SETTING]

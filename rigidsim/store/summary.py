@@ -302,6 +302,7 @@ class Summary(Brief):
     cost: Cost
     method: Annotated[Text, Claim()] = "taylor"
     hold_invariants: Annotated[StrictBool, Claim()] = False
+    hold_from_step: Annotated[StrictInt | None, Claim()] = None
     invariants: dict[Text, Invariant]
     accuracy: Accuracy
     modelling: Modelling | None = None

@@ -22,6 +22,7 @@ from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
 from rigidsim.workflows.read import Given, as_experiment
@@ -110,6 +111,7 @@ def plan(
         "closed_form": None if closed is None else closed.title,
         "closed_form_why_not": why_not or None,
         "hold_invariants": prepared.holds_invariants,
+        "hold_from_step": None if prepared.late is None else LATE,
         "accuracy": None
         if choice is None
         else {"chosen": choice.setting.title, "why": choice.why, "forecast": choice.forecast},

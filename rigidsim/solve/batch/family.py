@@ -59,7 +59,7 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
         return Alone.PRECISION
     if integrator.method != "taylor":
         return Alone.CLOSED_FORM
-    if integrator.hold_invariants:
+    if integrator.hold_invariants is True:
         return Alone.HELD
     if integrator.formulation in ("euler_angles", "canonical"):
         return Alone.CHART
