@@ -375,7 +375,7 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "hold_invariants one": (
         {"integrator": "hold_invariants = 1"},
         "[integrator] hold_invariants",
-        ["given 1; true or false is allowed"],
+        ["given 1; true, false or"],
     ),
     "record a string": (
         {"output": 'record = "energy"'},
