@@ -91,8 +91,15 @@ def sections_of(dataset: Table) -> list[Plane]:
             unit = str(dataset[full].attrs.get("units", ""))
             title = f"Section at {event}: {name.replace('_', ' ')}" + (f" [{unit}]" if unit != "1" else "")
             points = values[:, [first, second]]
-            points = points - (points.min(axis=0) + points.max(axis=0)) / 2
-            names = (labels[first], labels[second])
-            planes.append(Plane(f"section_{event}", title, _SHADES[1], points, moves=False, names=names))
+            # The origin is their middle, which the names tell: a small section would be a dot far off
+            middle = (points.min(axis=0) + points.max(axis=0)) / 2
+            points = points - middle
+            names = tuple(
+                f"{labels[k]} (axes cross at {place:.4g})" if place else labels[k]
+                for k, place in zip((first, second), middle, strict=True)
+            )
+            planes.append(
+                Plane(f"section_{event}", title, _SHADES[1], points, moves=False, names=(names[0], names[1]))
+            )
             break
     return planes

@@ -267,7 +267,9 @@ def test_events_have_a_lane_and_a_section(symmetric_top: Build) -> None:
     assert lane.values[:3] == ["before flip", "flip 1", "flip 2"]
     np.testing.assert_array_equal(lane.seconds, np.append(0.0, times))
     (plane,) = sections_of(dataset)
-    assert plane.names == ("x", "y")
+    low, high = np.cos(times).min(), np.cos(times).max()
+    assert plane.names[0] == f"x (axes cross at {(low + high) / 2:.4g})"
+    assert plane.points[:, 0].min() == pytest.approx((low - high) / 2)
     assert not plane.moves
     assert len(plane.points) == 12
     stopped = states_of(dataset.assign_attrs(status="max_drift"), 0.0, 20.0)[-1]
