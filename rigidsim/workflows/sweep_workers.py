@@ -65,6 +65,8 @@ class Workers:
                         file = between / str(tile)
                         running[pool.submit(leave_tile, file, *task(generation, tile))] = tile
                     done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
+                    if not done:
+                        _refuse_dead(pool)
                     for future in done:
                         future.result()
                         tile = running.pop(future)
@@ -93,6 +95,20 @@ def leave_tile(file: Path, *of: Any) -> int:
     return file.write_bytes(tile_image(*of))
 
 
+def _processes(pool: ProcessPoolExecutor) -> list[Any]:
+    return list((getattr(pool, "_processes", None) or {}).values())
+
+
+def _refuse_dead(pool: ProcessPoolExecutor) -> None:
+    """The pool looks for deaths among the workers that it had when it last looked up; this one among all.
+
+    Raises:
+        BrokenProcessPool: one has ended.
+    """
+    if not all(process.is_alive() for process in _processes(pool)):
+        raise BrokenProcessPool("a worker died")
+
+
 def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
     tile, count = deaths.most_common(1)[0]
     if count >= _MOST_DEATHS:
@@ -105,7 +121,7 @@ def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
 
 def _end(pool: ProcessPoolExecutor) -> None:
     """Nobody waits for what is in work."""
-    processes = list((getattr(pool, "_processes", None) or {}).values())
+    processes = _processes(pool)
     pool.shutdown(wait=False, cancel_futures=True)
     for process in processes:
         process.kill()
