@@ -26,6 +26,8 @@ def wanted(experiment: Experiment) -> float | None:
     """
     integrator = experiment.config.integrator
     found = [] if integrator.accuracy is None else [float(integrator.accuracy)]
+    if integrator.accuracy_axis is not None and not experiment.config.model.reduced:
+        found.append(float(integrator.accuracy_axis))  # no axis is further off than the attitude
     if integrator.accuracy_position is not None:
         scene = build_scene(experiment)
         if scene.position is None or scene.velocity is None:

@@ -97,6 +97,11 @@ class ModellingError:
     cpu_seconds: float
     windows: Sequence[Window] = field(default_factory=list)
 
+    @property
+    def worst(self) -> float:
+        """Of both directions."""
+        return max(self.momentum, self.figure or 0.0)
+
 
 def measure_modelling(
     prepared: InitialValueProblem, trail: Trail | None = None, go_on: Callable[[], bool] = lambda: True

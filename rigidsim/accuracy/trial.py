@@ -100,6 +100,7 @@ def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath
             "hold_invariants": setting.hold_invariants,
             "method": setting.method,
             "accuracy": None,
+            "accuracy_axis": None,
             "accuracy_position": None,
         }
     )

@@ -256,6 +256,9 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         on.line("method", f"{plan['closed_form']}: no steps are taken")
     elif plan["closed_form"] is not None:
         on.line("closed", f'{plan["closed_form"]}: method = "closed_form" would take no steps')
+    for row in plan["levels"]:
+        error = "" if row["error_rad"] is None else f"modelling error about {row['error_rad']:.1e} rad; "
+        on.line("level", f"{row['level']}: {error}{row['why_not'] or 'taken'}")
     if plan["accuracy"] is not None:
         on.line("chosen", f"{plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
     on.line(

@@ -8,7 +8,7 @@ from pydantic import Field, StrictBool
 
 from rigidsim.scene.fields import ConfigTable
 
-FULL, SPIN_AVERAGED, ORBIT_AVERAGED = "full", "spin_averaged", "orbit_averaged"
+FULL, SPIN_AVERAGED, ORBIT_AVERAGED, AUTO = "full", "spin_averaged", "orbit_averaged", "auto"
 REDUCED = (SPIN_AVERAGED, ORBIT_AVERAGED)
 """Levels that carry the momentum's direction alone, the more averaged the later."""
 
@@ -16,11 +16,11 @@ REDUCED = (SPIN_AVERAGED, ORBIT_AVERAGED)
 class Model(ConfigTable):
     """``[model]``: every rotation, or the motion averaged over it, or over the sources' orbits as well."""
 
-    level: Literal["full", "spin_averaged", "orbit_averaged"] = Field(
+    level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = Field(
         default="full",
         description="full resolves every rotation; spin_averaged carries the direction of the angular "
         "momentum under torques averaged over the body's free rotation; orbit_averaged averages over the "
-        "sources' orbits as well",
+        "sources' orbits as well; auto is the cheapest that keeps [integrator] accuracy_axis",
     )
     short_period: StrictBool = Field(
         default=False,

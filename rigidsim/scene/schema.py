@@ -174,6 +174,12 @@ class Integrator(ConfigTable):
         examples=[1e-9],
         json_schema_extra={"x-above": 0, "x-below": 3},
     )
+    accuracy_axis: Dimensionless | None = Field(
+        default=None,
+        description="error (rad) of the momentum's and the figure axis' direction to hold until the end; "
+        'with [model] level = "auto" the cheapest model that does is chosen',
+        examples=[1e-6],
+    )
     accuracy_position: Metre | None = Field(
         default=None,
         description="error of the position to hold at the end, where the body flies; certified",
@@ -193,7 +199,7 @@ class Integrator(ConfigTable):
             f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
         )
 
-    @field_validator("accuracy", mode="before")
+    @field_validator("accuracy", "accuracy_axis", mode="before")
     @classmethod
     def _possible_accuracy(cls, value: Any) -> Any:
         if value is None:

@@ -144,12 +144,16 @@ class Diagnostics:
 
     def _modelling(self) -> Iterator[Caution]:
         found = self.modelling
-        if found is None or found.momentum <= UNCERTAIN:
+        asked = self.prepared.scene.config.integrator.accuracy_axis
+        most = UNCERTAIN if asked is None else float(asked)
+        if found is None or found.worst <= most:
             return
         yield Caution(
             WarningCode.MODEL_UNCERTAIN,
-            f'[model] level = "{found.level}" leaves the momentum\'s direction uncertain by about '
-            f"{found.momentum:.2g} rad at the end; choose a less averaged level, or a nearer end",
+            f'[model] level = "{found.level}" leaves directions uncertain by about '
+            f"{found.worst:.2g} rad at the end"
+            + ("" if asked is None else f", where accuracy_axis = {most:.2g} rad was asked for")
+            + "; choose a less averaged level, or a nearer end",
         )
 
     def _joining(self) -> Iterator[Caution]:

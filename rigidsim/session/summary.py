@@ -236,6 +236,7 @@ def _modelling(found: Diagnostics) -> Modelling | None:
     if average is None:
         return None
     known, output = found.modelling, found.prepared.scene.config.output
+    asked = found.prepared.scene.config.integrator.accuracy_axis
     if known is None:
         why = "the run has not ended, or the full model can't be followed"
         why = why if output.estimate else "[output] estimate = false"
@@ -248,6 +249,7 @@ def _modelling(found: Diagnostics) -> Modelling | None:
         growth=known.growth,
         oscillation=known.oscillation,
         whole=known.whole,
+        requested=None if asked is None else float(asked),
         how=known.how,
         cpu_seconds=known.cpu_seconds,
         windows=tuple(

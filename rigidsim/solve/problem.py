@@ -18,6 +18,7 @@ from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
+from rigidsim.scene.model_table import AUTO
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.compiled import compiled_function
@@ -134,6 +135,9 @@ def prepare_scene(
         _check_tolerance(step_control, precision)
         step_control = _auto(precision) if step_control is None else step_control
         check_start(scene)
+        if scene.config.model.level == AUTO:
+            what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'
+            raise ConfigError(Problem("[model] level", what))
         system = build_system(scene, precision.number, loads)
         if system.plan.average is not None and asked == "auto" and tolerance is None:
             step_control = _auto_of_averages(precision)

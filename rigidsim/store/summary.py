@@ -191,6 +191,7 @@ class Modelling(Part):
             the end of the run, rad; None where they weren't measured, or a figure axis points nowhere.
         growth: of the distance, rad/s; oscillation: what it is without, rad.
         whole: whether the full model was followed to the end.
+        requested: what of it was asked for, rad.
         how: it was found, or why it wasn't.
     """
 
@@ -201,6 +202,7 @@ class Modelling(Part):
     growth: FiniteNumber | None = None
     oscillation: FiniteNumber | None = None
     whole: StrictBool = False
+    requested: Annotated[FiniteNumber | None, Claim()] = None
     how: Text = ""
     cpu_seconds: FiniteNumber | None = None
     windows: tuple[ModellingWindow, ...] = ()

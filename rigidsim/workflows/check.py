@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rigidsim.accuracy.level import fully
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweep import Sweep
@@ -64,7 +65,7 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
     try:
         experiment = load(path, overrides=overrides)
         if experiment.config.sweep is None:
-            prepared = prepare(experiment)
+            prepared = prepare(fully(experiment))
             refuse_taken_names(prepared)
         else:
             found = recording(Sweep.of(experiment))

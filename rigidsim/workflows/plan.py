@@ -12,6 +12,7 @@ import numpy as np
 
 from rigidsim.accuracy.choice import chosen
 from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
+from rigidsim.accuracy.level import Considered, choose_level
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names
@@ -56,7 +57,9 @@ def plan(
     Raises:
         ConfigError: the config can't be run.
     """
-    experiment, choice = chosen(as_experiment(experiment, changes), loads=loads)
+    experiment = as_experiment(experiment, changes)
+    level = choose_level(experiment, loads=loads)
+    experiment, choice = chosen(level.experiment if level else experiment, loads=loads)
     prepared = prepare(experiment, loads=loads)
     refuse_taken_names(prepared)
     closed, why_not = closed_form_if_any(prepared.scene, driven=bool(loads))
@@ -112,6 +115,7 @@ def plan(
         "closed_form_why_not": why_not or None,
         "hold_invariants": prepared.holds_invariants,
         "hold_from_step": None if prepared.late is None else LATE,
+        "levels": [] if level is None else [_as_dict(x) for x in level.considered],
         "accuracy": None
         if choice is None
         else {"chosen": choice.setting.title, "why": choice.why, "forecast": choice.forecast},
@@ -144,6 +148,11 @@ def plan(
         "start": start_of(prepared.scene).as_dict(),
         "time": span_of(prepared.scene).as_dict(),
     }
+
+
+def _as_dict(considered: Considered) -> dict[str, Any]:
+    """A level that was looked at, for JSON."""
+    return {"level": considered.level, "error_rad": considered.error, "why_not": considered.why_not}
 
 
 def _seconds_per_sample(

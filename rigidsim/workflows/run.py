@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from rigidsim.accuracy.asked import leaves_choice, wanted
 from rigidsim.errors import ConfigError
+from rigidsim.scene.model_table import AUTO, FULL
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.guards import Observer
 from rigidsim.session.session import Session
@@ -19,6 +20,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.run import Run, SavedRun
+from rigidsim.store.summary import WarningCode
 from rigidsim.workflows.read import Experiment, Given, as_experiment
 
 if TYPE_CHECKING:
@@ -87,7 +89,37 @@ def run(
     """
     experiment = as_experiment(experiment, changes)
     with watched(observer, progress) as watching:
-        return _run(experiment, out, watching, force=force, loads=loads, tuning=tuning or Tuning())
+        return _run_a_level(experiment, out, watching, force=force, loads=loads, tuning=tuning or Tuning())
+
+
+def _run_a_level(
+    experiment: Experiment,
+    out: str | Path | None,
+    observer: Observer,
+    *,
+    force: bool,
+    loads: Sequence[Load],
+    tuning: Tuning,
+) -> Run:
+    """The level given, or the cheapest whose measured error is within what is asked for."""
+    failed: list[str] = []
+    while experiment.config.model.level == AUTO:
+        from rigidsim.accuracy.level import choose_level
+
+        observer.choosing(experiment.config.name)
+        choice = choose_level(experiment, loads=loads, without=failed)
+        assert choice is not None
+        if choice.level == FULL:
+            experiment, force = choice.experiment, force or bool(failed)
+            break
+        result = _run(
+            choice.experiment, out, observer, force=force or bool(failed), loads=loads, tuning=tuning
+        )
+        codes = result.summary["warning_codes"]
+        if result.status != "finished" or WarningCode.MODEL_UNCERTAIN.value not in codes:
+            return result
+        failed.append(choice.level)
+    return _run(experiment, out, observer, force=force, loads=loads, tuning=tuning)
 
 
 def _run(

@@ -9,6 +9,8 @@ import pytest
 from support import config, run_text
 
 import rigidsim
+from rigidsim.accuracy.level import choose_level
+from rigidsim.errors import ConfigError
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"
@@ -129,3 +131,38 @@ def test_more_digits_are_kept_from_text_to_dataset() -> None:
     assert "momentum_axis_lo" in exact.dataset
     assert 0 < apart(exact, double, "momentum_axis") < 1e-10
     assert math.isclose(float(np.linalg.norm(exact.dataset["momentum_axis"].values[-1])), 1, rel_tol=1e-15)
+
+
+def test_the_accuracy_of_axes_chooses_the_model() -> None:
+    """The nutation of 1e-3 rad may stay or has to be resolved; and a quaternion takes every rotation."""
+    given = text("auto", time="end = 20\nsamples = 21")
+    levels = {}
+    for asked in ("1e-2", "1e-4", "1e-8"):
+        choice = choose_level(rigidsim.parse(given, overrides=[f"integrator.accuracy_axis={asked}"]))
+        assert choice is not None
+        levels[asked] = choice.level
+        assert choice.considered[-1].level == choice.level
+        assert (choice.considered[-1].error or 0) <= float(asked)
+    assert levels == {"1e-2": "orbit_averaged", "1e-4": "spin_averaged", "1e-8": "full"}
+    overrides = ["integrator.accuracy_axis=1e-2", 'output.record=["quaternion"]']
+    choice = choose_level(rigidsim.parse(given, overrides=overrides))
+    assert choice is not None
+    assert choice.level == "full"
+    assert "every rotation" in choice.considered[0].why_not
+
+
+def test_a_chosen_model_is_what_the_run_says() -> None:
+    given = text("auto", time="end = 20\nsamples = 21")
+    run = run_text(given, "integrator.accuracy_axis=1e-2", estimate=True)
+    assert run.summary["formulation"] == "orbit_averaged"
+    assert run.summary["modelling"]["requested"] == 0.01
+    assert run.summary["modelling"]["momentum_axis"] <= 0.01
+    assert run.summary["warnings"] == []
+    assert rigidsim.parse(run.dataset.attrs["config"]).config.model.level == "orbit_averaged"
+
+
+def test_auto_without_an_accuracy_is_refused() -> None:
+    with pytest.raises(
+        ConfigError, match=r"\[model\] level: given \"auto\", but .*accuracy_axis says no error"
+    ):
+        run_text(text("auto"))

@@ -13,6 +13,7 @@ import numpy as np
 from rigidsim.errors import ConfigError
 from rigidsim.model.scaling import Drive
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.model_table import FULL
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.trace_graph import Guard, Untraceable
 from rigidsim.scene.traced import Traced
@@ -53,7 +54,8 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
     """Why no member of such an experiment can run in a batch, as far as the config says."""
     config = experiment.config
     integrator = config.integrator
-    if integrator.accuracy is not None or integrator.accuracy_position is not None:
+    asked = integrator.accuracy, integrator.accuracy_axis, integrator.accuracy_position
+    if any(accuracy is not None for accuracy in asked):
         return Alone.ACCURACY
     if integrator.precision != "double":
         return Alone.PRECISION
@@ -63,7 +65,7 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
         return Alone.HELD
     if integrator.formulation in ("euler_angles", "canonical"):
         return Alone.CHART
-    if config.model.reduced:
+    if config.model.level != FULL:
         return Alone.AVERAGED
     return Alone.LYAPUNOV if config.output.lyapunov else None
 
