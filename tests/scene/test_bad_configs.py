@@ -100,7 +100,10 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
     "integrator key misspelt": (
         {"integrator": 'precison = "double"'},
         "[integrator] precison",
-        ['did you mean "precision"?', "allowed: accuracy, accuracy_position, euler_sequence, formulation"],
+        [
+            'did you mean "precision"?',
+            "allowed: accuracy, accuracy_axis, accuracy_position, euler_sequence, formulation",
+        ],
     ),
     "output key misspelt": (
         {"output": 'recrod = ["energy"]'},
