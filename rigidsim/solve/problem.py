@@ -177,6 +177,8 @@ def _can_hold(system: System) -> bool:
     """Whether ``hold_invariants = "auto"`` means anything: not where nothing is conserved, nor where steps
     end on switching surfaces, nor with equations that are made for loose tolerances.
     """
+    if system.plan.average is not None:  # whose norm is no invariant that its rate would depend on
+        return False
     if system.switches or system.plan.paired:
         return False
     try:
