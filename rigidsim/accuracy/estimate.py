@@ -13,9 +13,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rigidsim.accuracy.course import Course, Followed
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
 from rigidsim.accuracy.exact_error import ExactError, exact_error
-from rigidsim.accuracy.following import Course, Followed, follow, leading, loose
+from rigidsim.accuracy.following import follow, leading, loose
 from rigidsim.accuracy.growth import exponential_growth, power_of_time
 from rigidsim.accuracy.margins import MARGINS, Margins
 from rigidsim.scene.records import dataclass

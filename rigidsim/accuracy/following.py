@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import field, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rigidsim.accuracy.course import Course, Followed
 from rigidsim.accuracy.growth import power_of_time
 from rigidsim.accuracy.margins import Margins
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.lanes import (
     NEIGHBOURS,
@@ -33,67 +33,7 @@ from rigidsim.solve.lanes import (
 from rigidsim.solve.neighbours import Neighbours, Pushes, Spread
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.trail import Waypoint, Waypoints
-
-
-@dataclass(frozen=True)
-class Course:
-    """A run whose neighbours are to be followed.
-
-    Attributes:
-        start, end: internal units.
-        steps: that it took.
-        waypoints: boundaries of its steps; None where there are none.
-        stepper: of the run; it, or copies of its engine, are used where that is good enough.
-        nearest: singular factor of the run's chart where it was smallest; 1 for charts that are changed.
-        uneven: its longest step over its shortest.
-        lost: errors in epsilons past which nothing is to be learnt.
-    """
-
-    prepared: InitialValueProblem
-    start: float
-    end: float
-    steps: int
-    waypoints: Waypoints | None
-    stepper: Stepper | None
-    nearest: float
-    uneven: float
-    lost: float
-
-    def at(self, share: float) -> float:
-        """The time at a share of the run."""
-        return self.end if share >= 1 else self.start + (self.end - self.start) * share
-
-    @property
-    def carried(self) -> bool:
-        """Whether the run carries an attitude."""
-        return self.prepared.system.requirements.formulation != "rates"
-
-    @property
-    def own(self) -> Stepper | None:
-        """The run's stepper where it can carry the neighbours."""
-        single = self.prepared.system.partner is None and self.prepared.precision.name == "double"
-        return self.stepper if single else None
-
-
-@dataclass(frozen=True)
-class Followed:
-    """What was found.
-
-    Attributes:
-        share: of the run's time that neighbours were carried along from its start on, be it until no digit is
-            left.
-        windows: looked at beyond that; ``in_windows``: what part of the run they are.
-        more: by how much more errors grow in these than in as much of the beginning, root mean square, by
-            quantity; 1 where they don't.
-    """
-
-    spread: Spread
-    share: float
-    windows: int = 0
-    in_windows: float = 0.0
-    more: dict[str, float] = field(default_factory=dict)
+from rigidsim.solve.trail import Waypoint
 
 
 def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:

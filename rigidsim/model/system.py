@@ -9,10 +9,8 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.assembly import assemble_states
 from rigidsim.model.euler_charts import across, partner_sequence
-from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -20,6 +18,7 @@ from rigidsim.model.model_plan import ModelPlan, plan_model
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.paired_products import even_order
+from rigidsim.model.refusals import refuse_out_of_range, refuse_singular_start
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling, largest_rates
 from rigidsim.model.state_blocks import StateBlock, joined
@@ -30,9 +29,6 @@ from rigidsim.scene.expressions import ATTITUDE_NAMES, names_used
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.traced import largest_of
-
-_LARGEST_EXPONENT = 1000
-"""Of a recorded variable in SI: float64 ends at 2^1024, and the size of a variable is known roughly."""
 
 
 @dataclass(frozen=True)
@@ -324,8 +320,8 @@ def build_system(
     system = System(plan_model(scene, extra_loads, scaling), number)
     attitude = system.mechanics.attitude
     if system.requirements.canonical:
-        _refuse_singular_start(scene, attitude)
-    _refuse_out_of_range(system.initial, [*system.recorded, *system.invariants], number)
+        refuse_singular_start(scene, attitude)
+    refuse_out_of_range(system.initial, [*system.recorded, *system.invariants], number)
     return system
 
 
@@ -345,34 +341,3 @@ def _crossings(m: Mechanics) -> list[Crossing]:
         )
         for event in m.scene.events
     ]
-
-
-def _refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
-    if attitude is None or attitude.singular_factor is None:
-        return
-    context = scene.context
-    middle = attitude.initial[1]
-    proper = attitude.sequence[0] == attitude.sequence[2]
-    factor = abs(context.sin(middle) if proper else context.cos(middle))
-    if factor < context.mpf(2) ** -20:
-        raise ConfigError(
-            Problem(
-                "[integrator] formulation",
-                f"the motion starts {context.nstr(factor, 3)} rad from the singularity of the sequence "
-                f"{attitude.sequence} (middle angle {context.nstr(middle, 8)} rad), where Euler angles have "
-                'no momenta; choose formulation = "euler_angles", which changes its sequence there, '
-                '"quaternion", or another euler_sequence',
-            )
-        )
-
-
-def _refuse_out_of_range(
-    initial: list[Any], variables: Sequence[Recorded | Invariant], number: Rounder
-) -> None:
-    """Raise OverflowError for what neither the states nor the dataset's float64 numbers can hold."""
-    for value in initial:
-        number(value)
-    for variable in variables:
-        for exponent in variable.exponents:
-            if abs(exponent) > _LARGEST_EXPONENT:
-                raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")
