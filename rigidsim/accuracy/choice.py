@@ -24,8 +24,8 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.integrator_table import LARGEST_DIGITS
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.schema import LARGEST_DIGITS
 
 _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
 """Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""

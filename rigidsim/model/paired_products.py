@@ -39,9 +39,9 @@ from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import cross
+from rigidsim.scene.integrator_table import Integrator
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.schema import Integrator
 
 NAMES = ["ux", "uy", "uz", "fx", "fy", "fz"]
 _LOOSE = 1e-13

@@ -1,0 +1,128 @@
+"""``[integrator]`` of a config: how accurately the motion is integrated, and in which variables."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StrictBool, StrictInt, WithJsonSchema, field_validator
+
+from rigidsim.scene.exact import parse_number
+from rigidsim.scene.fields import ConfigTable, Dimensionless, EulerSequence, Metre, number_schema, refuse
+from rigidsim.scene.validation_messages import shown
+
+# A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
+# room for numbers down to 1e-70.
+LARGEST_DIGITS = 250
+PRECISION_NAMES = ("single", "double", "extended", "quadruple")
+
+
+class Integrator(ConfigTable):
+    """``[integrator]``: how accurately, and in which variables."""
+
+    precision: (
+        Literal["single", "double", "extended", "quadruple"]
+        | Annotated[StrictInt, WithJsonSchema({"type": "integer", "minimum": 1, "maximum": LARGEST_DIGITS})]
+    ) = Field(
+        default="double",
+        description="of the arithmetic: 24, 53, 64 or 113 bits, or so many decimal digits",
+        examples=["extended", 50],
+    )
+    tolerance: Literal["auto"] | Dimensionless = Field(
+        default="auto",
+        description="of each step, relative to the largest component of the state; auto is the precision's "
+        "epsilon in double precision and an eighth of it in others, whose series would otherwise be just too "
+        "short to keep what is cut off well below rounding",
+        examples=["auto", 1e-12],
+        json_schema_extra={"x-above": 0, "x-at-most": 1},
+    )
+    formulation: Literal[
+        "auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar"
+    ] = Field(
+        default="auto",
+        description="which variables are integrated; canonical: Euler angles and their momenta; planar: an "
+        "angle and its rate, for a body that turns about one axis",
+    )
+    euler_sequence: EulerSequence = Field(
+        default="zxz", description="axes of intrinsic rotations, of [initial] and of what is recorded"
+    )
+    method: Literal["taylor", "closed_form"] = Field(
+        default="taylor",
+        description="Taylor series step by step, or, for a free body or a heavy symmetric top, theta "
+        "functions at a cost that doesn't depend on the time",
+    )
+    hold_invariants: StrictBool | Literal["auto"] = Field(
+        default=False,
+        description="put what is conserved back as the run goes on: errors of long runs grow far slower; "
+        "auto: from a fixed count of steps on, so that shorter runs are the plain ones",
+    )
+
+    @field_validator("hold_invariants", mode="before")
+    @classmethod
+    def _whether_to_hold(cls, value: Any) -> Any:
+        if isinstance(value, bool) or value == "auto":
+            return value
+        raise refuse(f'given {shown(value)}; true, false or "auto" is allowed')
+
+    accuracy: Annotated[Dimensionless, WithJsonSchema(number_schema("rad"))] | None = Field(
+        default=None,
+        description="attitude error to hold at the end, instead of precision and tolerance; certified",
+        examples=[1e-9],
+        json_schema_extra={"x-above": 0, "x-below": 3},
+    )
+    accuracy_axis: Dimensionless | None = Field(
+        default=None,
+        description="error (rad) of the momentum's and the figure axis' direction to hold until the end; "
+        'with [model] level = "auto" the cheapest model that does is chosen',
+        examples=[1e-6],
+    )
+    accuracy_position: Metre | None = Field(
+        default=None,
+        description="error of the position to hold at the end, where the body flies; certified",
+        examples=["1 um"],
+        json_schema_extra={"x-above": 0},
+    )
+
+    @field_validator("precision", mode="before")
+    @classmethod
+    def _known_precision(cls, value: Any) -> Any:
+        if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= LARGEST_DIGITS:
+            return value
+        if isinstance(value, str) and value in PRECISION_NAMES:
+            return value
+        raise refuse(
+            f"given {shown(value)}; allowed: {', '.join(PRECISION_NAMES)}, "
+            f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
+        )
+
+    @field_validator("accuracy", "accuracy_axis", mode="before")
+    @classmethod
+    def _possible_accuracy(cls, value: Any) -> Any:
+        if value is None:
+            return value
+        try:
+            number = parse_number(value, "rad")
+        except ValueError as error:
+            raise refuse(str(error)) from None
+        if not 0 < float(number) < 3:
+            raise refuse(f"given {shown(value)}; an angle above 0 and below pi is allowed, in rad")
+        return value
+
+    @field_validator("accuracy_position")
+    @classmethod
+    def _possible_accuracy_of_position(cls, value: Any) -> Any:
+        if value is not None and value.sign <= 0:
+            raise refuse(f"given {shown(value)}; a length above 0 is allowed, in m")
+        return value
+
+    @field_validator("tolerance", mode="before")
+    @classmethod
+    def _positive_tolerance(cls, value: Any) -> Any:
+        if value == "auto":
+            return value
+        try:
+            number = parse_number(value, "1")
+        except ValueError as error:
+            raise refuse(f'{error}; or "auto"') from None
+        if not (number.sign > 0 and float(number) <= 1):
+            raise refuse(f'given {shown(value)}; allowed: above 0 and at most 1, or "auto"')
+        return number
