@@ -21,7 +21,7 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.status import Status
 from rigidsim.solve.trail import Trail
-from rigidsim.store.summary import WarningCode
+from rigidsim.store.summary_parts import WarningCode
 
 MOST_STEPS = 100_000
 """Of a scene; what would take longer is cut off, and counted as that."""

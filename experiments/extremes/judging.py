@@ -27,7 +27,7 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
 from rigidsim.solve.trail import Trail
-from rigidsim.store.summary import WarningCode
+from rigidsim.store.summary_parts import WarningCode
 
 FACTOR = 3.0
 """Between an error and the law or estimate that covers it."""

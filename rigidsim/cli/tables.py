@@ -11,7 +11,8 @@ from rigidsim.cli.understood import understood
 from rigidsim.cli.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import TimeWords, span_text
-from rigidsim.store.summary import ENGINE, Accuracy, Brief, Invariant, Modelling, Summary
+from rigidsim.store.summary import Brief, Summary
+from rigidsim.store.summary_parts import ENGINE, Accuracy, Invariant, Modelling
 from rigidsim.store.understood import Body, Span, Start
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import shlex
 
 from rigidsim.session.verdict import Soundness, verdict_on
-from rigidsim.store.summary import Advice, AdviceCode, Summary
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import Advice, AdviceCode
 
 _STYLES = {Soundness.LOST: "bold yellow", Soundness.DRIFTED: "bold red"}
 _SOUND = "sound: every drift is within what rounding explains, {share} of it at most"

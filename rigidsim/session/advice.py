@@ -7,7 +7,7 @@ import math
 from rigidsim.accuracy.error_law import CLOSED_FORM
 from rigidsim.accuracy.estimate import label_rounding
 from rigidsim.session.diagnostics import Diagnostics
-from rigidsim.store.summary import Advice, AdviceCode
+from rigidsim.store.summary_parts import Advice, AdviceCode
 
 _LONG = 8192
 """Steps from which on projected invariants pay for themselves (``experiments/precision_tradeoff.py``: from

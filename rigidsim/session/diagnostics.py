@@ -17,7 +17,7 @@ from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.trail import Trail, Waypoints
-from rigidsim.store.summary import Caution, WarningCode
+from rigidsim.store.summary_parts import Caution, WarningCode
 
 if TYPE_CHECKING:
     from rigidsim.accuracy.estimate import Estimate

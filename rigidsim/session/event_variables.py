@@ -11,7 +11,7 @@ from rigidsim.session.variables import LYAPUNOV_NAMES, dataset_variables, dates_
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.store.summary import EventTimes
+from rigidsim.store.summary_parts import EventTimes
 from rigidsim.store.variables import LABELS, OF_THE_RUN, Extra, Variable
 
 

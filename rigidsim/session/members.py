@@ -15,7 +15,8 @@ from rigidsim.session.kept import ALWAYS, Kept, KeptVariable, Series, joined, ke
 from rigidsim.solve.status import Status
 from rigidsim.store.collected import JoinedBlocks
 from rigidsim.store.memory import MemoryRun
-from rigidsim.store.summary import Summary, WarningCode
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import WarningCode
 from rigidsim.store.variables import Variable
 
 

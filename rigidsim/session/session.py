@@ -25,7 +25,7 @@ from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun, MemoryWriter
 from rigidsim.store.run import Run, SavedRun
 from rigidsim.store.segments import Chain, SegmentWriter
-from rigidsim.store.summary import Caution
+from rigidsim.store.summary_parts import Caution
 
 
 @dataclass

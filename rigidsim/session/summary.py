@@ -21,7 +21,8 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.status import Status
 from rigidsim.store.attributes import RootAttributes, Use
-from rigidsim.store.summary import (
+from rigidsim.store.summary import Summary, as_fields
+from rigidsim.store.summary_parts import (
     Accuracy,
     BitForBit,
     Caution,
@@ -32,8 +33,6 @@ from rigidsim.store.summary import (
     Lyapunov,
     Modelling,
     ModellingWindow,
-    Summary,
-    as_fields,
 )
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import field
 
 from rigidsim.scene.records import dataclass
-from rigidsim.store.summary import ENGINE
+from rigidsim.store.summary_parts import ENGINE
 
 NOT_KEPT = "attempts_not_kept"
 

@@ -9,8 +9,8 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.suspicions import suspicious_angles, suspicious_end, unreachable_events
-from rigidsim.store.summary import Caution, WarningCode
 from rigidsim.store.summary_fields import Three
+from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.store.understood import Body, Span, Start
 
 

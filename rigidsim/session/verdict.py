@@ -5,7 +5,8 @@ from __future__ import annotations
 from enum import Enum
 
 from rigidsim.scene.records import dataclass
-from rigidsim.store.summary import Summary, WarningCode
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import WarningCode
 
 
 class Soundness(Enum):

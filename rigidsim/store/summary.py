@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 from pydantic import (
-    AfterValidator,
     Field,
     StrictBool,
     StrictInt,
@@ -22,244 +20,24 @@ from pydantic import (
 )
 
 from rigidsim.errors import RunFolderError
-from rigidsim.scene.records import dataclass
 from rigidsim.store.summary_fields import Claim, FiniteNumber, Part, Text
+from rigidsim.store.summary_parts import (
+    Accuracy,
+    Advice,
+    BitForBit,
+    Caution,
+    ChartChanges,
+    Cost,
+    Digest,
+    EventTimes,
+    Invariant,
+    Lyapunov,
+    Modelling,
+    WarningCode,
+)
 from rigidsim.store.understood import Body, Span, Start
 
-ENGINE = "engine"
-"""Beside the phases in ``Cost.seconds``: what the engine alone took of integrating and recording."""
 _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
-
-
-class WarningCode(Enum):
-    """Why a result isn't to be trusted, or not wholly; ``value`` stands in summaries."""
-
-    DRIFT = "drift"
-    SINGULARITY = "singularity"
-    NO_EFFECT = "no_effect"
-    ATTITUDE_UNCERTAIN = "attitude_uncertain"
-    RATES_UNCERTAIN = "rates_uncertain"
-    NOT_JOINED = "not_joined"
-    SET_ASIDE = "set_aside"
-    BEGUN_ANEW = "begun_anew"
-    NOT_CERTIFIED = "not_certified"
-    ANGLE_WITHOUT_UNIT = "angle_without_unit"
-    EPHEMERIS_OF_EARTH = "ephemeris_of_earth"
-    NEVER_HAPPENS = "never_happens"
-    TIME_WITHOUT_UNIT = "time_without_unit"
-    MODEL_UNCERTAIN = "model_uncertain"
-    UNDEFINED = "undefined"
-
-
-class AdviceCode(Enum):
-    """What would do better nearly for free; ``value`` stands in summaries."""
-
-    HOLD_INVARIANTS = "hold_invariants"
-    CLOSED_FORM = "closed_form"
-
-
-@dataclass(frozen=True)
-class Caution:
-    """A warning: its code for decisions, its text for people."""
-
-    code: WarningCode
-    text: str
-
-
-def _with_engine(seconds: dict[str, float]) -> dict[str, float]:
-    if ENGINE not in seconds:
-        raise ValueError(f'"{ENGINE}" is missing')
-    return seconds
-
-
-Digest = Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")]
-Seconds = Annotated[dict[Text, FiniteNumber], AfterValidator(_with_engine)]
-
-
-class Cost(Part):
-    """What a run took.
-
-    Attributes:
-        steps_redone: of the steps, those that were taken once more on the way to an event or a chart.
-        smallest_step, largest_step: seconds; None where no step was taken, or none was finite.
-        seconds, cpu_by_phase: of this session by phase, on the wall and of the CPU.
-        cpu_seconds, wall_seconds: of all sessions.
-    """
-
-    steps: Annotated[StrictInt, Claim()]
-    steps_redone: StrictInt
-    smallest_step: FiniteNumber | None
-    largest_step: FiniteNumber | None
-    seconds: Seconds
-    cpu_seconds: FiniteNumber
-    cpu_by_phase: dict[Text, FiniteNumber] = Field(default_factory=dict)
-    sessions: StrictInt = 1
-    wall_seconds: FiniteNumber | None = None
-
-
-class Invariant(Part):
-    """How well one was kept.
-
-    Attributes:
-        initial: value, or components, in ``units``.
-        scale: what drifts are relative to, in ``units``.
-        largest_drift, final_drift: relative; None where no sample was taken.
-        bound: which rounding alone explains.
-        put_back: of a held one, what the drift would have been.
-        why: it is one.
-        numerical: whether it is kept by definition, whatever the motion.
-    """
-
-    initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Claim()]
-    units: Annotated[Text, Claim()]
-    scale: Annotated[FiniteNumber, Claim()]
-    scale_name: Annotated[Text, Claim()]
-    largest_drift: Annotated[FiniteNumber | None, Claim()]
-    final_drift: Annotated[FiniteNumber | None, Claim()]
-    bound: Annotated[FiniteNumber, Claim()]
-    put_back: Annotated[FiniteNumber | None, Claim(since=3)] = None  # from then on with its sign
-    why: Annotated[Text, Claim()]
-    numerical: Annotated[StrictBool, Claim()]
-
-
-class Accuracy(Part):
-    """How right the attitude is at the end, rad: asked for, estimated, and certified by a reference.
-
-    Attributes:
-        requested_position, certified_position: of the path, m.
-        estimated_position_error, estimated_velocity_error: at the end, m and m/s.
-        amplification: of rounding errors by the motion; None where nothing was estimated.
-        error_growth_rate: 1/s; 0 where errors don't grow exponentially.
-        predictable_seconds: from the start, after which no digit is left; None where that is never.
-        examined_share: of the run, over which the growth of errors was followed without a gap from its start;
-            1 for all of it.
-        how: the certificate came about.
-        chosen, chosen_why, forecast: the setting that was chosen for ``requested``, and its forecast.
-    """
-
-    requested: FiniteNumber | None
-    requested_position: FiniteNumber | None = None
-    certified_position: FiniteNumber | None = None
-    estimated_attitude_error: FiniteNumber | None
-    estimated_position_error: FiniteNumber | None = None
-    estimated_velocity_error: FiniteNumber | None = None
-    estimated_how: Text
-    amplification: FiniteNumber | None = 1.0
-    error_growth_rate: FiniteNumber | None = None
-    predictable_seconds: FiniteNumber | None = None
-    amplification_seconds: FiniteNumber | None = None
-    examined_share: FiniteNumber | None = None
-    amplification_how: Text = ""
-    certified: FiniteNumber | None
-    how: Text
-    difference_at_end: FiniteNumber | None = None
-    times_compared: StrictInt = 0
-    chosen: Text = ""
-    chosen_why: Text = ""
-    forecast: FiniteNumber | None = None
-
-
-class ModellingWindow(Part):
-    """Where the full model ran beside a reduced one; see ``rigidsim.accuracy.modelling``.
-
-    Attributes:
-        start, end: seconds.
-        steps: of the full model.
-        momentum_axis, figure_axis: largest distances between both models' directions, with what averaging
-            removed added back, rad; None where a figure axis points nowhere on average.
-        growth_along, growth_across: of the former, along and across the precession, rad/s.
-        doubt: by how much the growth of the window's parts differs, rad/s.
-    """
-
-    start: FiniteNumber
-    end: FiniteNumber
-    steps: StrictInt
-    momentum_axis: FiniteNumber
-    figure_axis: FiniteNumber | None
-    growth_along: FiniteNumber
-    growth_across: FiniteNumber
-    doubt: FiniteNumber
-
-
-class Modelling(Part):
-    """How far a reduced model is from the full one, apart from numerical errors.
-
-    Attributes:
-        level: of the model.
-        short_period: whether what averaging removed is added back in what is recorded.
-        momentum_axis, figure_axis: largest distances of the directions recorded from the full model's, until
-            the end of the run, rad; None where they weren't measured, or a figure axis points nowhere.
-        growth: of the distance, rad/s; oscillation: what it is without, rad.
-        whole: whether the full model was followed to the end.
-        requested: what of it was asked for, rad.
-        how: it was found, or why it wasn't.
-    """
-
-    level: Annotated[Text, Claim()]
-    short_period: Annotated[StrictBool, Claim()]
-    momentum_axis: FiniteNumber | None = None
-    figure_axis: FiniteNumber | None = None
-    growth: FiniteNumber | None = None
-    oscillation: FiniteNumber | None = None
-    whole: StrictBool = False
-    requested: Annotated[FiniteNumber | None, Claim()] = None
-    how: Text = ""
-    cpu_seconds: FiniteNumber | None = None
-    windows: tuple[ModellingWindow, ...] = ()
-
-
-class Lyapunov(Part):
-    """The spectrum of the motion, 1/s, with what it says of the run's digits."""
-
-    chaotic: Annotated[StrictBool, Claim()]
-    largest_exponent: Annotated[FiniteNumber, Claim()]
-    moved_over_second_half: Annotated[FiniteNumber, Claim()]
-    e_folding_seconds: FiniteNumber | None = None
-    predictable_seconds: FiniteNumber | None = None
-    exponents: Annotated[tuple[FiniteNumber, ...], Claim()] = ()
-    states: tuple[Text, ...] = ()
-    units: Text = "s-1"
-
-
-class EventTimes(Part):
-    """When an event happened, s.
-
-    Attributes:
-        early: the first ones, at most ``EventTimes.EARLY``; the first among them.
-    """
-
-    EARLY: ClassVar[int] = 5
-    first: Annotated[FiniteNumber, Claim()]
-    last: Annotated[FiniteNumber, Claim()]
-    early: Annotated[tuple[FiniteNumber, ...], Claim(since=4)] = ()
-
-
-class Advice(Part):
-    """Something that would do better.
-
-    Attributes:
-        code: an ``AdviceCode``.
-        now, then: attitude error at the end as it is, and about as it would be, rad.
-    """
-
-    code: Text
-    now: FiniteNumber
-    then: FiniteNumber
-
-
-class ChartChanges(Part):
-    """How often a run in Euler angles went from its sequence to the partner or back."""
-
-    count: StrictInt
-    sequence: Text
-    partner: Text
-
-
-class BitForBit(Part):
-    """Whether running again gives the same bits, and on what condition."""
-
-    claim: StrictBool
-    holds_for: StrictStr
 
 
 class Brief(Part):

@@ -12,7 +12,8 @@ from rigidsim.scene.config import Experiment
 from rigidsim.session.session import Session
 from rigidsim.solve.status import Status
 from rigidsim.store.run import Run
-from rigidsim.store.summary import Caution, Summary, WarningCode
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import Caution, WarningCode
 
 AnyRun = TypeVar("AnyRun", bound=Run)
 

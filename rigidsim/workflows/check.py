@@ -13,7 +13,7 @@ from rigidsim.scene.sweep import Sweep
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.solve.problem import prepare
-from rigidsim.store.summary import Caution
+from rigidsim.store.summary_parts import Caution
 from rigidsim.store.understood import Body, Span, Start
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweep_check import QUICK, check_sweep

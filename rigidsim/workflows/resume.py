@@ -29,7 +29,8 @@ from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain, root_attributes
-from rigidsim.store.summary import Caution, Summary, WarningCode
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.certify import certified
 from rigidsim.workflows.recorded_then import as_recorded

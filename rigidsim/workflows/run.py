@@ -20,7 +20,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.run import Run, SavedRun
-from rigidsim.store.summary import WarningCode
+from rigidsim.store.summary_parts import WarningCode
 from rigidsim.workflows.read import Experiment, Given, as_experiment
 
 if TYPE_CHECKING:

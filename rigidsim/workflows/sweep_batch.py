@@ -30,7 +30,7 @@ from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
-from rigidsim.store.summary import WarningCode
+from rigidsim.store.summary_parts import WarningCode
 from rigidsim.store.variables import Variable
 
 _ONE_BY_ONE = ("frequencies",)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigidsim.cli.verdicts import advice_line, next_lines
-from rigidsim.store.summary import Advice, AdviceCode
+from rigidsim.store.summary_parts import Advice, AdviceCode
 
 LONG = "end = 12000\nsamples = 101"
 ESTIMATED = ("--set", "output.estimate=true")

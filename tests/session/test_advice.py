@@ -9,7 +9,7 @@ from support import config
 
 import rigidsim
 from rigidsim.session.verdict import Soundness, verdict_on
-from rigidsim.store.summary import AdviceCode
+from rigidsim.store.summary_parts import AdviceCode
 
 LONG = config(  # some 24,000 steps
     time="end = 12000\nsamples = 101", integrator="hold_invariants = false", estimate=True

@@ -14,7 +14,8 @@ from pydantic import ValidationError
 import rigidsim
 from rigidsim.errors import RunFolderError
 from rigidsim.store.attributes import Use, read_attributes
-from rigidsim.store.summary import Brief, Caution, Summary, WarningCode, read_summary
+from rigidsim.store.summary import Brief, Summary, read_summary
+from rigidsim.store.summary_parts import Caution, WarningCode
 
 # hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
 BLURRED = (
