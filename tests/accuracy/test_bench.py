@@ -73,6 +73,7 @@ def error_of(dataset: xarray.Dataset, setting: Setting) -> float:
     return float(dataset["attitude_error_largest"].sel(setting=setting.title))
 
 
+@pytest.mark.slow
 def test_errors_are_angles_from_the_exact_motion(measured: Measurement, dataset: xarray.Dataset) -> None:
     times = [mpmath.mpf(t) for t in measured.plan.times]
     form = closed_form_of(prepare(free()).scene)
@@ -88,6 +89,7 @@ def test_errors_are_angles_from_the_exact_motion(measured: Measurement, dataset:
         assert found < 1e-4  # and it is the motion that begins at the start
 
 
+@pytest.mark.slow
 def test_precision_and_tolerance_order_the_errors(dataset: xarray.Dataset) -> None:
     # 3 (eps/2) sqrt(steps) |w| t / sqrt 3: the round-off law, over some 270 steps and 115 rad
     law = 3 * EPSILON / 2 * 270**0.5 * 115 / 3**0.5
@@ -98,6 +100,7 @@ def test_precision_and_tolerance_order_the_errors(dataset: xarray.Dataset) -> No
     assert error_of(dataset, CLOSED) < 100 * EPSILON  # no growth: some rounding of O(1) numbers
 
 
+@pytest.mark.slow
 def test_the_default_costs_one_and_every_speed_has_a_spread(dataset: xarray.Dataset) -> None:
     assert float(dataset["cpu_ratio"].sel(setting=DEFAULT.title)) == 1.0
     assert (dataset["cpu_ratio_least"] <= dataset["cpu_ratio"]).all()
@@ -119,6 +122,7 @@ def test_held_invariants_drift_less_over_a_long_run() -> None:
     assert error_of(long, HELD) < error_of(long, DEFAULT) / 30
 
 
+@pytest.mark.slow
 def test_the_dataset_opens_as_it_was(dataset: xarray.Dataset, tmp_path: Path) -> None:
     save(dataset, tmp_path)
     with xarray.open_dataset(tmp_path / "tradeoff.h5") as again:
@@ -133,6 +137,7 @@ def test_the_dataset_opens_as_it_was(dataset: xarray.Dataset, tmp_path: Path) ->
         assert rigidsim.parse(again.attrs["config"]).config.name == "free"
 
 
+@pytest.mark.slow
 def test_the_figure_shows_every_point(dataset: xarray.Dataset, tmp_path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

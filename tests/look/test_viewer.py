@@ -19,6 +19,7 @@ from rigidsim.look.timeline import write_timeline
 Build = Callable[..., xarray.Dataset]
 
 
+@pytest.mark.slow  # the viewer starts
 def test_picture_of_a_run_shows_the_body_and_its_plots(symmetric_top: Build, tmp_path: Path) -> None:
     from matplotlib.image import imread
 
