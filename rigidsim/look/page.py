@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,11 +51,15 @@ def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
         ("samples", _samples(dataset, thinned)),
         ("steps", attributes.get("steps")),
         ("precision", attributes.get("precision") or integrator.get("precision")),
-        ("formulation", attributes.get("formulation") or integrator.get("formulation")),
+        (
+            "model" if is_averaged(attributes) else "formulation",
+            attributes.get("formulation") or integrator.get("formulation"),
+        ),
         ("status", status),
     ]
     if "attitude_error" in attributes:
-        facts.append(("attitude uncertain by", f"{float(attributes['attitude_error']):.2g} rad"))
+        what = "axis integrated to" if is_averaged(attributes) else "attitude uncertain by"
+        facts.append((what, f"{float(attributes['attitude_error']):.2g} rad"))
     facts = [(name, value) for name, value in facts if value not in (None, "")]
     lines = [heading, "", *_table(tuple(name for name, _ in facts), [tuple(str(v) for _, v in facts)])]
     invariants = _invariants(thinned)
@@ -66,6 +71,11 @@ def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
         rows = [("initial", *initial), (drift, *largest)]
         lines += _table(("invariant", *names), rows)
     return legible("\n".join(lines))
+
+
+def is_averaged(attributes: Mapping[str, Any]) -> bool:
+    """Whether a dataset with these attributes is of an averaged model: it has axes, but no attitude."""
+    return str(attributes.get("formulation", "")).endswith("averaged")
 
 
 def notes_page(kind: str, notes: list[str]) -> str:

@@ -192,6 +192,22 @@ def test_obliquity_and_longitude_have_axes_of_their_own_and_say_what_was_taken_o
     )
 
 
+def test_the_page_of_a_run_with_axes_alone_is_about_their_precession() -> None:
+    dataset = precessing()  # as of an averaged model: neither attitude nor rates
+    page = figures.figure(dataset.assign_attrs(formulation="orbit_averaged"))
+    shown = [title.split(" less")[0].split(":")[0].split(" (")[0] for title in titles(page)]
+    assert shown[:4] == ["Obliquity", "Longitude of the node", "Nutation", "Path of the pole in space"]
+    said = [text.get_text() for text in texts(page)]
+    assert "model" in said
+    assert "formulation" not in said
+    alone = dataset.drop_vars(["obliquity", "node_longitude"])
+    tilt, node = (dataset[name].values[:, 1] for name in ("obliquity", "node_longitude"))
+    axis = np.stack([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1)
+    alone = alone.assign(momentum_axis=(("time", "space_axis"), axis))  # of a tumbling body
+    assert {"obliquity", "nutation", "pole_path"} <= set(figures.available(alone))
+    assert titles(figures.figure(alone))[0] == titles(page)[0]
+
+
 def test_nutation_ellipse_has_its_period_and_its_axes() -> None:
     page = figures.figure(precessing(years=60), "nutation")
     (axes,) = page.axes

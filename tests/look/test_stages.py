@@ -143,6 +143,68 @@ def test_a_kepler_path_keeps_to_the_laws_of_kepler() -> None:
     assert np.ptp(areas) / areas.mean() < (2 * np.pi / 2000 * 6) ** 2
 
 
+def averaged(dataset: xarray.Dataset, axis: str, drawn: xarray.Dataset) -> xarray.Dataset:
+    """A pole that goes backwards about Z, 0.4 rad from it, and nothing else; the Sun goes round fast."""
+    node = 1.0 - 0.05 * dataset["time"].values
+    pole = np.stack([np.sin(0.4) * np.sin(node), -np.sin(0.4) * np.cos(node), np.cos(0.4) + 0 * node], axis=1)
+    bare = dataset.drop_vars(["quaternion", "angular_velocity", "angular_momentum", "energy"])
+    known = {
+        f"{axis}_axis": (("time", "space_axis"), pole),
+        "obliquity": (("time", "axis"), np.full((len(node), 1), 0.4), {"units": "rad"}),
+        "node_longitude": (("time", "axis"), node[:, None], {"units": "rad"}),
+    }
+    bare = bare.assign(known).assign_coords(axis=[axis]).assign_attrs(formulation="orbit_averaged")
+    sun = {
+        "what": "source",
+        "gravitational_parameter": 1.32712440018e20,
+        "orbit": {**CIRCLE, "mean_motion": 60},
+    }
+    return around(bare.assign_attrs(drawing=drawn.attrs["drawing"]), sun)
+
+
+def test_a_globe_without_rotation_points_where_its_axis_does(symmetric_top: Build) -> None:
+    top = symmetric_top(count=101)
+    dataset = averaged(top, "figure", earth(top))
+    for known in (dataset, dataset.drop_vars("figure_axis")):  # by itself, and from its angles
+        found = picture(known)
+        assert found.kind == "rotation of the Earth in space"
+        (stage,) = found.stages
+        assert stage.quaternion is not None
+        turn = rotation_matrix(stage.quaternion[:, [3, 0, 1, 2]])
+        np.testing.assert_allclose(turn[:, :, 2], dataset["figure_axis"].values, rtol=0, atol=1e-6)  # float32
+        # about its axis it keeps to the node: the first of its axes across stays level
+        assert np.abs(turn[:, 2, :2]).min(axis=1).max() < 1e-6
+        assert [arrow.name for arrow in stage.arrows] == ["figure_axis"]  # the Sun would jump about
+        assert "prime_meridian" not in [line.name for line in stage.lines]
+        (ring,) = [line for line in stage.lines if line.name == "precession"]
+        assert ring.words == "precession of the pole: once in 2.09 min"  # 2 pi / 0.05 s
+        np.testing.assert_allclose(ring.points[:, 2], 1.45 * np.cos(0.4), rtol=1e-12)
+        assert any("averaged over" in note for note in found.notes)
+        assert any("direction of the Sun isn't shown" in note for note in found.notes)
+
+
+def test_of_a_tumbling_body_without_attitude_the_momentum_is_shown_alone(symmetric_top: Build) -> None:
+    top = symmetric_top(count=101)
+    dataset = averaged(top, "momentum", top)
+    found, subject = build_picture(dataset)
+    assert found.kind == "axes in space"
+    (stage,) = found.stages
+    assert stage.meshes == []
+    assert stage.quaternion is None
+    (arrow,) = stage.arrows
+    np.testing.assert_allclose(arrow.vectors, 1.45 * dataset["momentum_axis"].values, rtol=1e-12)
+    assert {"plane of reference", "precession of the momentum: once in 2.09 min"} <= {
+        line.words for line in stage.lines
+    }
+    assert any("isn't drawn" in note for note in found.notes)
+    with_axis = averaged(top, "figure", top)  # a disk whose axis is known is drawn, along it
+    found, _ = build_picture(with_axis)
+    assert found.kind == "axes in space"
+    assert len(found.stages[0].meshes) == len(subject.meshes) > 0
+    turn = rotation_matrix(found.stages[0].quaternion[:, [3, 0, 1, 2]])
+    np.testing.assert_allclose(turn[:, :, 2], with_axis["figure_axis"].values, rtol=0, atol=1e-6)
+
+
 def test_the_local_frame_points_forward_and_down() -> None:
     seconds = np.linspace(0, 3000, 50)
     source = surroundings.kepler_path(CIRCLE, seconds)

@@ -126,11 +126,12 @@ class Kind:
 
 
 _TURNS, _ATTITUDE = "angular_velocity recorded", "an attitude recorded"
+_AXIS = "an attitude or an axis (figure_axis, momentum_axis, obliquity) recorded"
 KINDS: dict[str, Kind] = {
     "polar_motion": Kind("a spin near a principal axis", (POLAR_MOTION,), (CIRCLE,)),
-    "pole_path": Kind(_ATTITUDE, (), (PATH, NUTATION)),
+    "pole_path": Kind(_AXIS, (), (PATH, NUTATION)),
     "nutation": Kind("a pole that a torque moves", (), (NUTATION,)),
-    "obliquity": Kind(_ATTITUDE, (OBLIQUITY, LONGITUDE)),
+    "obliquity": Kind(_AXIS, (OBLIQUITY, LONGITUDE)),
     "libration": Kind(
         "libration, roll_pitch_yaw or nadir recorded", (LIBRATION, ROLL_PITCH_YAW), (NADIR, PHASES)
     ),
@@ -211,6 +212,8 @@ def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
         return (POLAR_MOTION,), (CIRCLE, *moving)
     if moving:
         return (RATES, ATTITUDE), (*moving, POLHODE)
+    if not (RATES.shows(rows) or ATTITUDE.shows(rows)):  # only axes are known, as of an averaged model
+        return (OBLIQUITY, LONGITUDE) if _precesses(rows) else (WOBBLE,), (NUTATION, PATH)
     if polhode.surfaces(rows) is not None:
         return (RATES, ATTITUDE), (POLHODE, HERPOLHODE)
     return (RATES, ATTITUDE), (POLHODE,)

@@ -10,7 +10,7 @@ import numpy as np
 from rigidsim.look import signals
 from rigidsim.look.figures import timelines
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
-from rigidsim.look.page import largest_drift, read_config
+from rigidsim.look.page import is_averaged, largest_drift, read_config
 from rigidsim.look.readable_time import unit_for
 from rigidsim.look.roles import drifts
 from rigidsim.look.thinning import thin
@@ -191,7 +191,10 @@ def facts_of(shown: Shown) -> list[tuple[str, str]]:
         (name, str(value))
         for name, value in (
             ("status", status if status != "finished" else ""),
-            ("formulation", dataset.attrs.get("formulation") or integrator.get("formulation")),
+            (
+                "model" if is_averaged(dataset.attrs) else "formulation",
+                dataset.attrs.get("formulation") or integrator.get("formulation"),
+            ),
             ("precision", dataset.attrs.get("precision") or integrator.get("precision")),
             ("tolerance", integrator.get("tolerance")),
             ("steps", dataset.attrs.get("steps")),

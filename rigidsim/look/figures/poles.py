@@ -95,7 +95,7 @@ def pole_path_panel(axes: Axes, dataset: xarray.Dataset) -> None:
     if center == "momentum":
         axes.set_xlabel(f"across the momentum [{unit}]")
         axes.set_ylabel(f"across the momentum [{unit}]")
-    rate = fits.circulation(signals.seconds(dataset), shown["figure"]) if "figure" in shown else None
+    rate = fits.circulation(signals.seconds(dataset), next(iter(shown.values())))
     if rate is not None:
         period = span_text(_TURN / abs(rate), 4)
         title += f", once round in {period}"

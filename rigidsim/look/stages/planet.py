@@ -11,16 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.angle_units import angle_unit
-from rigidsim.look.readable_time import span_text
+from rigidsim.look.stages import precession
 from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, source_arrows
 from rigidsim.look.stages.parts import (
     BODY,
-    FAINT,
     FIGURE,
     PALE,
     POLHODE,
-    SPACE,
     VELOCITY,
     Array,
     Arrow,
@@ -29,7 +26,6 @@ from rigidsim.look.stages.parts import (
     Line,
     Picture,
     Plane,
-    Spot,
     Stage,
     Vector,
     circle,
@@ -43,9 +39,7 @@ if TYPE_CHECKING:
 _LARGE = 1e5  # m: a smaller body is no globe
 _ROUND = 0.9  # of the smallest over the largest semi-axis
 _UNKNOWN: Color = (128, 148, 170)
-ECLIPTIC: Color = (226, 196, 90)
 EQUATOR: Color = (150, 205, 110)
-PRECESSION: Color = (190, 150, 255)
 _LEADING = (
     "polar_motion",
     "obliquity",
@@ -65,8 +59,11 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     known = next((one for one in surroundings.GLOBES if one.name.lower() == name), None)
     half = axes / axes.max()
     mesh = globe(half, known.color if known else _UNKNOWN)
-    subject = replace(subject, meshes=[mesh], reach=float(axes.max()))
     figure = signals.figure_direction(dataset)
+    turns = subject.attitude is not None
+    if not turns and "angular_velocity" not in dataset:
+        subject = precession.pointed(dataset, subject, figure)
+    subject = replace(subject, meshes=[mesh], reach=float(axes.max()))
     stage = replace(subject.stage([], []), title=name.capitalize() or "Planet", axis_length=0.0)
     stage.lines.extend(
         [
@@ -74,21 +71,24 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
             for k, line in enumerate(graticule(half))
         ]
     )
-    # the prime meridian stands out, so that the rotation shows
-    stage.lines.append(Line("prime_meridian", PALE, graticule(half, 180.0, 1.006)[0], BODY, 1.6))
+    if turns or subject.attitude is None:  # the prime meridian stands out, so that the rotation shows
+        stage.lines.append(Line("prime_meridian", PALE, graticule(half, 180.0, 1.006)[0], BODY, 1.6))
     stage.lines.append(Line("equator", EQUATOR, circle(1.01, figure), BODY, 1.8, 1.0, "equator"))
     notes: list[str] = []
-    planes = _pole_planes(dataset, notes)
+    planes = _pole_planes(dataset)
     if subject.attitude is None:
         _in_its_own_axes(dataset, stage, figure, notes)
         stage = replace(stage, camera=_eye(np.array([0.0, 0.0, 0.3]), 1.75))
         return Picture(f"rotation of {_article(name)}", [stage], planes, _LEADING, notes)
-    pole = signals.body_direction(dataset, figure)
-    assert pole is not None
+    pole = subject.attitude @ figure
     stage.arrows.append(Arrow("figure_axis", "figure axis", FIGURE, 1.45 * pole, False, "figure axis"))
-    _orbit_plane(stage)
-    _precession(dataset, stage, pole, notes)
-    stage.arrows.extend(source_arrows(dataset, subject, 1.75))
+    precession.reference_plane(stage)
+    precession.circle_of_precession(dataset, stage, pole, "figure", notes)
+    if turns:
+        stage.arrows.extend(source_arrows(dataset, subject, 1.75))
+    else:
+        stage.arrows.extend(precession.followed_sources(dataset, subject, 1.75, notes))
+        notes.append(precession.standing_note(dataset, "globe"))
     step = _largest_turn(dataset)
     if step > 1.0:
         notes.append(
@@ -159,74 +159,10 @@ def _times(factor: float) -> str:
     return f"{factor:,.0f} times"
 
 
-def _orbit_plane(stage: Stage) -> None:
-    stage.lines.extend(
-        [
-            Line(
-                "ecliptic/rim",
-                ECLIPTIC,
-                circle(1.75, np.array([0.0, 0.0, 1.0])),
-                SPACE,
-                1.8,
-                0.9,
-                "plane of reference",
-            ),
-            Line("ecliptic/inner", ECLIPTIC, circle(1.3, np.array([0.0, 0.0, 1.0])), SPACE, 0.8, 0.35),
-        ]
-    )
-    for k in range(6):
-        way = direction_of(0.0, np.pi * k / 6)
-        stage.lines.append(
-            Line(f"ecliptic/spoke{k}", ECLIPTIC, np.stack([-1.75 * way, 1.75 * way]), SPACE, 0.7, 0.22)
-        )
-    stage.lines.append(Line("normal", FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), SPACE, 1.0))
-    stage.spots.append(Spot("normal", "normal", FAINT, np.array([0.0, 0.0, 1.78])))
-
-
-def _precession(dataset: Table, stage: Stage, pole: Array, notes: list[str]) -> None:
-    """The circle that the pole goes about the normal, once in how long."""
-    tilt = float(np.nanmean(np.arctan2(np.hypot(pole[:, 0], pole[:, 1]), pole[:, 2])))
-    if not 1e-3 < tilt < np.pi - 1e-3:
-        return
-    ring = circle(1.45 * np.sin(tilt), np.array([0.0, 0.0, 1.0]), np.array([0, 0, 1.45 * np.cos(tilt)]))
-    words = "precession of the pole"
-    found = signals.orientation(dataset, "figure")
-    seconds = signals.seconds(dataset)
-    if found is not None and len(seconds) > 8:
-        rate = np.polyfit(seconds - seconds[0], found[1], 1)[0]
-        span = seconds[-1] - seconds[0]
-        if abs(rate) > 0 and abs(rate) * span > 1e-9:
-            words += f": once in {span_text(2 * np.pi / abs(rate), 3)}"
-            notes.append(f"the pole's longitude moves by {rate:.6g} rad/s on the mean (straight line)")
-    stage.lines.append(Line("precession", PRECESSION, ring, SPACE, 2.0, 1.0, words))
-
-
-def _pole_planes(dataset: Table, notes: list[str]) -> list[Plane]:
+def _pole_planes(dataset: Table) -> list[Plane]:
     """Polar motion in the body, and the pole in space less its mean motion."""
-    planes = []
-    momentum = signals.steady_momentum(dataset) if "quaternion" in dataset else None
-    found = signals.orientation(dataset, "figure") if momentum is None else None
-    if found is not None and np.isfinite(found[0]).all() and len(found[0]) > 8:
-        seconds = signals.seconds(dataset)
-        tilt, node = (x - np.polyval(np.polyfit(seconds, x, 1), seconds) for x in found)
-        across = node * np.sin(np.mean(found[0]))
-        path = np.stack([across, tilt], axis=1)
-        if np.abs(path).max() > 0:
-            planes.append(
-                _plane("nutation_path", "Nutation of the pole", FIGURE, path, ("longitude", "obliquity"), "")
-            )
+    planes = precession.nutation_planes(dataset, "figure")
     motion = signals.polar_motion(dataset)
     if motion is not None and np.nanmax(np.abs(motion)) > 0:
-        planes.append(_plane("polar_motion_path", "Polar motion", POLHODE, motion, ("m1", "m2"), "F"))
+        planes.append(precession.plane_of("polar_motion_path", "Polar motion", POLHODE, motion, ("m1", "m2")))
     return planes
-
-
-def _plane(key: str, title: str, color: Color, path: Array, names: tuple[str, str], middle: str) -> Plane:
-    size = float(np.nanmax(np.linalg.norm(path, axis=1)))
-    unit = angle_unit(size)
-    shown = path * unit.per_radian
-    reach = size * unit.per_radian
-    power = 10.0 ** np.floor(np.log10(reach))
-    step = next(s for s in (5, 2, 1, 0.5) if s * power <= 0.75 * reach) * power
-    rings = tuple((k * step, f"{k * step:.3g} {unit.symbol}") for k in (1, 2) if k * step < 1.6 * reach)
-    return Plane(key, f"{title} [{unit.symbol}]", color, shown, rings=rings, names=names)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rigidsim.look.stages import flight, free, generic, orbit, planet, satellite, top
+from rigidsim.look.stages import flight, free, generic, orbit, planet, pole, satellite, top
 from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture
 
@@ -18,6 +18,7 @@ KINDS: tuple[Callable[[Table, Subject], Picture | None], ...] = (
     flight.picture,
     satellite.picture,
     planet.picture,
+    pole.picture,
     free.picture,
     generic.picture,
 )

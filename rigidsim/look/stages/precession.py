@@ -1,0 +1,180 @@
+"""A pole that precesses: the plane of reference, the circle about its normal, and the motion beside it.
+
+Where no attitude is known but an axis is (of an averaged model, which has no rotation), a body is drawn that
+points there and doesn't turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigidsim.look import signals, surroundings
+from rigidsim.look.angle_units import angle_unit
+from rigidsim.look.page import is_averaged
+from rigidsim.look.readable_time import span_text
+from rigidsim.look.stages.bodies import Subject, direction_of, source_arrows
+from rigidsim.look.stages.parts import (
+    FAINT,
+    FIGURE,
+    SPACE,
+    Array,
+    Arrow,
+    Color,
+    Line,
+    Plane,
+    Spot,
+    Stage,
+    circle,
+    quaternion_of,
+)
+
+if TYPE_CHECKING:
+    from rigidsim.look.rows import Table
+
+ECLIPTIC: Color = (226, 196, 90)
+PRECESSION: Color = (190, 150, 255)
+POLE_REACH = 1.45
+"""Length of the arrow of a pole."""
+_UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
+_SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
+
+
+def axis_in_space(dataset: Table, axis: str) -> Array | None:
+    """Unit vectors (rows, 3), space axes, of the axis named figure or momentum; None where not all are known.
+
+    As recorded, else from its obliquity and node longitude where these are against the XY plane.
+    """
+    found = signals.pole(dataset, axis)
+    if found is None and "obliquity" in dataset and "node_longitude" in dataset:
+        pair = signals.orientation(dataset, axis)
+        plane = str(dataset["obliquity"].attrs.get("reference_plane", "XY"))
+        if pair is not None and plane.startswith("XY"):
+            tilt, node = pair
+            found = np.stack(
+                [np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1
+            )
+    return found if found is not None and np.isfinite(found).all() else None
+
+
+def pointed(dataset: Table, subject: Subject, figure: Array) -> Subject:
+    """The subject with an attitude whose figure axis is the recorded one, and which keeps to its node.
+
+    The same subject where no figure axis is known.
+
+    Args:
+        figure: (3,) unit vector of the figure axis, body axes.
+    """
+    pole = axis_in_space(dataset, "figure")
+    if pole is None:
+        return subject
+    node = np.stack([-pole[:, 1], pole[:, 0], np.zeros(len(pole))], axis=1)
+    node[np.hypot(pole[:, 0], pole[:, 1]) < _UPRIGHT] = (1.0, 0.0, 0.0)
+    node -= np.sum(node * pole, axis=1, keepdims=True) * pole
+    node /= np.linalg.norm(node, axis=1, keepdims=True)
+    across = np.cross(np.eye(3)[np.abs(figure).argmin()], figure)
+    across /= np.linalg.norm(across)
+    in_body = np.stack([across, np.cross(figure, across), figure], axis=1)
+    in_space = np.stack([node, np.cross(pole, node), pole], axis=2)
+    attitude = in_space @ in_body.T
+    return replace(subject, attitude=attitude, quaternion=quaternion_of(attitude))
+
+
+def standing_note(dataset: Table, what: str) -> str:
+    """Why a body that was `pointed` doesn't turn."""
+    why = "every rotation is averaged over" if is_averaged(dataset.attrs) else "no attitude was recorded"
+    return f"{why}: the {what} points where its figure axis does, and doesn't turn about it"
+
+
+def followed_sources(dataset: Table, subject: Subject, length: float, notes: list[str]) -> list[Arrow]:
+    """Directions of sources that go on so little from row to row that the eye can follow.
+
+    Of the others some would seem to stand still, where samples are whole revolutions apart.
+    """
+    seconds = signals.seconds(dataset)
+    step = float(np.abs(np.diff(seconds)).mean()) if len(seconds) > 1 else 0.0
+    orbits = [one.get("orbit", {}) for one in surroundings.told(dataset, "source")]
+    rates = {f"source{k}": float(orbit.get("mean_motion", 0.0)) for k, orbit in enumerate(orbits)}
+    kept = []
+    for arrow in source_arrows(dataset, subject, length):
+        if abs(rates.get(arrow.name, 0.0)) * step > _SPARSE:
+            notes.append(f"the {arrow.words} isn't shown: samples are too far apart to follow it")
+        else:
+            kept.append(arrow)
+    return kept
+
+
+def reference_plane(stage: Stage) -> None:
+    """The XY plane of space with its normal, put on a stage."""
+    up = np.array([0.0, 0.0, 1.0])
+    stage.lines.extend(
+        [
+            Line("ecliptic/rim", ECLIPTIC, circle(1.75, up), SPACE, 1.8, 0.9, "plane of reference"),
+            Line("ecliptic/inner", ECLIPTIC, circle(1.3, up), SPACE, 0.8, 0.35),
+        ]
+    )
+    for k in range(6):
+        way = direction_of(0.0, np.pi * k / 6)
+        stage.lines.append(
+            Line(f"ecliptic/spoke{k}", ECLIPTIC, np.stack([-1.75 * way, 1.75 * way]), SPACE, 0.7, 0.22)
+        )
+    stage.lines.append(Line("normal", FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), SPACE, 1.0))
+    stage.spots.append(Spot("normal", "normal", FAINT, np.array([0.0, 0.0, 1.78])))
+
+
+def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, notes: list[str]) -> None:
+    """The circle that a pole goes about the normal, once in how long, put on a stage.
+
+    Args:
+        pole: unit vectors (rows, 3), space axes.
+        axis: its name, figure or momentum.
+    """
+    tilt = float(np.nanmean(np.arctan2(np.hypot(pole[:, 0], pole[:, 1]), pole[:, 2])))
+    if not 1e-3 < tilt < np.pi - 1e-3:
+        return
+    up, high = np.array([0.0, 0.0, 1.0]), np.array([0, 0, POLE_REACH * np.cos(tilt)])
+    ring = circle(POLE_REACH * np.sin(tilt), up, high)
+    words = "precession of the pole" if axis == "figure" else f"precession of the {axis}"
+    found = signals.orientation(dataset, axis)
+    seconds = signals.seconds(dataset)
+    if found is not None and len(seconds) > 8:
+        rate = np.polyfit(seconds - seconds[0], found[1], 1)[0]
+        span = seconds[-1] - seconds[0]
+        if abs(rate) > 0 and abs(rate) * span > 1e-9:
+            words += f": once in {span_text(2 * np.pi / abs(rate), 3)}"
+            which = "pole" if axis == "figure" else axis
+            notes.append(f"the {which}'s longitude moves by {rate:.6g} rad/s on the mean (straight line)")
+    stage.lines.append(Line("precession", PRECESSION, ring, SPACE, 2.0, 1.0, words))
+
+
+def nutation_planes(dataset: Table, axis: str) -> list[Plane]:
+    """An axis in space less its mean motion, where its momentum moves: one plane, or none.
+
+    Args:
+        axis: figure or momentum.
+    """
+    momentum = signals.steady_momentum(dataset) if "quaternion" in dataset else None
+    found = signals.orientation(dataset, axis) if momentum is None else None
+    if found is None or not np.isfinite(found).all() or len(found[0]) <= 8:
+        return []
+    seconds = signals.seconds(dataset)
+    tilt, node = (x - np.polyval(np.polyfit(seconds, x, 1), seconds) for x in found)
+    path = np.stack([node * np.sin(np.mean(found[0])), tilt], axis=1)
+    if not np.abs(path).max() > 0:
+        return []
+    title = "Nutation of the pole" if axis == "figure" else f"Nutation of the {axis}"
+    return [plane_of("nutation_path", title, FIGURE, path, ("longitude", "obliquity"))]
+
+
+def plane_of(key: str, title: str, color: Color, path: Array, names: tuple[str, str]) -> Plane:
+    """A plane of small angles (rows, 2), rad, in the unit that suits them, with rings about the origin."""
+    size = float(np.nanmax(np.linalg.norm(path, axis=1)))
+    unit = angle_unit(size)
+    shown = path * unit.per_radian
+    reach = size * unit.per_radian
+    power = 10.0 ** np.floor(np.log10(reach))
+    step = next(s for s in (5, 2, 1, 0.5) if s * power <= 0.75 * reach) * power
+    rings = tuple((k * step, f"{k * step:.3g} {unit.symbol}") for k in (1, 2) if k * step < 1.6 * reach)
+    return Plane(key, f"{title} [{unit.symbol}]", color, shown, rings=rings, names=names)
