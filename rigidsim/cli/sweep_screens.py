@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 import time
 from pathlib import Path
@@ -137,6 +138,10 @@ def print_sweep(result: SavedSweep) -> None:
         screen.print(f"drift    {name.removesuffix('_drift')}: at most {drift:.2g}", highlight=False)
     for text in told["warnings"]:
         screen.print(f"[yellow]warning[/]  {escape(text)}", highlight=False)
+    place = shlex.quote(result.place)
+    screen.print(escape(f"next     rigidsim plot {place}"), highlight=False)
+    screen.print(escape(f"         rigidsim view {place} --member 0"), highlight=False)
+    screen.print(escape(f"         rigidsim export {place} --format csv"), highlight=False)
 
 
 def print_sweep_plan(made: dict[str, Any]) -> None:

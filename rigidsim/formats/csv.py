@@ -11,6 +11,8 @@ import re
 from decimal import Decimal
 from pathlib import Path
 
+import numpy as np
+
 from rigidsim.formats.decimals import texts
 from rigidsim.formats.naming import named_epoch
 from rigidsim.formats.registry import Format, Source
@@ -31,9 +33,10 @@ def write_csv(table: Table, path: Path, source: Source) -> None:
     dates = _dates(table, source)
     wide = any(len(column.parts) > 1 for column in columns if "significant_bits" not in column.attributes)
     head = [
-        f"# {_plain(source.title)}: {table.rows} rows along {table.dim}",
+        f"# {_plain(source.title)}: {table.extent}",
         'read with pandas.read_csv(path, comment="#", float_precision="round_trip")',
-        "units: " + ", ".join(f"{column.name} [{column.units}]" for column in columns),
+        "units: " + ", ".join(f"{c.name} [{c.units}]" for c in columns if c.kind != "U"),
+        *(f"{column.name}: {column.flags}" for column in columns if column.flags),
     ]
     if wide:
         head.insert(2, f"numbers have {source.bits} bits; dtype=str keeps the digits that float64 can't hold")
@@ -45,10 +48,17 @@ def write_csv(table: Table, path: Path, source: Source) -> None:
         file.write("\n# ".join(head) + "\n")
         file.write(",".join(names) + "\n")
         for block in table.blocks(columns):
-            shown = [texts(parts, c.bits(source.bits)) for c, parts in zip(columns, block, strict=True)]
+            shown = [_shown(c, parts, source) for c, parts in zip(columns, block, strict=True)]
             if dates is not None:
                 shown.insert(1, [dates.text(time) for time in shown[columns.index(dates.times)]])
             file.writelines(",".join(row) + "\n" for row in zip(*shown, strict=True))
+
+
+def _shown(column: Column, parts: list[np.ndarray], source: Source) -> list[str]:
+    """One column's numbers, or its texts in quotes."""
+    if column.kind == "U":
+        return [f'"{_on_one_line(text).replace(chr(34), chr(34) * 2)}"' for text in parts[0]]
+    return texts(parts, column.bits(source.bits))
 
 
 @dataclass(frozen=True)
@@ -69,6 +79,8 @@ class _Dates:
 
 def _dates(table: Table, source: Source) -> _Dates | None:
     """Where time 0 is known and the calendar reaches from the first row to the last."""
+    if not table.dated:
+        return None
     times = next((c for c in table.columns if re.fullmatch(r"(.*_)?time", c.variable)), None)
     if times is None or not table.rows or not (source.naming.epoch or source.attributes.get("epoch")):
         return None
@@ -82,8 +94,12 @@ def _dates(table: Table, source: Source) -> _Dates | None:
 
 
 def _plain(text: str) -> str:
-    """On one line, whatever a title holds."""
-    return "".join(c if c.isprintable() else " " for c in text)[:200]
+    """On one line of some length, whatever a title holds."""
+    return _on_one_line(text)[:200]
+
+
+def _on_one_line(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 FORMAT = Format(write_csv, angles=True, side_tables=True)

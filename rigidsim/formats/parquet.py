@@ -19,17 +19,20 @@ def write_parquet(table: Table, path: Path, source: Source) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    kinds = {"f": pa.float64(), "i": pa.int64(), "M": pa.timestamp("ns"), "U": pa.string()}
     fields = []
     for column in table.columns:
         for part in range(len(column.parts)):
             told = {"units": column.units, "long_name": str(column.attributes.get("long_name", ""))}
             if part:
                 told["residual_of"] = column.name
+            elif column.flags:
+                told["flags"] = column.flags
             elif "exact_value" in column.attributes:
                 told["exact_value"] = " + ".join(
                     column.part_name(n) for n in reversed(range(len(column.parts)))
                 )
-            kind = pa.timestamp("ns") if column.is_date else pa.float64()
+            kind = kinds[column.kind]
             fields.append(pa.field(column.part_name(part), kind, nullable=column.is_date, metadata=told))
     schema = pa.schema(fields, metadata={str(key): str(value) for key, value in source.attributes.items()})
     with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=False) as writer:

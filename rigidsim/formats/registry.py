@@ -18,7 +18,7 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class Source:
-    """The run that a table is of.
+    """The run, or the sweep, that a table is of.
 
     Attributes:
         title: its name.

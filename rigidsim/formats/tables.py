@@ -33,7 +33,7 @@ class Column:
         index: of the component, beside the row.
         parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
         attributes: units, long_name, ... of the variable.
-        is_date: whether it holds datetime64 instead of float64.
+        kind: "f" for float64, "M" for datetime64, "i" for int64, "U" for texts.
         angle_unit: that its angles are converted to, and that the column's name ends with; None: as they are.
     """
 
@@ -42,13 +42,18 @@ class Column:
     index: tuple[int, ...]
     parts: tuple[str, ...]
     attributes: dict[str, Any]
-    is_date: bool = False
+    kind: str = "f"
     angle_unit: AngleUnit | None = None
 
     @property
     def name(self) -> str:
         """``angular_velocity_x``, or ``obliquity_figure_deg``."""
         return self.variable + self.suffix + self._unit
+
+    @property
+    def is_date(self) -> bool:
+        """Whether it holds datetime64."""
+        return self.kind == "M"
 
     @property
     def _unit(self) -> str:
@@ -60,6 +65,13 @@ class Column:
         if self.angle_unit is not None:
             return self.angle_unit.name
         return str(self.attributes.get("units", "1"))
+
+    @property
+    def flags(self) -> str:
+        """What the values of a status, or the bits of a mask, mean: "0 finished, 1 ..."; empty of others."""
+        codes = self.attributes.get("flag_values", self.attributes.get("flag_masks", ()))
+        names = str(self.attributes.get("flag_meanings", "")).split()
+        return ", ".join(f"{code} {name}" for code, name in zip(np.atleast_1d(codes), names, strict=True))
 
     def bits(self, of_run: int) -> int:
         """Of the significand that its digits are to show."""
@@ -90,6 +102,21 @@ class Table:
     def rows(self) -> int:
         """How many there are."""
         return int(self.dataset.sizes[self.dim])
+
+    @property
+    def is_main(self) -> bool:
+        """Whether it is the one that has the name of the run."""
+        return self.dim == "time"
+
+    @property
+    def dated(self) -> bool:
+        """Whether its times may be told as dates."""
+        return True
+
+    @property
+    def extent(self) -> str:
+        """What its rows are, for the comment at a file's top."""
+        return f"{self.rows} rows along {self.dim}"
 
     def column(self, name: str) -> Column | None:
         """By name; None where there is none."""
@@ -131,23 +158,32 @@ def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits
     names.sort(key=lambda name: (name != "time", name not in dataset.coords))
     columns: dict[str, list[Column]] = {}
     for name in names:
-        columns.setdefault(str(variables[name].dims[0]), []).extend(_columns(dataset, name, angle_unit))
+        columns.setdefault(str(variables[name].dims[0]), []).extend(columns_of(dataset, name, angle_unit))
     return [Table(dim, tuple(found), dataset, bits) for dim, found in columns.items() if found]
 
 
-def _columns(dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None) -> list[Column]:
+def columns_of(
+    dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None = None, rows: Sequence[str] = ()
+) -> list[Column]:
+    """The columns of a variable, one for each component; none for a residual, which its value's columns hold.
+
+    Args:
+        angle_unit: that angles are converted to.
+        rows: the dimensions that a table's rows run along; the variable's first by default.
+    """
     variable = dataset[name]
     if "residual_of" in variable.attrs:
         return []
+    beside = [str(dim) for dim in variable.dims if str(dim) not in (rows or (variable.dims[0],))]
     parts = tuple(parts_in(dataset, name))
     unit = angle_unit if variable.attrs.get("units") == RADIAN else None
-    is_date = variable.dtype.kind == "M"
+    kind = variable.dtype.kind if variable.dtype.kind in "fMi" else "U"
     labels = []
-    for dim in map(str, variable.dims[1:]):
+    for dim in beside:
         own = [str(x) for x in dataset[dim].values] if dim in dataset.coords else None
         labels.append(LABELS.get(dim) or own or [str(n) for n in range(variable.sizes[dim])])
     found = []
     for index in product(*(range(len(names)) for names in labels)):
         suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True))
-        found.append(Column(name, suffix, index, parts, dict(variable.attrs), is_date, unit))
+        found.append(Column(name, suffix, index, parts, dict(variable.attrs), kind, unit))
     return found

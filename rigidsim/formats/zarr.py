@@ -2,43 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import xarray
 
 from rigidsim.formats.angles import RADIAN, converted
+from rigidsim.formats.member_tables import MemberTable
 from rigidsim.formats.registry import Format, Source
 from rigidsim.formats.tables import Table
 from rigidsim.look.angle_units import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
+from rigidsim.store.sweep_dataset import chunk_shape
 from rigidsim.store.variables import parts_in
 
 BLOCK_ROWS = 8 * CHUNK_ROWS
+_SLAB_NUMBERS = 1 << 24  # 128 MB
 
 
 def write_zarr(table: Table, path: Path, source: Source) -> None:
-    """Write a store, a folder that doesn't exist yet, block by block along time.
+    """Write a store, a folder that doesn't exist yet, block by block along time, or a sweep's first axis.
 
     Args:
-        table: along time; its whole dataset is written.
+        table: along time, or of a sweep's members; its whole dataset is written.
         path: the folder.
         source: the run, for the attributes of the store.
     """
     dataset = table.dataset
-    along = dataset[[name for name in dataset.variables if "time" in dataset[name].dims]]
-    for first in range(0, max(dataset.sizes["time"], 1), BLOCK_ROWS):
-        block = _plain(along.isel(time=slice(first, first + BLOCK_ROWS)), source)
+    attributes = {str(key): _json(value) for key, value in source.attributes.items()}
+    members = table.members if isinstance(table, MemberTable) else ()
+    dim = members[0] if members else table.dim
+    rows = _slab(dataset, members) if members else BLOCK_ROWS
+    along = dataset[[name for name in dataset.variables if dim in dataset[name].dims]]
+    for first in range(0, max(dataset.sizes[dim], 1), rows):
+        block = _plain(along.isel({dim: slice(first, first + rows)}), source)
         if first:
-            block = block.drop_vars([name for name in block.variables if "time" not in block[name].dims])
-            block.to_zarr(path, mode="a", append_dim="time", zarr_format=2, consolidated=False)
+            block = block.drop_vars([name for name in block.variables if dim not in block[name].dims])
+            block.to_zarr(path, mode="a", append_dim=dim, zarr_format=2, consolidated=False)
         else:
-            block.attrs = {str(key): _json(value) for key, value in source.attributes.items()}
-            chunks = {name: {"chunks": _chunks(block[name])} for name in block.variables
-                      if "time" in block[name].dims}  # fmt: skip
+            block.attrs = attributes
+            chunks = {name: {"chunks": _chunks(dataset[name], members)} for name in block.variables
+                      if dim in block[name].dims}  # fmt: skip
             block.to_zarr(path, mode="w", encoding=chunks, zarr_format=2, consolidated=False)
-    rest = [name for name in dataset.variables if "time" not in dataset[name].dims]
-    _plain(dataset[rest], source).to_zarr(path, mode="a", zarr_format=2, consolidated=True)
+    rest = [name for name in dataset.variables if dim not in dataset[name].dims]
+    last = _plain(dataset[rest], source)
+    last.attrs = attributes
+    if members:  # no variable that is written beside a vector's components tells that they are a coordinate
+        last = last.reset_coords()
+        beside = [str(name) for name in dataset.coords if name not in dataset.dims]
+        last.attrs = attributes | ({"coordinates": " ".join(beside)} if beside else {})
+    last.to_zarr(path, mode="a", zarr_format=2, consolidated=True)
 
 
 def _plain(dataset: xarray.Dataset, source: Source) -> xarray.Dataset:
@@ -68,8 +82,18 @@ def _converted(dataset: xarray.Dataset, unit: AngleUnit, bits: int) -> xarray.Da
     return dataset.assign(changed)
 
 
-def _chunks(variable: xarray.DataArray) -> tuple[int, ...]:
-    return (CHUNK_ROWS, *variable.shape[1:])
+def _chunks(variable: xarray.DataArray, members: Sequence[str]) -> tuple[int, ...]:
+    """Rows of time; of a sweep members, as its dataset has them."""
+    if not members:
+        return (CHUNK_ROWS, *variable.shape[1:])
+    of_members = len([dim for dim in variable.dims if dim in members])
+    return chunk_shape(variable.shape[:of_members], variable.shape[of_members:])
+
+
+def _slab(dataset: xarray.Dataset, members: Sequence[str]) -> int:
+    """Values of the first axis whose members are held in memory at once."""
+    numbers = sum(found.size for found in dataset.variables.values() if members[0] in found.dims)
+    return max(1, _SLAB_NUMBERS * dataset.sizes[members[0]] // max(numbers, 1))
 
 
 def _json(value: Any) -> Any:

@@ -175,7 +175,7 @@ def write_dataset(
             created = _declared(file, sweep, found, beside)
             for name, (target_variable, described) in created.items():
                 item = _item(sources, described.variable.item)
-                for first, shape, flat in _boxes(sweep.shape, math.prod(described.extra)):
+                for first, shape, flat in boxes(sweep.shape, math.prod(described.extra)):
                     values = _values(name, described, item, sources, reader, flat)
                     box = values.reshape(*shape, *described.extra)
                     write_box(target_variable, (*first, *(0 for _ in described.extra)), box)
@@ -276,9 +276,17 @@ def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]
     return (*reversed(chunk), *(max(1, n) for n in extra))
 
 
-def _boxes(members: Sequence[int], extra: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], range]]:
-    """Consecutive members that are a box of their dimensions: first corner, shape, and which they are."""
-    most = max(1, _BOX_NUMBERS // max(1, extra))
+def boxes(
+    members: Sequence[int], extra: int, numbers: int = _BOX_NUMBERS
+) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], range]]:
+    """Consecutive members that are a box of their dimensions: first corner, shape, and which they are.
+
+    Args:
+        members: along each of their dimensions.
+        extra: numbers of one member.
+        numbers: of a box, unless a single member has more.
+    """
+    most = max(1, numbers // max(1, extra))
     axis, within = len(members) - 1, 1
     while axis > 0 and within * members[axis] <= most:
         within *= members[axis]

@@ -1,23 +1,31 @@
-"""``rigidsim export``: a run's dataset in the formats of other tools."""
+"""``rigidsim export``: the dataset of a run or a sweep in the formats of other tools."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigidsim.errors import RigidsimError, RunFolderError
+from rigidsim.errors import RESUME, RigidsimError, RunFolderError
+from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.angles import angle_unit_named
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.registry import Format, Source, format_named
 from rigidsim.formats.tables import Table, tables_of
+from rigidsim.scene.arithmetic import working_bits
 from rigidsim.store import atomic
+from rigidsim.store.variables import parts_in
+from rigidsim.workflows.read import parse
+
+_PART_BITS = 53  # of a double: a value that n of them hold has n times as many at most
 
 if TYPE_CHECKING:
     import xarray
 
+    from rigidsim.look.angle_units import AngleUnit
     from rigidsim.store.run import SavedRun
+    from rigidsim.store.sweep_run import SavedSweep
 
 
 def export(
@@ -48,25 +56,92 @@ def export(
         RigidsimError: unknown format or unit, a package is missing, or the format can't hold the run.
         RunFolderError: the run is damaged or empty.
     """
+    found, unit = _asked(file_format, angle_unit)
+    name = run.folder.path.resolve().name
+    target = Path(f"{name}.{file_format}") if out is None else Path(out)
+    with run.opened(indexed=False) as dataset:  # sample times are not loaded as an index
+        bits = _bits(dataset)
+        attributes = dict(dataset.attrs, status=run.status)
+        source = Source(name, bits, attributes, naming or Naming(), unit)
+        return _written(tables_of(dataset, unit, bits), target, found, source, force)
+
+
+def export_sweep(
+    sweep: SavedSweep,
+    file_format: str,
+    out: str | Path | None = None,
+    *,
+    force: bool = False,
+    naming: Naming | None = None,
+    angle_unit: str | None = None,
+) -> list[Path]:
+    """Write the members of a finished sweep in another format; block by block, so that memory stays small.
+
+    Args:
+        sweep: from ``open_sweep``.
+        file_format: csv, parquet or zarr.
+        out: as in ``export``. In csv and parquet it has a row per member; whole series, occurrences
+            of an event and spectral lines go to long tables beside it: ``NAME.time.csv``,
+            ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
+        force: replace what is there.
+        naming: must be empty: what it says is for messages and dates, which sweeps don't have.
+        angle_unit: as in ``export``.
+
+    Returns:
+        What was written; the table of the members first.
+
+    Raises:
+        RigidsimError: unknown format or unit, a package is missing, or the format can't hold a sweep.
+        RunFolderError: the sweep isn't finished, or it is damaged.
+    """
+    from rigidsim.formats.member_tables import member_tables
+
+    found, unit = _asked(file_format, angle_unit)
+    if file_format not in FOR_SWEEPS:
+        raise RigidsimError(
+            f"--format: given {file_format}, which holds a single motion, but {sweep.place} is a sweep; "
+            f"allowed: {', '.join(FOR_SWEEPS)}. rigidsim run {sweep.folder.config} --member N runs one "
+            f"member by itself, which {file_format} can hold"
+        )
+    if naming not in (None, Naming()):
+        raise RigidsimError(
+            "--epoch, --axes and --object-name are for single runs: tables of a sweep have times in s and no "
+            "dates; leave them out"
+        )
+    if not sweep.finished:
+        raise RunFolderError(f"{sweep.place}: the sweep is {sweep.status}; {RESUME} completes it")
+    name = sweep.folder.path.resolve().name
+    target = Path(f"{name}.{file_format}") if out is None else Path(out)
+    with sweep.dataset as dataset:
+        bits = _bits_of_members(dataset)
+        tables = member_tables(dataset, unit, bits)
+        source = Source(name, bits, dict(dataset.attrs), Naming(), unit)
+        return _written(tables, target, found, source, force)
+
+
+def _asked(file_format: str, angle_unit: str | None) -> tuple[Format, AngleUnit | None]:
+    """The format and the unit of angles.
+
+    Raises:
+        RigidsimError: one is unknown, or they don't go together.
+    """
     found = format_named(file_format)
     unit = None if angle_unit is None else angle_unit_named(angle_unit)
     if unit is not None and not found.angles:
         raise RigidsimError(
             f"--angle-unit: given {angle_unit}, but {file_format} prescribes its units; leave it out"
         )
-    name = run.folder.path.resolve().name
-    target = Path(f"{name}.{file_format}") if out is None else Path(out)
-    with run.opened(indexed=False) as dataset:  # sample times are not loaded as an index
-        bits = _bits(dataset)
-        tables = tables_of(dataset, unit, bits)
-        kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
-        for path in kept:
-            _refuse_existing(path, found, force)
-        attributes = dict(dataset.attrs, status=run.status)
-        source = Source(name, bits, attributes, naming or Naming(), unit)
-        for path, table in kept.items():
-            with _replacing(path, found) as new:
-                found.write(table, new, source)
+    return found, unit
+
+
+def _written(tables: Sequence[Table], target: Path, found: Format, source: Source, force: bool) -> list[Path]:
+    """Write the tables that a format takes, the first to the target itself."""
+    kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
+    for path in kept:
+        _refuse_existing(path, found, force)
+    for path, table in kept.items():
+        with _replacing(path, found) as new:
+            found.write(table, new, source)
     return list(kept)
 
 
@@ -79,9 +154,22 @@ def _bits(dataset: xarray.Dataset) -> int:
     return bits
 
 
+def _bits_of_members(dataset: xarray.Dataset) -> int:
+    """Enough to tell all members' numbers apart: those of the config's precision, where it is one for all.
+
+    Where precision is swept, or left to ``accuracy``, as many as the dataset's residuals can hold.
+    """
+    config = parse(str(dataset.attrs["config"]), source="the sweep's config").config
+    integrator, axes = config.integrator, config.sweep.axes if config.sweep else {}
+    chosen = integrator.accuracy is not None or integrator.accuracy_axis is not None
+    if chosen or any(key.startswith("integrator") for key in axes):
+        return _PART_BITS * max(len(parts_in(dataset, str(name))) for name in dataset.data_vars)
+    return working_bits(integrator.precision)
+
+
 def _beside(target: Path, table: Table) -> Path:
-    """The file of a table: that of samples has the name itself."""
-    return target if table.dim == "time" else target.with_name(f"{target.stem}.{table.dim}{target.suffix}")
+    """The file of a table: that of samples, or of members, has the name itself."""
+    return target if table.is_main else target.with_name(f"{target.stem}.{table.dim}{target.suffix}")
 
 
 def _refuse_existing(path: Path, found: Format, force: bool) -> None:

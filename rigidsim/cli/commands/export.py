@@ -1,4 +1,4 @@
-"""``rigidsim export``: a run in the formats of other tools."""
+"""``rigidsim export``: a run or a sweep in the formats of other tools."""
 
 from __future__ import annotations
 
@@ -52,15 +52,27 @@ def export(
 ) -> None:
     """Write a run for other tools: tables with every digit, or CCSDS attitude and orbit messages.
 
+    Of a sweep csv and parquet hold a row per member, and zarr its dataset.
+
     Example: rigidsim export runs/intermediate_axis --format csv
     """
     from rigidsim.formats.naming import Naming
     from rigidsim.store.run import open_run
+    from rigidsim.store.sweep_folder import is_sweep
     from rigidsim.workflows.export import export as write
+    from rigidsim.workflows.export import export_sweep
 
     given = {"epoch": epoch, "axes": axes, "object_name": object_name}
     naming = Naming(**{key: value for key, value in given.items() if value is not None})
-    for path in write(
-        open_run(run_path), file_format, out, force=force, naming=naming, angle_unit=angle_unit
-    ):
+    if is_sweep(run_path):
+        from rigidsim.store.sweep_run import open_sweep
+
+        written = export_sweep(
+            open_sweep(run_path), file_format, out, force=force, naming=naming, angle_unit=angle_unit
+        )
+    else:
+        written = write(
+            open_run(run_path), file_format, out, force=force, naming=naming, angle_unit=angle_unit
+        )
+    for path in written:
         print(path)

@@ -1,0 +1,227 @@
+"""Exports of sweeps: every number of the dataset, by member, in files that other tools read."""
+
+from __future__ import annotations
+
+import csv
+from decimal import Decimal, localcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner, Result
+
+import rigidsim
+from rigidsim.cli.app import app
+from rigidsim.errors import RunFolderError
+from rigidsim.store.sweep_run import SavedSweep
+from rigidsim.workflows.export import export_sweep
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.sweep import sweep as run_sweep
+
+CONFIG = """\
+name = "box"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1, 0.05]
+[time]
+end = 10
+samples = 11
+[integrator]
+formulation = "rates"
+precision = "extended"
+[output]
+estimate = false
+record = ["angular_velocity", "energy"]
+[[events]]
+name = "middle"
+expression = "wx"
+[sweep]
+keep = ["final", "events", "section", "series"]
+most_events = 3
+axes."initial.angular_velocity" = {values = [[0.1, 1, 0.3], [-0.3, 1, 0.1]], name = "w"}
+axes."body.principal_moments[2]" = {linspace = [2.25, 2.75, 3], name = "C"}
+"""
+ZIPPED = """\
+name = "pairs"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1, 0.05]
+[time]
+end = 2
+samples = 3
+[[loads]]
+kind = "torque"
+components = ["0", "0", "wz^3"]
+[output]
+estimate = false
+record = ["nutation_angle"]
+[sweep]
+mode = "zip"
+keep = ["final"]
+axes."integrator.formulation" = {values = ["quaternion", "rates", "quaternion"], name = "carried"}
+axes."initial.angular_velocity[2]" = {values = [0.1, 3, 0.2], name = "w3"}
+"""
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def exported(sweep: SavedSweep, file_format: str, folder: Path, *options: str) -> Result:
+    to = str(folder / f"out.{file_format}")
+    return CliRunner().invoke(
+        app, ["export", str(sweep.place), "--format", file_format, "--out", to, *options]
+    )
+
+
+def written(sweep: SavedSweep, file_format: str, folder: Path, *options: str) -> list[Path]:
+    told = exported(sweep, file_format, folder, *options)
+    assert told.exit_code == 0, told.output
+    return [Path(line) for line in told.stdout.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory: pytest.TempPathFactory) -> SavedSweep:
+    return run_sweep(parse(CONFIG), out=tmp_path_factory.mktemp("sweeps"))
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> SavedSweep:
+    return run_sweep(parse(ZIPPED), out=tmp_path_factory.mktemp("sweeps"))
+
+
+def test_csv_has_a_row_per_member_with_every_digit(box: SavedSweep, tmp_path: Path) -> None:
+    paths = written(box, "csv", tmp_path)
+    assert [path.name for path in paths] == ["out.csv", "out.time.csv", "out.middle_occurrence.csv"]
+    dataset, found = box.dataset, rows(paths[0])
+    assert list(found[0])[:8] == [
+        "member", "w_value_0", "w_value_1", "w_value_2", "C", "status", "warnings", "steps",
+    ]  # fmt: skip
+    assert [int(row["member"]) for row in found] == list(range(6))
+    assert [row["C"] for row in found] == ["2.25", "2.5", "2.75"] * 2
+    assert [row["w_value_0"] for row in found] == ["0.1"] * 3 + ["-0.3"] * 3
+    assert any(dataset.angular_velocity_final_lo.values.ravel())
+    for number, row in enumerate(found):
+        cell = dataset.isel(w=number // 3, C=number % 3)
+        assert int(row["status"]) == int(cell.status) == 0
+        assert int(row["steps"]) == int(cell.steps)
+        assert int(row["middle_count"]) == int(cell.middle_count)
+        assert row["middle_first"] == repr(float(cell.middle_first))
+        for axis in "xyz":
+            value = cell.sel(body_axis=axis)
+            with localcontext() as context:
+                context.prec = 400
+                whole = Decimal(float(value.angular_velocity_final))
+                whole += Decimal(float(value.angular_velocity_final_lo))
+                error = abs(Decimal(row[f"angular_velocity_final_{axis}"]) - whole)
+                assert error < abs(whole) * Decimal(2) ** -65  # half of the spacing of 64 bits
+    head = [line for line in paths[0].read_text().splitlines() if line.startswith("#")]
+    assert head[0] == "# box: 6 members along w, C"
+    assert any(line.startswith("# status: 0 finished, 1 finished_event, ") for line in head)
+    assert any(line.startswith("# warnings: 1 drift, 2 singularity, ") for line in head)
+
+
+def test_series_and_events_are_long_tables(box: SavedSweep, tmp_path: Path) -> None:
+    _, series, events = written(box, "csv", tmp_path)
+    dataset, found = box.dataset, rows(series)
+    assert len(found) == 6 * 11
+    assert [float(row["time"]) for row in found] == [*dataset.time.values] * 6
+    values = dataset.angular_velocity.sel(body_axis="y").values.ravel()
+    assert [float(row["angular_velocity_y"]) for row in found] == values.tolist()
+    assert [row["C"] for row in found[11:22]] == ["2.5"] * 11
+    found = rows(events)
+    counts = dataset.middle_count.values.ravel()
+    assert 0 < counts.sum() < counts.size * dataset.sizes["middle_occurrence"]  # some slots are empty
+    assert [int(row["member"]) for row in found] == np.repeat(np.arange(6), counts).tolist()
+    assert [int(row["middle_occurrence"]) for row in found] == [i for n in counts for i in range(n)]
+    times = dataset.middle_times.values
+    assert [float(row["middle_times"]) for row in found] == times[~np.isnan(times)].tolist()
+
+
+def test_tables_are_the_same_read_in_small_blocks(
+    box: SavedSweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("zarr")
+    whole = [path.read_bytes() for path in written(box, "csv", tmp_path)]
+    for numbers in (30, 100):  # two samples of a member, or a few members
+        monkeypatch.setattr("rigidsim.formats.member_tables._BLOCK_NUMBERS", numbers)
+        assert [path.read_bytes() for path in written(box, "csv", tmp_path, "--force")] == whole
+    monkeypatch.setattr("rigidsim.formats.zarr._SLAB_NUMBERS", 1)
+    (store,) = written(box, "zarr", tmp_path)
+    with xarray.open_zarr(store) as found:
+        xarray.testing.assert_identical(found.load().drop_attrs(), box.dataset.load().drop_attrs())
+
+
+def test_parquet_has_residuals_and_whole_numbers(box: SavedSweep, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    main, series, _ = written(box, "parquet", tmp_path)
+    dataset, found = box.dataset, parquet.read_table(main)
+    assert found.num_rows == 6
+    assert str(found.schema.field("status").type) == str(found.schema.field("member").type) == "int64"
+    for name in ("angular_velocity_final", "angular_velocity_final_lo"):
+        expected = dataset[name].sel(body_axis="z").values.ravel()
+        np.testing.assert_array_equal(found[f"{name}_z"].to_numpy(), expected)
+    assert found.schema.field("C").metadata[b"units"] == b"kg m^2"
+    assert found.schema.field("status").metadata[b"flags"].startswith(b"0 finished, ")
+    assert parquet.read_table(series).num_rows == 66
+
+
+def test_zarr_is_the_dataset_of_the_sweep(box: SavedSweep, tmp_path: Path) -> None:
+    pytest.importorskip("zarr")
+    (store,) = written(box, "zarr", tmp_path)
+    with xarray.open_zarr(store) as found, box.dataset as dataset:
+        assert found.status.dtype == dataset.status.dtype
+        assert found.angular_velocity.encoding["chunks"] == (2, 3, 11, 3)
+        assert (set(found.variables), set(found.coords)) == (set(dataset.variables), set(dataset.coords))
+        for name in dataset.variables:
+            np.testing.assert_array_equal(found[name].values, dataset[name].values, strict=True)
+        assert found.attrs["config"] == dataset.attrs["config"]
+
+
+def test_texts_failures_and_angles(pairs: SavedSweep, tmp_path: Path) -> None:
+    parquet, _ = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("zarr")
+    dataset = pairs.dataset
+    assert dataset.failed_member.values.tolist() == [1]  # which spins up beyond all bounds
+    (path,) = written(pairs, "csv", tmp_path, "--angle-unit", "deg")
+    found = rows(path)
+    assert [row["carried"] for row in found] == ["quaternion", "rates", "quaternion"]
+    assert [row["w3"] for row in found] == ["0.1", "3.0", "0.2"]
+    assert [row["failed_reason"] for row in found] == ["", str(dataset.failed_reason.values[0]), ""]
+    np.testing.assert_allclose(
+        [float(row["nutation_angle_final_deg"]) for row in found],
+        np.rad2deg(dataset.nutation_angle_final.values),
+        rtol=4e-16,
+    )
+    (path,) = written(pairs, "parquet", tmp_path)
+    assert parquet.read_table(path)["carried"].to_pylist() == ["quaternion", "rates", "quaternion"]
+    (path,) = written(pairs, "zarr", tmp_path)
+    with xarray.open_zarr(path) as store:
+        assert store.carried.values.tolist() == ["quaternion", "rates", "quaternion"]
+        assert store.failed_reason.values.tolist() == dataset.failed_reason.values.tolist()
+
+
+def test_what_makes_no_sense_is_refused(box: SavedSweep, tmp_path: Path) -> None:
+    for file_format in ("aem", "oem"):
+        told = exported(box, file_format, tmp_path)
+        assert told.exit_code == 2
+        assert f"given {file_format}, which holds a single motion" in told.output
+        assert "allowed: csv, parquet, zarr. rigidsim run" in told.output
+        assert "--member N" in told.output
+    told = exported(box, "csv", tmp_path, "--epoch", "J2000")
+    assert told.exit_code == 2
+    assert "leave them out" in told.output
+    assert list(tmp_path.iterdir()) == []
+    written(box, "csv", tmp_path)
+    assert "--force replaces it" in exported(box, "csv", tmp_path).output
+
+
+def test_an_unfinished_sweep_is_not_exported(box: SavedSweep, tmp_path: Path) -> None:
+    begun = SavedSweep(box.folder, {**box.summary, "status": "interrupted"})
+    with pytest.raises(RunFolderError, match=r"is interrupted; .* completes it"):
+        export_sweep(begun, "csv", tmp_path / "out.csv")
+    assert list(tmp_path.iterdir()) == []
+    assert rigidsim.open_sweep(box.place).finished
