@@ -108,6 +108,9 @@ class MemberTable(Table):
         dims = self.members if self.dim == MEMBER else (*self.members, self.dim)
         key: Any = (slice(None), *column.index)
         parts = [block.rows(name, dims)[key] for name in column.parts]
+        for number in range(1, len(parts)):  # members of fewer bits than others have no residuals: nan
+            empty = np.isnan(parts[number]) & ~np.isnan(parts[0])
+            parts[number] = np.where(empty, 0.0, parts[number])
         unit = column.angle_unit
         return parts if unit is None else converted(parts, unit, column.bits(self.bits))
 

@@ -60,8 +60,9 @@ estimate = false
 record = ["nutation_angle"]
 [sweep]
 mode = "zip"
-keep = ["final"]
-axes."integrator.formulation" = {values = ["quaternion", "rates", "quaternion"], name = "carried"}
+keep = ["final", "series"]
+axes."integrator.precision" = {values = ["double", "extended", "quadruple"]}
+axes."time.end" = {values = [2, 2, 1]}
 axes."initial.angular_velocity[2]" = {values = [0.1, 3, 0.2], name = "w3"}
 """
 
@@ -186,9 +187,11 @@ def test_texts_failures_and_angles(pairs: SavedSweep, tmp_path: Path) -> None:
     parquet, _ = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("zarr")
     dataset = pairs.dataset
     assert dataset.failed_member.values.tolist() == [1]  # which spins up beyond all bounds
-    (path,) = written(pairs, "csv", tmp_path, "--angle-unit", "deg")
+    path, series = written(pairs, "csv", tmp_path, "--angle-unit", "deg")
+    assert series.name == "out.sample.csv"  # members have times of their own
+    assert [row["time"] for row in rows(series) if row["member"] == "2"] == ["0.0", "0.5", "1.0"]
     found = rows(path)
-    assert [row["carried"] for row in found] == ["quaternion", "rates", "quaternion"]
+    assert [row["precision"] for row in found] == ["double", "extended", "quadruple"]
     assert [row["w3"] for row in found] == ["0.1", "3.0", "0.2"]
     assert [row["failed_reason"] for row in found] == ["", str(dataset.failed_reason.values[0]), ""]
     np.testing.assert_allclose(
@@ -196,12 +199,23 @@ def test_texts_failures_and_angles(pairs: SavedSweep, tmp_path: Path) -> None:
         np.rad2deg(dataset.nutation_angle_final.values),
         rtol=4e-16,
     )
-    (path,) = written(pairs, "parquet", tmp_path)
-    assert parquet.read_table(path)["carried"].to_pylist() == ["quaternion", "rates", "quaternion"]
+    path, _ = written(pairs, "parquet", tmp_path)
+    assert parquet.read_table(path)["precision"].to_pylist() == ["double", "extended", "quadruple"]
     (path,) = written(pairs, "zarr", tmp_path)
     with xarray.open_zarr(path) as store:
-        assert store.carried.values.tolist() == ["quaternion", "rates", "quaternion"]
+        assert store.precision.values.tolist() == ["double", "extended", "quadruple"]
         assert store.failed_reason.values.tolist() == dataset.failed_reason.values.tolist()
+
+
+def test_digits_are_enough_for_the_finest_of_several_precisions(pairs: SavedSweep, tmp_path: Path) -> None:
+    path, _ = written(pairs, "csv", tmp_path)
+    finest, text = pairs.dataset.isel(member=2), rows(path)[2]["nutation_angle_final"]
+    parts = [finest[f"nutation_angle_final{part}"] for part in ("_lo2", "_lo", "")]
+    with localcontext() as context:
+        context.prec = 400
+        whole = sum((Decimal(float(part)) for part in parts), Decimal(0))
+        assert abs(Decimal(text) - whole) < whole * Decimal(2) ** -114
+    assert float(parts[1]) != 0
 
 
 def test_what_makes_no_sense_is_refused(box: SavedSweep, tmp_path: Path) -> None:
