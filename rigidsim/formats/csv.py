@@ -38,6 +38,9 @@ def write_csv(table: Table, path: Path, source: Source) -> None:
         "units: " + ", ".join(f"{c.name} [{c.units}]" for c in columns if c.kind != "U"),
         *(f"{column.name}: {column.flags}" for column in columns if column.flags),
     ]
+    swept = {c.variable: c.attributes["swept_key"] for c in columns if "swept_key" in c.attributes}
+    if swept:
+        head.append("axes: " + ", ".join(f"{name} is {_plain(key)}" for name, key in swept.items()))
     if wide:
         head.insert(2, f"numbers have {source.bits} bits; dtype=str keeps the digits that float64 can't hold")
     names = [column.name for column in columns]

@@ -122,6 +122,7 @@ def test_csv_has_a_row_per_member_with_every_digit(box: SavedSweep, tmp_path: Pa
                 assert error < abs(whole) * Decimal(2) ** -65  # half of the spacing of 64 bits
     head = [line for line in paths[0].read_text().splitlines() if line.startswith("#")]
     assert head[0] == "# box: 6 members along w, C"
+    assert "# axes: w_value is initial.angular_velocity, C is body.principal_moments[2]" in head
     assert any(line.startswith("# status: 0 finished, 1 finished_event, ") for line in head)
     assert any(line.startswith("# warnings: 1 drift, 2 singularity, ") for line in head)
 
