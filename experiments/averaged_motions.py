@@ -56,7 +56,7 @@ def draw(ran: list[Member], count: int, out: Path) -> None:
     title = (
         f"{len(ran)} of {count} random bodies have an average, and its announced error covers the true one"
     )
-    figure = new_figure(7.6, 6.2, title)
+    figure = new_figure(8.4, 6.2, title)
     axes = figure.subplots()
     for tumbles, color, label in ((False, BLUE, "principal rotation"), (True, ORANGE, "tumbling")):
         points = [(one.true, one.announced) for one in ran if one.tumbles == tumbles]
