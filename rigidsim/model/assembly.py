@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import heyoka as hy
 
-from rigidsim.model.averaged.states import averaged_states
 from rigidsim.model.canonical import MOMENTA, CanonicalStates, canonical_states, hamilton_equations
 from rigidsim.model.equations import (
     flight_equations,
@@ -53,6 +52,8 @@ def assemble_states(
     """
     requirements, numbers = plan.requirements, plan.numbers
     if plan.average is not None:
+        from rigidsim.model.averaged.states import averaged_states
+
         return averaged_states(
             plan.scene, plan.average, plan.loads, plan.scaling, numbers, plan.orbit_tags, number
         )

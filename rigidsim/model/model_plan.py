@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from typing import TYPE_CHECKING
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.averaged.average import Average, average_of
-from rigidsim.model.averaged.states import WHY, refuse_untold
 from rigidsim.model.load import Load
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
@@ -25,6 +24,9 @@ from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces, surfaces_of
 from rigidsim.scene.tabulated_orbit import TabulatedOrbit
+
+if TYPE_CHECKING:
+    from rigidsim.model.averaged.average import Average
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,9 @@ def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
 
 def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
     """Of a motion averaged over its rotation, and maybe over its sources' orbits."""
+    from rigidsim.model.averaged.average import average_of
+    from rigidsim.model.averaged.states import WHY, refuse_untold
+
     average = average_of(scene, loads)
     record = scene.config.output.record
     refuse_untold(average, record)

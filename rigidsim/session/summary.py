@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.session.advice import advice_on
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words
@@ -24,6 +23,7 @@ from rigidsim.store.attributes import RootAttributes, Use
 from rigidsim.store.summary import Summary, as_fields
 from rigidsim.store.summary_parts import (
     Accuracy,
+    Advice,
     BitForBit,
     Caution,
     ChartChanges,
@@ -100,9 +100,18 @@ def summarise(
         events=events,
         event_times=event_times,
         chart_changes=chart_changes,
-        advice=advice_on(found),
+        advice=_advice(found),
         undefined_samples={name: seen.count for name, seen in found.statistics.undefined.items()},
     )
+
+
+def _advice(found: Diagnostics) -> tuple[Advice, ...]:
+    """What would do better; without an estimate nobody knows."""
+    if found.estimate is None:
+        return ()
+    from rigidsim.session.advice import advice_on
+
+    return advice_on(found)
 
 
 def cost_so_far(prepared: InitialValueProblem, progress: Progress, phases: Phases, effort: Effort) -> Cost:
