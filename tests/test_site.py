@@ -109,6 +109,18 @@ def test_every_config_is_in_the_gallery() -> None:
     assert [n for n in names if not (ROOT / "docs" / "figures" / "gallery" / f"{n}.png").exists()] == []
 
 
+def test_a_site_built_before_is_no_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """docs/_site has copies of the notebooks for download."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "builder"))
+    import staging
+
+    for name in ("index.md", "notebooks/first.ipynb", "_site/_downloads/76a2/first.ipynb", "_site/a.md"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    found = [str(page.relative_to(tmp_path)) for page in staging.sources(tmp_path)]
+    assert found == ["index.md", "notebooks/first.ipynb"]
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("sphinx", reason="pip install -e '.[docs]'")

@@ -39,7 +39,7 @@ def gather(folder: Path) -> list[Path]:
     Raises:
         DeadLinkError: with all dead links of all pages.
     """
-    pages = {page: place_of(page) for page in [*sorted(DOCS.rglob("*.md")), *_notebooks(), *ELSEWHERE]}
+    pages = {page: place_of(page) for page in [*sources(DOCS), *ELSEWHERE]}
     pages.pop(ROOT / "README.md", None)  # the site begins with docs/index.md
     dead: list[str] = []
     for page, place in pages.items():
@@ -89,8 +89,10 @@ def _toctree(caption: str, names: list[str]) -> str:
     return f"```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{entries}\n```"
 
 
-def _notebooks() -> list[Path]:
-    return sorted(DOCS.rglob("*.ipynb"))
+def sources(folder: Path) -> list[Path]:
+    """The pages and notebooks below a folder, without those of a site that was built into it before."""
+    found = [*sorted(folder.rglob("*.md")), *sorted(folder.rglob("*.ipynb"))]
+    return [page for page in found if not any(p.startswith("_") for p in page.relative_to(folder).parts)]
 
 
 def _notebook_text(page: Path) -> str:

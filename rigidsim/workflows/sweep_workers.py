@@ -61,9 +61,10 @@ class Workers:
             try:
                 while waiting or running:
                     while waiting and len(running) < 2 * self._count:  # one ahead for each
-                        tile = waiting.pop()
+                        tile = waiting[-1]  # waits on where the pool broke a moment ago and takes no more
                         file = between / str(tile)
                         running[pool.submit(leave_tile, file, *task(generation, tile))] = tile
+                        waiting.pop()
                     done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
                     if not done:
                         _refuse_dead(pool)
@@ -75,7 +76,7 @@ class Workers:
                         file.unlink()
             except BrokenProcessPool:
                 lost = list(running.values())
-                deaths.update(lost)
+                deaths.update(lost or waiting[-1:])
                 _refuse_deadly(generation, deaths)
                 waiting += sorted(lost, reverse=True)
             finally:

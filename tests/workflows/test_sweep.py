@@ -10,7 +10,9 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures.process import _ResultItem
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool, _ResultItem
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +38,7 @@ from rigidsim.workflows.sweep import sweep as run_sweep
 from rigidsim.workflows.sweep_members import run_members, sweep_of
 from rigidsim.workflows.sweep_verify import verify_sweep
 from rigidsim.workflows.sweep_ways import task
-from rigidsim.workflows.sweep_workers import leave_tile
+from rigidsim.workflows.sweep_workers import Workers, leave_tile
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -495,6 +497,31 @@ def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: P
     assert killer.killed
     expected = open_sweep(folder).dataset.angular_velocity_final
     np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
+
+
+def test_no_tile_is_lost_to_a_pool_that_breaks(folder: Path) -> None:
+    """A worker may die while the next tile is handed in, which the pool then refuses."""
+
+    class Pool:
+        taken = 0
+
+        def submit(self, function: Callable[..., int], *of: object) -> Future[int]:
+            Pool.taken += 1
+            if Pool.taken in (1, 3, 4):
+                raise BrokenProcessPool("a worker died")
+            done: Future[int] = Future()
+            done.set_result(function(*of))
+            return done
+
+        def shutdown(self, **_: object) -> None: ...
+
+    class Breaking(Workers):
+        def _pool(self, *_: object) -> Pool:  # type: ignore[override]
+            return Pool()
+
+    (generation,) = SweepFolder(open_sweep(folder).folder.path).generations()
+    tiles = range(generation.tiles)
+    assert sorted(tile for tile, _ in Breaking(2).images(generation, tiles)) == list(tiles)
 
 
 def test_what_a_worker_sends_back_is_one_write(folder: Path, tmp_path: Path) -> None:
