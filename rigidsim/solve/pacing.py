@@ -133,7 +133,7 @@ class WayFinder:
                 if stepper.at_whole_time and left >= pacing.least_grid_steps:
                     return Way.GRID, self._grid_steps(left)
                 limit = corrected.left  # to where a grid can start
-            elif spacing <= pacing.block_spacing:
+            if spacing <= pacing.block_spacing:
                 if min(left, corrected.left) >= pacing.least_block_steps:
                     wanted = max(1, int(pacing.rows_at_once * spacing), pacing.least_block_steps)
                     return Way.BLOCK, min(pacing.block_steps, wanted, corrected.left, left)

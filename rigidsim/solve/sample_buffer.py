@@ -16,7 +16,7 @@ from rigidsim.solve.sampling import SampleClock
 
 _FEWEST_ROWS = 8  # that may wait: some tens of milliseconds at 250 digits
 _GROWTH = 4  # of the rows that may wait, from one hand-over to the next
-_FIRST_ROWS = 16  # looked at for those before a limit
+_FIRST_ROWS = 16  # looked at for those before a limit, at least
 
 
 class SampleBuffer:
@@ -38,6 +38,7 @@ class SampleBuffer:
         self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
         self._upcoming: tuple[int, Scalar] | None = None
+        self._found = 0  # before the limit last asked for: the next asks for about as many
 
     @property
     def complete(self) -> bool:
@@ -64,7 +65,8 @@ class SampleBuffer:
     def until(self, limit: Scalar, most: int) -> np.ndarray:
         """Times of the next samples that lie at or before ``limit``, at most so many."""
         pieces = []
-        position, rows = self.count, min(_FIRST_ROWS, self._pacing.rows_at_once)
+        position = first = self.count
+        rows = min(max(_FIRST_ROWS, self._found + self._found // 8), self._pacing.rows_at_once)
         stop = min(self._clock.count, position + max(most, 0))
         while position < stop:
             times = self._clock.internal(position, min(position + rows, stop))
@@ -74,6 +76,7 @@ class SampleBuffer:
             if inside < len(times):
                 break
             rows = min(_GROWTH * rows, self._pacing.rows_at_once)
+        self._found = position - first
         return np.concatenate(pieces) if pieces else self._clock.internal(0, 0)
 
     def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
