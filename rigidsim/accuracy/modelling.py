@@ -326,7 +326,7 @@ def _extrapolated(
     mean = np.abs(rates.mean(axis=0)) + (rates.max(axis=0) - rates.min(axis=0)) / 2
     along, across = (float(x) + doubt for x in mean)
     # an error across the precession changes its rate, along it
-    shear = float(average.shear(prepared.scene.context))
+    shear = float(average.shear(prepared.scene.context, prepared.scene.start))
     grown = math.hypot(along + shear * across * span / 2, across) * span
     oscillation = max(w.recorded for w in windows)
     growth = grown / span

@@ -55,7 +55,14 @@ def assemble_states(
         from rigidsim.model.averaged.states import averaged_states
 
         return averaged_states(
-            plan.scene, plan.average, plan.loads, plan.scaling, numbers, plan.orbit_tags, number
+            plan.scene,
+            plan.average,
+            plan.loads,
+            plan.scaling,
+            numbers,
+            plan.orbit_tags,
+            plan.tables,
+            number,
         )
     canonical = None
     if requirements.canonical:

@@ -18,7 +18,7 @@ from rigidsim.model.planar import Plane, asked_plane, gradient_plane
 from rigidsim.model.reference_plane import refuse_without_plane
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
-from rigidsim.model.table_states import TablePlace, places_of
+from rigidsim.model.table_states import Carried, TablePlace, places_of
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
@@ -122,9 +122,9 @@ def plan_model(
     )
 
 
-def _tables(scene: Scene) -> dict[TabulatedOrbit, TablePlace]:
+def _tables(scene: Scene, longitude: Carried = Carried.ECCENTRIC) -> dict[TabulatedOrbit, TablePlace]:
     tables = [(str(number), getattr(load, "table", None)) for number, load in enumerate(scene.loads, start=1)]
-    return places_of([(tag, table) for tag, table in tables if table is not None])
+    return places_of([(tag, table) for tag, table in tables if table is not None], longitude)
 
 
 def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
@@ -161,6 +161,7 @@ def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
         None,
         False,
         surfaces_of(scene),
+        tables=_tables(scene, average.longitude),
         average=average,
     )
 

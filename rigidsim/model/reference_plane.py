@@ -119,9 +119,8 @@ def initial_normal(scene: Scene, loads: Sequence[Any]) -> Vector:
         node = orbit.ascending_node + orbit.node_rate * scene.start
         return _normal_of(context, orbit.inclination, node)
     if load.table is not None:
-        q, p = (load.table.at(scene.start)[name] for name in ("q", "p"))
-        chi = context.sqrt(1 - p * p - q * q)
-        return [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
+        normal: Vector = load.table.normal(scene.start)
+        return normal
     if isinstance(load, MovingSource):
         return load.starting_normal(scene)
     if load.attracting_point is not None and scene.position is not None and scene.velocity is not None:

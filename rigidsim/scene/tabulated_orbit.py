@@ -235,9 +235,20 @@ class TabulatedOrbit:
         return max(self.context.sqrt(a * a + b * b) for a, b in zip(k, h, strict=True))
 
     @property
+    def smallest_axis(self) -> Any:
+        """Over the rows, m."""
+        return min(self._each(AXIS))
+
+    @property
     def pericentre(self) -> Any:
         """Least distance, m."""
-        return min(self._each(AXIS)) * (1 - self.largest_eccentricity)
+        return self.smallest_axis * (1 - self.largest_eccentricity)
+
+    def normal(self, time: Any) -> list[Any]:
+        """Unit vector at a time (s) about which the body goes in the direct sense, space axes."""
+        q, p = (self.at(time)[name] for name in TILTED)
+        chi = self.context.sqrt(1 - p * p - q * q)
+        return [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
 
     @property
     def mean_motion(self) -> Any:
@@ -247,19 +258,37 @@ class TabulatedOrbit:
     def fastest_rate(self) -> Any:
         """Angular rate of the direction at the least pericentre, rad/s."""
         e = self.largest_eccentricity
-        return self.motion(min(self._each(AXIS))) * self.context.sqrt(1 - e * e) / (1 - e) ** 2
+        return self.motion(self.smallest_axis) * self.context.sqrt(1 - e * e) / (1 - e) ** 2
 
     @cached_property
     def normal_drift(self) -> Any:
         """Bound of the rate at which the plane turns, rad/s: twice what neighbouring rows show."""
+        return 4 * self._fastest(TILTED)
+
+    @cached_property
+    def shape_drift(self) -> Any:
+        """Bound of the rate at which the periapsis turns where the orbit is most eccentric, rad/s: twice what
+        neighbouring rows show.
+        """
+        e = self.largest_eccentricity
+        return 2 * self._fastest(EXCENTRIC) / e if e > 0 else self.context.zero
+
+    def _fastest(self, pair: tuple[str, str]) -> Any:
+        """Largest rate of a pair of elements between neighbouring rows, 1/s."""
         times, largest = self.table.times, self.context.zero
-        if TILTED[0] not in self.moving:
+        if pair[0] not in self.moving:
             return largest
-        q, p = self._rows["q"], self._rows["p"]
+        one, other = (self._rows[name] for name in pair)
         for i in range(len(times) - 1):
-            change = self.context.hypot(q[i + 1] - q[i], p[i + 1] - p[i])
+            change = self.context.hypot(one[i + 1] - one[i], other[i + 1] - other[i])
             largest = max(largest, change / (times[i + 1] - times[i]))
-        return 4 * largest
+        return largest
+
+    @property
+    def longitude_exponent(self) -> int:
+        """Binary, of a unit of which the mean longitude passes less than one over the whole table, rad."""
+        span = self.table.times[-1] - self.table.times[0]
+        return int(self.context.mag(self.motion(self.smallest_axis) * span)) + 1
 
     @cached_property
     def error(self) -> InterpolationError:

@@ -50,8 +50,6 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "no gradient has a torque on a body whose moments are all the same"
     elif strange := [load.title for load in loads if not isinstance(load, GravityGradient)]:
         against = f"{strange[0]} is no gravity gradient of a source with elements, a place or an ephemeris"
-    elif any(load.table is not None for load in loads if isinstance(load, GravityGradient)):
-        against = "an orbit by a table of elements isn't averaged yet; give elements with their rates"
     elif all(w == 0 for w in scene.angular_velocity):
         against = "the body starts at rest"
     elif integrator.formulation != "auto":

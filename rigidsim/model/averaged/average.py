@@ -20,11 +20,12 @@ from rigidsim.model.averaged.applies import (
     swing_of,
 )
 from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
-from rigidsim.model.averaged.orbit_terms import nutation, secular_factor
+from rigidsim.model.averaged.orbit_terms import nutation
 from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
 from rigidsim.model.load import Load
 from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.model.table_states import Carried
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
 from rigidsim.scene.model_table import ORBIT_AVERAGED
@@ -65,6 +66,13 @@ class Average:
         """Whether it averages over the sources' orbits as well."""
         return self.level == ORBIT_AVERAGED
 
+    @property
+    def longitude(self) -> Carried:
+        """What of the place on an orbit by a table it takes."""
+        if not self.over_orbits:
+            return Carried.ECCENTRIC
+        return Carried.MEAN if self.short_period else Carried.NEITHER
+
     def rate(self, source: Source) -> Any:
         """3 (G M / a^3) excess / L (mpf, 1/s): see ``rigidsim.model.averaged.orbit_terms``."""
         return source.strength * self.motion.excess / self.motion.momentum
@@ -74,16 +82,16 @@ class Average:
         """Of the momentum's turning, rad/s (mpf)."""
         return sum(abs(self.rate(source)) * source.nearest for source in self.sources)
 
-    def shear(self, context: Any) -> Any:
-        """By how much an angle across the precession changes the rate along it, 1/s (mpf), at the start: of
-        k/2 (1 - e^2)^(-3/2) |n x s|^2 summed over the sources.
+    def shear(self, context: Any, time: Any) -> Any:
+        """By how much an angle across the precession changes the rate along it, 1/s (mpf), at the start
+        ``time``: of k/2 (1 - e^2)^(-3/2) |n x s|^2 summed over the sources.
         """
         total = context.zero
         for source in self.sources:
             size, square = abs(self.rate(source)) / 2, context.one
-            if source.orbit is not None:
-                size *= 2 * secular_factor(context, source.orbit)
-                across = cross(source.orbit.normal(context), self.start)
+            if source.has_elements:
+                size = abs(source.secular_strength(context) * self.motion.excess / self.motion.momentum)
+                across = cross(source.normal(context, time), self.start)
                 square = dot(across, across)
             total += size * square
         return total
@@ -183,11 +191,11 @@ def osculating(scene: Scene, average: Average, mean: Sequence[Any], time: Any) -
     context = scene.context
     found = list(mean)
     for source in average.sources if average.over_orbits else ():
-        if source.orbit is not None:
-            place = source.place(context, time)
-            more = nutation(
-                context, context, source.orbit, place, average.rate(source), list(mean), lambda x: x
-            )
+        if source.has_elements:
+            ellipse, place = source.ellipse(context, time), source.place(context, time)
+            k = source.strength_at(context, time) * average.motion.excess / average.motion.momentum
+            size = k / (2 * ellipse.motion * ellipse.root**3)
+            more = nutation(context, ellipse, place, size, list(mean), lambda x: x)
             found = [x + y for x, y in zip(found, more, strict=True)]
     return unit(context, found)
 

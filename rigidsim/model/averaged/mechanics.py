@@ -8,8 +8,9 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.averaged.orbit_terms import OrbitPlace, nutation, plane_vectors, second_order
+from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, nutation, plane_vectors, second_order
 from rigidsim.model.averaged.sources import Source
+from rigidsim.model.averaged.table_terms import TableTerms
 from rigidsim.model.ephemeris import source_position
 from rigidsim.model.kinematics import seconds
 from rigidsim.model.load import Load, Term
@@ -23,6 +24,7 @@ from rigidsim.scene.epochs import J2000
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 DIRECTION = ["sx", "sy", "sz"]
 """States: the momentum's direction, space axes; its mean where nothing is added back."""
@@ -95,6 +97,9 @@ class AveragedMechanics(Mechanics):
     def _secular(self, source: Source) -> list[Symbolic]:
         """-(k/2) (1 - e^2)^(-3/2) (n . s) n and what second order adds, or the pull of a source at rest."""
         context, s = self.scene.context, self.direction
+        if source.table is not None:
+            unit = self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
+            return self._by_table[source.table].secular(self.of.rate(source) * unit, s)
         if source.orbit is None:
             return self._pull_of(source, s)
         normal = self.orbit(source.orbit).normal
@@ -122,6 +127,22 @@ class AveragedMechanics(Mechanics):
         more = self.number(size * context.mpf(steady))
         towards = zip(gradient, normal, p, t, strict=True)
         return [g + more * ((x * x - y * y) * n + 2.0 * (z * (x * a - y * b))) for g, n, a, b in towards]
+
+    @cached_property
+    def _by_table(self) -> dict[TabulatedOrbit, TableTerms]:
+        """For each table its part in an average over orbits."""
+        return {
+            table: TableTerms.of(table, place, self.scaling.time, self.scene.start, self.number)
+            for table, place in self.tables.items()
+        }
+
+    def table_block(self, table: TabulatedOrbit) -> StateBlock:
+        """The states of an orbit by a table."""
+        return self.table(table).block
+
+    def table(self, orbit: TabulatedOrbit) -> OrbitStates:
+        """As of ``Kinematics``; averaged over, without a direction unless the mean longitude is carried."""
+        return self._by_table[orbit].seen if self.of.over_orbits else super().table(orbit)
 
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
         """The sum of k (a/r)^3 (s . r) r over the sources, per internal unit of time: s' is that times s."""
@@ -181,6 +202,9 @@ class AveragedMechanics(Mechanics):
                 time = time + self.number(ExactNumber(load.epoch.since_j2000()).at(context))
             place = source_position(load.ephemeris, time)
             return place.direction, place.inverse_distance
+        if source.table is not None:
+            by_table = self.table(source.table)
+            return by_table.direction, by_table.inverse_distance
         assert source.orbit is not None
         seen = self.orbit(source.orbit)
         return seen.direction, None if source.orbit.circular else seen.inverse_distance
@@ -253,16 +277,8 @@ class AveragedMechanics(Mechanics):
             return mean, figure, mean
         if self.of.over_orbits:
             for source in self.of.sources:
-                if source.orbit is not None:
-                    more = nutation(
-                        hy,
-                        self.scene.context,
-                        source.orbit,
-                        self._place(source.orbit),
-                        self.of.rate(source),
-                        mean,
-                        self.number,
-                    )
+                if source.has_elements:
+                    more = self._nutation(source, mean)
                     momentum = [x + y for x, y in zip(momentum, more, strict=True)]
         if not sign:
             return momentum, lost, momentum
@@ -272,6 +288,17 @@ class AveragedMechanics(Mechanics):
         figure = [float(sign) * (x + d) for x, d in zip(momentum, away, strict=True)]
         spin = [x + ratio * d for x, d in zip(momentum, away, strict=True)]
         return momentum, figure, spin
+
+    def _nutation(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
+        """With the period of a source's orbit, rad."""
+        context, rate = self.scene.context, self.of.rate(source)
+        if source.table is not None:
+            unit = context.ldexp(context.one, self.scaling.time)
+            return self._by_table[source.table].nutation(rate * unit, s)
+        assert source.orbit is not None
+        ellipse = Ellipse.of(context, source.orbit)
+        size = self.number(rate / (2 * ellipse.motion * ellipse.root**3))
+        return nutation(hy, ellipse, self._place(source.orbit), size, s, self.number)
 
     @cached_property
     def momentum_space(self) -> list[Symbolic]:

@@ -25,7 +25,8 @@ potentials, h = k s . (Q - <Q>) s / 2 and H = k s . J s / 2 with s' = grad h x s
     K = <s . (grad h x grad H)> / 2 = (k^2 / 4) z (c0 (x^2 - y^2) + c1 (x^2 + y^2)),
 
 x, y, z being the parts of s along P, T and n, c0 = <(a/r)^3 C> and c1 = <(a/r)^3 cos(2 f) C> over
-n (1 - e^2)^(3/2): -1 / (4 n) for c1 of a circle. For the Earth and the Sun it is 6e-6 of the precession.
+n (1 - e^2)^(3/2): c1 = -(1/4 + e^2/6) (1 - e^2)^(-3) / n. For the Earth and the Sun it is 6e-6 of the
+precession.
 """
 
 from __future__ import annotations
@@ -70,14 +71,43 @@ class OrbitPlace:
     across: Vector
 
 
-def secular_factor(context: Any, orbit: KeplerOrbit) -> Any:
-    """(1 - e^2)^(-3/2) / 2 (mpf)."""
-    rest = 1 - orbit.eccentricity**2
-    return 1 / (2 * rest * context.sqrt(rest))
+@dataclass(frozen=True)
+class Ellipse:
+    """Shape and pace of an orbit, as numbers (mpf) or expressions.
+
+    Attributes:
+        square: e^2.
+        root: sqrt(1 - e^2).
+        motion: mean motion.
+        circular: whether e is known to be zero.
+    """
+
+    eccentricity: Any
+    square: Any
+    root: Any
+    motion: Any
+    circular: bool
+
+    @classmethod
+    def of(cls, context: Any, orbit: KeplerOrbit) -> Ellipse:
+        """Of constant elements (mpf, rad/s)."""
+        e = orbit.eccentricity
+        return cls(e, e * e, context.sqrt(1 - e * e), orbit.mean_motion, orbit.circular)
+
+    @property
+    def secular_factor(self) -> Any:
+        """(1 - e^2)^(-3/2) / 2."""
+        return 1 / (2 * (1 - self.square) * self.root)
+
+    @property
+    def across(self) -> Any:
+        """-n c1."""
+        rest = 1 - self.square
+        return (0.25 + self.square / 6) / (rest * rest * rest)
 
 
 def second_order(eccentricity: float) -> tuple[float, float]:
-    """n c0 and n c1, by the trapezoidal rule over the eccentric anomaly."""
+    """n c0 and n c1 (see ``Ellipse.across``), by the trapezoidal rule over the eccentric anomaly."""
     e, root = eccentricity, math.sqrt(1 - eccentricity**2)
     anomaly = 2 * np.pi * np.arange(_POINTS) / _POINTS
     radius = 1 - e * np.cos(anomaly)
@@ -91,41 +121,32 @@ def second_order(eccentricity: float) -> tuple[float, float]:
 
 
 def nutation(
-    functions: Functions,
-    context: Any,
-    orbit: KeplerOrbit,
-    place: OrbitPlace,
-    strength: Any,
-    s: Vector,
-    number: Any,
+    functions: Functions, ellipse: Ellipse, place: OrbitPlace, size: Any, s: Vector, number: Any
 ) -> Vector:
     """k (J s) x s.
 
     Args:
-        strength: k, 1/s (mpf).
-        number: from an mpf to the factor that it is to be.
+        size: k / (2 n) (1 - e^2)^(-3/2).
+        number: from what the ellipse is given in to the factor that it is to be.
     """
-    e = orbit.eccentricity
-    root = context.sqrt(1 - e * e)
+    e, root = ellipse.eccentricity, ellipse.root
     b = e / (1 + root)
     mean = -_cosines(lambda k: (-b) ** k * (1 + k * root), e)
     c, sn = place.cosine, place.sine
     # true less eccentric anomaly, and the true one itself
-    ahead = 0 if orbit.circular else 2 * functions.atan2(number(b) * sn, 1 - number(b) * c)
-    inverse = 1 if orbit.circular else 1 / (1 - number(e) * c)
-    cf = c if orbit.circular else (c - number(e)) * inverse
-    sf = sn if orbit.circular else number(root) * sn * inverse
+    ahead = 0 if ellipse.circular else 2 * functions.atan2(number(b) * sn, 1 - number(b) * c)
+    inverse = 1 if ellipse.circular else 1 / (1 - number(e) * c)
+    cf = c if ellipse.circular else (c - number(e)) * inverse
+    sf = sn if ellipse.circular else number(root) * sn * inverse
     c2, s2 = cf * cf - sf * sf, 2 * sf * cf
-    half = number(context.one / 2)
-    odd, even = half * s2, -(half * c2) - number(mean)
+    odd, even = 0.5 * s2, -(0.5 * c2) - number(mean)
     equation = None
-    if not orbit.circular:
+    if not ellipse.circular:
         c3, s3 = c2 * cf - s2 * sf, s2 * cf + c2 * sf
         odd = odd + number(e / 2) * sf + number(e / 6) * s3
         even = even - number(e / 2) * cf - number(e / 6) * c3
         # f - M + e sin f
         equation = ahead + number(e) * sn + number(e) * sf
-    size = number(strength / (2 * orbit.mean_motion * root**3))
     along, beside = dot(place.pericentre, s), dot(place.across, s)
     first = odd * along + even * beside
     second = even * along - odd * beside
@@ -149,6 +170,19 @@ def plane_vectors(
     cw, sw = periapsis
     first = [cn, sn, 0 * cn]
     second = [-(sn * ci), cn * ci, si]
-    pericentre = [cw * x + sw * y for x, y in zip(first, second, strict=True)]
-    across = [cw * y - sw * x for x, y in zip(first, second, strict=True)]
-    return pericentre, across
+    return turned((first, second), (cw, sw))
+
+
+def equinoctial_axes(q: Any, p: Any, chi: Any) -> tuple[Vector, Vector]:
+    """Unit vectors in an orbit's plane that longitudes count from, and across, from its elements (see
+    ``rigidsim.scene.tabulated_orbit``) and chi = sqrt(1 - p^2 - q^2).
+    """
+    product = 2 * p * q
+    return [1 - 2 * p * p, product, -2 * p * chi], [product, 1 - 2 * q * q, 2 * q * chi]
+
+
+def turned(axes: tuple[Vector, Vector], turn: tuple[Any, Any]) -> tuple[Vector, Vector]:
+    """Two unit vectors turned within their plane, by the cosine and sine of an angle."""
+    (first, second), (c, s) = axes, turn
+    along = [c * x + s * y for x, y in zip(first, second, strict=True)]
+    return along, [c * y - s * x for x, y in zip(first, second, strict=True)]

@@ -1,4 +1,4 @@
-"""The sources of an averaged torque: on Kepler orbits, at fixed places, or of an ephemeris."""
+"""The sources of an averaged torque: on Kepler orbits, by a table, at fixed places, or of an ephemeris."""
 
 from __future__ import annotations
 
@@ -8,14 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.averaged.orbit_terms import OrbitPlace, plane_vectors, secular_factor
+from rigidsim.model.averaged.orbit_terms import (
+    Ellipse,
+    OrbitPlace,
+    equinoctial_axes,
+    plane_vectors,
+    turned,
+)
 from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.ephemeris import MEAN_DISTANCE
 from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.tabulated_orbit import AXIS, TabulatedOrbit
 
 _DAY = 86400.0
 _SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
@@ -41,22 +49,38 @@ class Source:
         return self.load.orbit
 
     @property
+    def table(self) -> TabulatedOrbit | None:
+        """That its orbit goes by; None for others."""
+        return self.load.table
+
+    @property
+    def has_elements(self) -> bool:
+        """Whether there is an orbit to average over."""
+        return self.orbit is not None or self.table is not None
+
+    @property
     def motion(self) -> float:
         """Mean motion, rad/s; 0 for a source at rest."""
         if self.load.ephemeris is not None:
             return 2 * math.pi / (_SERIES[self.load.ephemeris][0] * _DAY)
+        if self.table is not None:
+            return float(self.table.mean_motion)
         return 0.0 if self.orbit is None else abs(float(self.orbit.mean_motion))
 
     @property
     def eccentricity(self) -> float:
-        """Of its orbit; 0 for a source at rest."""
+        """Of its orbit, the largest; 0 for a source at rest."""
         if self.load.ephemeris is not None:
             return _SERIES[self.load.ephemeris][1]
+        if self.table is not None:
+            return float(self.table.largest_eccentricity)
         return 0.0 if self.orbit is None else float(self.orbit.eccentricity)
 
     @property
     def slow_rate(self) -> float:
         """Of node and periapsis together, rad/s."""
+        if self.table is not None:
+            return float(self.table.normal_drift + self.table.shape_drift)
         if self.orbit is None:
             return 0.0
         return abs(float(self.orbit.node_rate)) + abs(float(self.orbit.periapsis_rate))
@@ -69,15 +93,47 @@ class Source:
     @property
     def nearest(self) -> float:
         """(a/r)^3 where it is nearest."""
+        if self.table is not None:
+            return float(self.table.semi_major_axis / self.table.pericentre) ** 3
         return float((1 - self.eccentricity) ** -3)
 
-    def secular_strength(self, context: Any) -> Any:
-        """3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2), of an orbit."""
+    def strength_at(self, context: Any, time: Any) -> Any:
+        """3 G M / a^3 (mpf, 1/s^2) at a time."""
+        if self.table is None:
+            return self.strength
+        axis = self.table.at(time)[AXIS] / self.table.semi_major_axis
+        return self.strength if axis == 1 else self.strength / axis**3
+
+    def ellipse(self, context: Any, time: Any) -> Ellipse:
+        """Shape and mean motion of its orbit at a time, numbers (mpf)."""
+        if self.table is not None:
+            found = self.table.at(time)
+            square = found["k"] ** 2 + found["h"] ** 2
+            root = context.sqrt(1 - square)
+            return Ellipse(context.sqrt(square), square, root, self.table.motion(found[AXIS]), False)
         assert self.orbit is not None
-        return self.strength * secular_factor(context, self.orbit)
+        return Ellipse.of(context, self.orbit)
+
+    def secular_strength(self, context: Any) -> Any:
+        """3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2), of an orbit; the largest that a table gives."""
+        if self.table is not None:
+            rest = 1 - self.table.largest_eccentricity**2
+            size = self.strength * (self.table.semi_major_axis / self.table.smallest_axis) ** 3
+            return size / (2 * rest * context.sqrt(rest))
+        assert self.orbit is not None
+        return self.strength * Ellipse.of(context, self.orbit).secular_factor
+
+    def normal(self, context: Any, time: Any) -> Vector:
+        """Of its orbit's plane at a time (of a node that moves uniformly, at time zero), unit, space axes."""
+        if self.table is not None:
+            return self.table.normal(time)
+        assert self.orbit is not None
+        return self.orbit.normal(context)
 
     def place(self, context: Any, time: Any) -> OrbitPlace:
         """Where it is on its orbit, numbers (mpf)."""
+        if self.table is not None:
+            return self._place_by_table(context, self.table, time)
         orbit = self.orbit
         assert orbit is not None
         anomaly = orbit.eccentric_anomaly(context, time)
@@ -89,21 +145,32 @@ class Source:
         tilt, node, periapsis = ((context.cos(x), context.sin(x)) for x in angles)
         return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *plane_vectors(tilt, node, periapsis))
 
+    @staticmethod
+    def _place_by_table(context: Any, table: TabulatedOrbit, time: Any) -> OrbitPlace:
+        found = table.at(time)
+        k, h = found["k"], found["h"]
+        e, periapsis = context.sqrt(k * k + h * h), context.atan2(h, k)
+        anomaly = eccentric_anomaly(context, table.starting_longitude(time) - periapsis, e)
+        axes = equinoctial_axes(found["q"], found["p"], context.sqrt(1 - found["q"] ** 2 - found["p"] ** 2))
+        turn = context.cos(periapsis), context.sin(periapsis)
+        return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *turned(axes, turn))
+
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
         """(a/r)^3 r r^T (3, 3) at a time; None where only a series tells it."""
         if self.load.position is not None:
             length = norm(context, self.load.position)
             direction = np.array([float(x / length) for x in self.load.position])
             return np.outer(direction, direction)
-        if self.orbit is None:
+        if not self.has_elements:
             return None
-        e, at = float(self.orbit.eccentricity), self.place(context, time)
+        e, at = float(self.ellipse(context, time).eccentricity), self.place(context, time)
         c, s = float(at.cosine), float(at.sine)
         x, y = c - e, math.sqrt(1 - e * e) * s
         radius = math.hypot(x, y)
         along, across = (np.array([float(v) for v in vector]) for vector in (at.pericentre, at.across))
         direction = (x * along + y * across) / radius
-        return np.outer(direction, direction) / radius**3
+        scale = float(self.strength_at(context, time) / self.strength)
+        return np.outer(direction, direction) * scale / radius**3
 
 
 def sources_of(scene: Scene, loads: Sequence[GravityGradient]) -> list[Source]:
@@ -112,6 +179,8 @@ def sources_of(scene: Scene, loads: Sequence[GravityGradient]) -> list[Source]:
     for number, load in enumerate(loads, start=1):
         if load.orbit is not None:
             distance = load.orbit.semi_major_axis
+        elif load.table is not None:
+            distance = load.table.semi_major_axis
         elif load.position is not None:
             distance = norm(context, load.position)
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import heyoka as hy
 
@@ -14,8 +15,10 @@ from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.table_states import TablePlace
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 _OF_FIGURE = ("figure_axis",)
 WHY = {
@@ -51,6 +54,7 @@ def averaged_states(
     scaling: Scaling,
     numbers: ScaledNumbers,
     orbit_tags: Mapping[KeplerOrbit, str],
+    tables: Mapping[TabulatedOrbit, TablePlace],
     number: Rounder,
 ) -> tuple[AveragedMechanics, list[StateBlock]]:
     """The mechanical quantities of an averaged motion, and its states."""
@@ -70,7 +74,13 @@ def averaged_states(
         ),
     )
     m = AveragedMechanics(
-        scene, scaling, numbers, s, attitude, None, None, None, number, orbit_tags,
+        scene, scaling, numbers, s, attitude, None, None, None, number, orbit_tags, tables=tables,
         loads=list(loads), average=average,
     )  # fmt: skip
-    return m, [StateBlock(DIRECTION, m.derivatives, average.start, why=WHY[average.level])]
+    blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=WHY[average.level])]
+    for orbit in tables:
+        what = "elements of" if average.over_orbits else "where"
+        which = "the source's orbit" if average.over_orbits else "the source is"
+        block = m.table_block(orbit)
+        blocks.append(replace(block, why=f'gravity_gradient: {what} {which}, by "{orbit.name}"'))
+    return m, blocks

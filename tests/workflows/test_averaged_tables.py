@@ -1,0 +1,110 @@
+"""Averages over orbits by a table: against the same orbit by its elements, and against every rotation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from support import config, run_text
+
+import rigidsim
+from rigidsim.solve.problem import prepare
+
+FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
+NODE, PERIAPSIS = 0.004, 0.006  # rad/s beside a mean motion of 1
+BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"
+START = f'angular_velocity = [0, 0, {SPIN}]\neuler_angles = [0.3, "35 deg", 0]'
+LOAD = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {orbit}'
+KEPLER = (
+    f"{{semi_major_axis = 1, eccentricity = {ECCENTRICITY}, inclination = 0.2, ascending_node = 1, "
+    f"periapsis = 0.5, mean_anomaly = 0.3, node_rate = {NODE}, periapsis_rate = {PERIAPSIS}}}"
+)
+RATE = 3 * FLATTENING / SPIN
+RECORD = 'record = ["momentum_axis", "figure_axis", "obliquity", "node_longitude"]'
+
+
+def table(*, anomaly: bool) -> str:
+    """Rows every half turn or so; the whole turns follow from Kepler's third law."""
+    lines = [
+        "time, eccentricity, inclination, ascending_node, periapsis" + (", mean_anomaly" if anomaly else "")
+    ]
+    for t in np.arange(-12.0, 120.0, 4.0):
+        cells = [t, ECCENTRICITY, 0.2, 1 + NODE * t, 0.5 + PERIAPSIS * t]
+        cells += [(0.3 + t) % (2 * math.pi)] if anomaly else []
+        lines.append(", ".join(repr(float(x)) for x in cells))
+    return "\n".join(lines)
+
+
+def text(level: str, *, by_table: bool, short_period: bool = True, anomaly: bool = True) -> str:
+    orbit = '{table = "orbit.csv", semi_major_axis = 1}' if by_table else KEPLER
+    if by_table and not anomaly:
+        orbit = orbit[:-1] + ", mean_anomaly = 0.3}"
+    model = f'[model]\nlevel = "{level}"\nshort_period = {str(short_period).lower()}\n'
+    model += '[frame]\nreference = "orbit"\n'
+    if by_table:
+        model += f"[tables.\"orbit.csv\"]\ntext = '''\n{table(anomaly=anomaly)}\n'''"
+    return config(BODY, START, LOAD.format(orbit=orbit), "end = 100\nsamples = 101", "", RECORD, model)
+
+
+def apart(one: rigidsim.Run, other: rigidsim.Run, name: str = "momentum_axis") -> float:
+    return float(np.linalg.norm(one.dataset[name].values - other.dataset[name].values, axis=1).max())
+
+
+@pytest.fixture(scope="module")
+def full() -> rigidsim.Run:
+    return run_text(text("full", by_table=True))
+
+
+@pytest.mark.parametrize("level", ["spin_averaged", "orbit_averaged"])
+def test_a_table_of_an_orbit_averages_as_the_orbit_does(level: str, full: rigidsim.Run) -> None:
+    found = run_text(text(level, by_table=True))
+    direct = run_text(text(level, by_table=False))
+    prepared = prepare(rigidsim.parse(text(level, by_table=True)))
+    (load,) = prepared.system.plan.loads
+    error = load.table.error  # type: ignore[union-attr]
+    path = RATE * (1 - ECCENTRICITY) ** -3 * 100  # of the momentum, at most
+    # a torque errs by twice the direction's error and three times the distance's; all rows do better
+    bound = path * (2 * error.direction + 3 * error.distance)
+    assert bound < 1e-4  # it means something beside the path of 0.2 rad
+    for name in ("momentum_axis", "figure_axis"):
+        assert apart(found, direct, name) < bound
+    for name in ("obliquity", "node_longitude"):
+        difference = np.abs(found.dataset[name].values - direct.dataset[name].values).max()
+        assert difference < 4 * (bound + error.direction)
+    # and the model's own error is what it is for elements (tests/workflows/test_averaged_runs.py)
+    nodding = RATE * (1 - ECCENTRICITY) ** -3
+    assert apart(found, full) < 10 * path * (nodding**2 + nodding / SPIN + NODE * nodding) + bound
+
+
+def test_the_average_over_an_orbit_carries_its_elements_alone() -> None:
+    """Neither place nor anomaly of the orbit, which a step would have to follow."""
+    for short_period, more in ((False, []), (True, ["table_longitude1"])):
+        system = prepare(
+            rigidsim.parse(text("orbit_averaged", by_table=True, short_period=short_period))
+        ).system
+        names = ["table_part1", "table_k1", "table_h1", "table_q1", "table_p1"]
+        assert system.states == ["sx", "sy", "sz", *names, *more]
+    mean = run_text(text("orbit_averaged", by_table=True, short_period=False))
+    nodding = run_text(text("orbit_averaged", by_table=True))
+    assert 0.05 * RATE < apart(mean, nodding) < RATE * (1 - ECCENTRICITY) ** -3
+
+
+def test_without_an_anomaly_nutation_follows_keplers_law() -> None:
+    """Its mean longitude and not its anomaly then goes at Kepler's rate."""
+    found = run_text(text("orbit_averaged", by_table=True, anomaly=False))
+    slower = KEPLER[:-1] + f", period = {2 * math.pi / (1 - NODE - PERIAPSIS)!r}}}"
+    same = run_text(text("orbit_averaged", by_table=False).replace(KEPLER, slower))
+    # whose size is that of the mean motion by Kepler's law, or of the anomaly's: they differ by 1 %
+    assert apart(found, same) < (NODE + PERIAPSIS) * RATE * (1 - ECCENTRICITY) ** -3
+    assert apart(found, run_text(text("orbit_averaged", by_table=True))) > 1e-4
+
+
+def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
+    from rigidsim.accuracy.modelling import measure_modelling
+
+    for level in ("spin_averaged", "orbit_averaged"):
+        given = text(level, by_table=True)
+        found = measure_modelling(prepare(rigidsim.parse(given)))
+        assert found is not None
+        assert apart(run_text(given), full) <= found.momentum
