@@ -110,7 +110,15 @@ def _follow(
     # what takes long to compile only where all isn't lost soon
     soon = OWN_FIRST / steps
     if isinstance(neighbours.lanes, OwnLanes) and _same_states(course.prepared) and first * steps > OWN_UNTIL:
-        neighbours.follow(course.at(soon), go_on, course.lost)
+        spread = neighbours.follow(course.at(soon), go_on, course.lost)
+        while (
+            soon * steps < OWN_UNTIL / 2
+            and go_on()
+            and not neighbours.all_lost(course.lost)
+            and _suspicious(spread, start, carried, margins.exponential)
+        ):
+            soon += OWN_FIRST / steps
+            neighbours.follow(course.at(soon), go_on, course.lost)
         if not neighbours.all_lost(course.lost):
             _prepare(neighbours, steps * (first - soon), course.at(first))
     spread = neighbours.follow(course.at(first), go_on, course.lost)

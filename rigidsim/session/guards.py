@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rigidsim.session.statistics import SampleStatistics
@@ -47,6 +47,19 @@ class Interruption:
 
     def __init__(self) -> None:
         self.requested = False
+        self._dispensable = False
+
+    @contextmanager
+    def dispensable(self) -> Iterator[None]:
+        """What is done inside the block is given up at the first signal, wherever it is: its result would
+        not be used any more.
+        """
+        with suppress(KeyboardInterrupt):
+            self._dispensable = True
+            try:
+                yield
+            finally:
+                self._dispensable = False
 
     @contextmanager
     def watching(self) -> Iterator[None]:
@@ -56,9 +69,10 @@ class Interruption:
             return
 
         def note(*_: object) -> None:
+            given_up, self._dispensable = self._dispensable, False
             self.requested = True
             give_up()
-            if building():
+            if given_up or building():
                 raise KeyboardInterrupt
 
         before = {s: signal.signal(s, note) for s in (signal.SIGINT, signal.SIGTERM)}

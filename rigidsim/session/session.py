@@ -109,7 +109,7 @@ class Session:
             found = Diagnostics(prepared, progress, recorder.statistics)
             if prepared.scene.config.output.estimate and progress.status.final:
                 self.observer.phase("estimate")
-                with suppress(KeyboardInterrupt):  # while neighbours were compiled
+                with interruption.dispensable():
                     found = found.estimated(
                         recorder.trail,
                         stepper,
@@ -119,7 +119,7 @@ class Session:
                 clock.next("estimate")
                 if prepared.system.plan.average is not None and progress.status is Status.FINISHED:
                     self.observer.phase("modelling")
-                    with suppress(KeyboardInterrupt):
+                    with interruption.dispensable():
                         found = found.modelled(recorder.trail, lambda: not interruption.requested)
                     clock.next("modelling")
                 if interruption.requested:

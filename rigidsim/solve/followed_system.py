@@ -13,6 +13,7 @@ import numpy as np
 
 from rigidsim.model.assembly import RATES
 from rigidsim.model.system import System
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sample_block import SampleBlock
@@ -43,14 +44,18 @@ class FollowedSystem:
         if self.system is None or self.system is self._own:
             return states
         if not self._charts:
-            number = precision_of("double").number
-            own = self._own.rounded(number)
-            for chart in (own, own.partner):
-                if chart is not None:
-                    expressions = _twin_states(self.system, chart)
-                    self._charts.append(hy.cfunc(expressions, chart.variables, compact_mode=True))
+            twin = self.system
+            self._charts = interruptible(lambda: self._compiled(twin))
         charts = [np.asarray(chart(np.ascontiguousarray(states.T))).T for chart in self._charts]
         return np.where(block.chart[:, None] == 0, charts[0], charts[-1])
+
+    def _compiled(self, twin: System) -> list[CompiledFunction]:
+        own = self._own.rounded(precision_of("double").number)
+        return [
+            hy.cfunc(_twin_states(twin, chart), chart.variables, compact_mode=True)
+            for chart in (own, own.partner)
+            if chart is not None
+        ]
 
 
 def _twin_states(twin: System, chart: System) -> list[hy.expression]:

@@ -12,6 +12,8 @@ from typing import Any, Protocol
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.observables.mechanical import WORK
+from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.precision import precision_of
@@ -22,14 +24,16 @@ NEIGHBOURS = 3
 TOLERANCE, TIGHT = 1e-8, 1e-14
 """The tight one where errors grow so much that a loosely followed motion is soon another one."""
 _TIGHT_UNTIL = 50_000
-OWN_UNTIL, OWN_FIRST = 4_000, 1_000
+OWN_UNTIL, OWN_FIRST = 7_000, 500
 """Steps up to which the run's own integrator, called for each lane, costs less than what is compiled for all;
-and so many that it takes of longer motions, lest code is compiled for one that is lost at once."""
+and so many that it takes of longer motions, and as many again and again as long as their errors grow
+exponentially, lest code is compiled for one that is soon lost."""
 UNROLLED_FROM, OPTIMISED_FROM = 3_000, 300_000
 """Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
 terms of the equations' decomposition, four lanes, tolerance 1e-8: compact 42 and 48 ms, 10 and 22 us a step;
 unrolled 60 and 132 ms, 2.2 and 5.4 us; unrolled and optimised 315 and 860 ms, 1.3 and 3.2 us. An own
-integrator takes 18 and 48 us for four lanes."""
+integrator takes 18 and 48 us for four lanes; on a quieter machine 6.6 and 15, where unrolled code takes 45
+and 83 ms to compile and 1.5 and 2.3 us a step."""
 _HOPELESS_STEPS = 32_768
 """In one stretch: the motion comes to no end, say towards a collision."""
 _UNEVEN, _FEW_STEPS = 2.5, 8
@@ -112,7 +116,8 @@ class _Evenly:
 
 
 class BatchLanes:
-    """All lanes in one call, in code of their own.
+    """All lanes in one call, in code of their own. States that nothing feels, nor any step, stay where they
+    are: they would only be compiled.
 
     Args:
         steps: to be taken; decides how it is compiled.
@@ -121,11 +126,14 @@ class BatchLanes:
     def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
         self._system, self.tolerance = system, tolerance
         self._level = self._level_for(steps)
-        initial = np.repeat(np.array([[float(x)] for x in system.initial]), NEIGHBOURS + 1, axis=1)
+        self._carried = [i for i, n in enumerate(system.states) if not (n == WORK or n.startswith(TANGENT))]
+        equations = [system.equations[i] for i in self._carried]
+        initial = np.array([[float(system.initial[i])] for i in self._carried])
+        initial = np.repeat(initial, NEIGHBOURS + 1, axis=1)
         options: dict[str, Any] = {"compact_mode": True, "opt_level": 0}
         if self._level:
             options = {"compact_mode": system.wide, "opt_level": 1 if system.wide else self._level - 1}
-        self._integrator = hy.taylor_adaptive_batch(system.equations, initial, tol=tolerance, **options)
+        self._integrator = hy.taylor_adaptive_batch(equations, initial, tol=tolerance, **options)
         self._even = _Evenly()
 
     @staticmethod
@@ -143,10 +151,10 @@ class BatchLanes:
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
         """As of ``Lanes``."""
-        integrator = self._integrator
+        integrator, carried = self._integrator, self._carried
 
         def go(most: int) -> tuple[int, float, float]:
-            integrator.state[:] = states
+            integrator.state[:] = states[carried]
             integrator.set_time([float(t) for t in begin])
             integrator.propagate_until([float(t) for t in end], max_steps=most)
             _, shortest, longest, steps = integrator.propagate_res[0]
@@ -160,7 +168,9 @@ class BatchLanes:
             results = integrator.propagate_res
             if any(result[0] != hy.taylor_outcome.time_limit for result in results):
                 return None
-        return np.array(integrator.state), steps, reached
+        moved = states.copy()
+        moved[carried] = integrator.state
+        return moved, steps, reached
 
 
 class OwnLanes:
@@ -179,7 +189,7 @@ class OwnLanes:
 
     def again(self, steps: float) -> Lanes:
         """As of ``Lanes``."""
-        if steps < UNROLLED_FROM:
+        if steps < OWN_UNTIL - OWN_FIRST:
             return self
         tight = not self._loose and steps < _TIGHT_UNTIL
         return BatchLanes(self._system, steps, TIGHT if tight else TOLERANCE)

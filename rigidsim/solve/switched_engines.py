@@ -74,7 +74,7 @@ class SwitchedEngines(Stepper):
         if self._chart not in self._probes:
             system = self.system if self._chart == 0 else self.system.partner
             assert system is not None
-            self._probes[self._chart] = Probe(system, self.precision)
+            self._probes[self._chart] = interruptible(lambda: Probe(system, self.precision))
         return self._probes[self._chart]
 
     def mark(self) -> Mark:

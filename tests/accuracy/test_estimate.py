@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -15,6 +16,8 @@ from rigidsim.accuracy.estimate import estimate_errors
 from rigidsim.accuracy.margins import Margins
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
+from rigidsim.solve import lanes
+from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 from rigidsim.store.variables import parts_in
 
@@ -76,6 +79,7 @@ orbit = {semi_major_axis = 44407.402167355416, eccentricity = 0.0984891105921793
     'formulation = "canonical"',
 )
 """In 29,759 steps of canonical momenta, of which nine windows show no chaos (scene 875 of seed 5)."""
+DRIVEN = 'kind = "torque"\ncomponents = ["0.01*sin(0.3*t)", "0.02*cos(0.5*t)", "0"]'
 COMET = config(
     "principal_moments = [1, 1.3, 1.6]\nmass = 1",
     "angular_velocity = [1e-3, 2e-3, 3e-3]\nposition = [100, 0, 0]\nvelocity = [0, 0.022, 0.008]",
@@ -91,6 +95,25 @@ def test_chaos_that_sets_in_late_leaves_no_digits() -> None:
     assert accuracy["estimated_attitude_error"] == pytest.approx(np.pi)
     assert 100 < accuracy["predictable_seconds"] < 2000
     assert "attitude_uncertain" in run.summary["warning_codes"]
+
+
+def test_nothing_is_compiled_for_what_is_soon_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chaos that leaves no digit after a thousand steps of 70,000: the run's own integrator shows it."""
+    made: list[int] = []
+    compiled = lanes.BatchLanes.__init__
+
+    def noted(self: lanes.BatchLanes, *given: Any) -> None:
+        made.append(1)
+        compiled(self, *given)
+
+    monkeypatch.setattr(lanes.BatchLanes, "__init__", noted)
+    for load, least in ((GRADIENT, 0), (DRIVEN, 1)):
+        made.clear()
+        prepared = prepare(rigidsim.parse(scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "10000", load)))
+        found = estimate_errors(prepared, 70_000, 10_000.0, stepper=assemble(prepared).stepper)
+        assert found is not None
+        assert (found.leading == pytest.approx(np.pi)) == (least == 0)
+        assert len(made) == least
 
 
 @pytest.mark.slow

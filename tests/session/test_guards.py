@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import itertools
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support import cases, config, loaded, run_text, same_bits
+from support import cases, config, loaded, run_estimated, run_text, same_bits
 
 import rigidsim
+from rigidsim.session.guards import Interruption
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.lanes import StepperLanes
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
@@ -168,6 +172,54 @@ def test_ctrl_c_within_a_chunk_takes_it_back(scene: str, monkeypatch: pytest.Mon
     assert next(calls) > 6
     assert loop.progress.steps == total
     assert kept.all() == reference
+
+
+def test_a_signal_ends_what_nobody_would_miss_at_once() -> None:
+    """Wherever it is, once; elsewhere it is noted, and what is done goes on."""
+    interruption, passed = Interruption(), []
+    with interruption.watching():
+        with interruption.dispensable():
+            passed.append("begun")
+            os.kill(os.getpid(), signal.SIGINT)
+            for _ in range(10_000):  # the handler runs between two of these at the latest
+                pass
+            passed.append("went on")
+        assert interruption.requested
+        with interruption.dispensable():
+            passed.append("once more")
+        os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(10_000):
+            pass
+        passed.append("saved")
+    assert passed == ["begun", "once more", "saved"]
+
+
+def test_ctrl_c_within_a_stretch_of_an_estimate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neighbours of a motion that switches take thousands of steps between two questions whether to go on."""
+    text = config(
+        loads='kind = "torque"\ncomponents = ["-0.2*sign(wx)", "0", "0"]',
+        time="end = 20\nsamples = 5",
+    )
+    whole = run_estimated(text, out=tmp_path / "whole")
+    taken = 0
+    advanced = StepperLanes.advance
+
+    def interrupted(self: StepperLanes, *given: Any) -> Any:
+        nonlocal taken
+        os.kill(os.getpid(), signal.SIGINT)
+        found = advanced(self, *given)
+        taken += 1
+        return found
+
+    with monkeypatch.context() as patch:
+        patch.setattr(StepperLanes, "advance", interrupted)
+        run = run_estimated(text, out=tmp_path / "cut")
+    assert run.status == "interrupted"
+    assert taken == 0
+    resumed = rigidsim.resume(run.folder.path)
+    same_bits(resumed, whole)
+    announced = [one.summary["accuracy"]["estimated_attitude_error"] for one in (resumed, whole)]
+    assert announced[0] == announced[1] > 0
 
 
 def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:

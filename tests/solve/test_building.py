@@ -15,6 +15,7 @@ from support import config, run_text, same_bits
 import rigidsim
 from rigidsim.model.system import System
 from rigidsim.solve.building import building, give_up, interruptible, take_up
+from rigidsim.solve.followed_system import FollowedSystem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.turn_count import TurnCounter
 
@@ -102,3 +103,26 @@ def test_ctrl_c_while_what_counts_turns_is_compiled(tmp_path: Path, monkeypatch:
     assert run.status == "interrupted"
     assert run.summary["samples"] < 61
     same_bits(rigidsim.resume(run.folder.path), whole)
+
+
+def test_charts_that_turns_are_counted_in_are_compiled_beside_the_main_thread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal would wait for two charts of Euler angles in code of their own."""
+    where: list[bool] = []
+    compiled = FollowedSystem._compiled
+
+    def noted(self: FollowedSystem, twin: System) -> Any:
+        where.append(threading.current_thread() is threading.main_thread())
+        return compiled(self, twin)
+
+    monkeypatch.setattr(FollowedSystem, "_compiled", noted)
+    run_text(
+        config(
+            time="end = 60\nsamples = 3",
+            integrator='formulation = "euler_angles"',
+            output=f'record = ["rotation_angle"]\n{PLAIN}',
+        ),
+        out=tmp_path,
+    )
+    assert where == [False]

@@ -53,6 +53,32 @@ def test_a_stretch_ends_where_steps_change_in_length() -> None:
         assert taken <= 50 * len(nearest)
 
 
+def test_states_that_nothing_feels_are_not_carried() -> None:
+    """The work done by a load is one, and what it would cost to compile is saved; the motion is the same."""
+    system = system_of(
+        config(
+            body="principal_moments = [1, 2, 2.5]",
+            initial="angular_velocity = [0.5, 0.25, 1]",
+            loads='kind = "torque"\ncomponents = ["0.01*sin(0.3*t)", "0.02*cos(0.5*t)", "0"]',
+            time="end = 100\nsamples = 2",
+        )
+    )
+    work = system.states.index("work")
+    assert work == len(system.states) - 1
+    lanes = BatchLanes(system, 100.0, 1e-14)
+    initial = np.array([float(x) for x in system.initial])
+    states = np.repeat(initial[:, None], NEIGHBOURS + 1, axis=1)
+    states[work] = 0.25
+    found = lanes.advance(states, np.zeros(4), np.full(4, 8.0), 1000)
+    whole = stepper_of(system, COMPACT, None, 0.0)
+    assert whole.to(8.0)
+    assert found is not None
+    assert (found[0][work] == 0.25).all()
+    assert abs(whole.state[work]) > 1e-6  # where it is carried it moves
+    # two tolerances of 1e-14 and 2e-16 over some tens of steps
+    assert np.abs(found[0][:work] - whole.state[:work, None]).max() < 1e-12
+
+
 def test_errors_of_series_are_those_of_their_order() -> None:
     """An order belongs to all tolerances down to the next; one more may gain more than the tolerance says, or
     nothing.
