@@ -7,44 +7,30 @@ import fcntl
 import json
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
+from rigidsim.errors import FORCE, OUT, RunFolderError, once_mended
 from rigidsim.look.figure_names import FIGURES
 from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
+from rigidsim.store.work_folder import WorkFolder
 
 _REOPENED = ".segments.reopened"
 
 
 @dataclass(frozen=True)
-class RunFolder:
+class RunFolder(WorkFolder):
     """Paths of one run."""
 
-    path: Path
-
-    @property
-    def config(self) -> Path:
-        """What is run, in one visible value per key."""
-        return self.path / "config.toml"
-
-    @property
-    def dataset(self) -> Path:
-        """The finished dataset."""
-        return self.path / "dataset.h5"
+    kept = "what was saved stays"
+    resumed = "continues from there"
+    seen_by = fcntl.LOCK_SH
 
     @property
     def timeline(self) -> Path:
         """The rerun recording."""
         return self.path / "timeline.rrd"
-
-    @property
-    def summary(self) -> Path:
-        """Status, cost, drifts, accuracy."""
-        return self.path / "summary.json"
 
     @property
     def figure(self) -> Path:
@@ -91,7 +77,7 @@ class RunFolder:
             atomic.write_bytes(self.config, config.encode())
             self.segments.mkdir()
         except OSError as error:
-            raise self._unwritable(error) from None
+            raise self.unwritable(error) from None
 
     def create(self, *, force: bool) -> None:
         """Make the folder empty of any run.
@@ -106,8 +92,7 @@ class RunFolder:
         folders = [self.segments, self.set_aside]
         ours = files + folders
         try:
-            if self.path.exists() and not self.path.is_dir():
-                raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
+            self.refuse_a_file()
             present = list(self.path.iterdir()) if self.path.exists() else []
             foreign = [p.name for p in present if p not in ours and not p.name.startswith(".")]
             if foreign:
@@ -131,60 +116,7 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             atomic.sync_folder(self.path.parent)
         except OSError as error:
-            raise self._unwritable(error) from None
-
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep other processes out; the lock goes with the process, however it ends.
-
-        Raises:
-            RunFolderError: another process works there, or the folder can't be written.
-        """
-        try:
-            if self.path.exists() and not self.path.is_dir():
-                raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
-            self.path.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(self.path, os.O_RDONLY)  # the folder itself: no file is left behind
-        except OSError as error:
-            raise self._unwritable(error) from None
-        try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise RunFolderError(
-                    f"{self.path}: another process is at work there; wait for it, or choose another {OUT} or "
-                    "name"
-                ) from None
-            try:
-                yield
-            except OSError as error:
-                raise StoppedWritingError(
-                    f"{self.path}: can't be read or written: {error.filename or 'a file'}: "
-                    f"{error.strerror or error}; what was saved stays, and {once_mended(error)}, {RESUME} "
-                    "continues from there"
-                ) from error
-        finally:
-            os.close(descriptor)
-
-    @property
-    def at_work(self) -> bool:
-        """Whether a process is at work here, as far as can be told."""
-        try:
-            descriptor = os.open(self.path, os.O_RDONLY)
-        except OSError:
-            return False
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
-            return True
-        finally:
-            os.close(descriptor)
-        return False
-
-    def _unwritable(self, error: OSError) -> RunFolderError:
-        return RunFolderError(
-            f"{self.path}: can't be written: {error.strerror or error}; choose another {OUT}"
-        )
+            raise self.unwritable(error) from None
 
     @property
     def read_only(self) -> OSError | None:

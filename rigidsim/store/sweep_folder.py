@@ -8,48 +8,34 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
+from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
 from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic
 from rigidsim.store.sweep_generation import Generation
 from rigidsim.store.sweep_tile import Tile, read_tile
+from rigidsim.store.work_folder import WorkFolder
 
 KIND = "sweep"
 _GENERATION = re.compile(r"g(\d{3})\.json")
 
 
 @dataclass(frozen=True)
-class SweepFolder:
+class SweepFolder(WorkFolder):
     """Paths of one sweep, and what lies there."""
 
-    path: Path
-
-    @property
-    def config(self) -> Path:
-        """What is run, in one visible value per key."""
-        return self.path / "config.toml"
+    kept = "the tiles that are complete stay"
+    resumed = "computes the others"
+    seen_by = fcntl.LOCK_EX
 
     @property
     def tiles(self) -> Path:
         """Generations and their tiles."""
         return self.path / "tiles"
-
-    @property
-    def dataset(self) -> Path:
-        """All members, when all are there."""
-        return self.path / "dataset.h5"
-
-    @property
-    def summary(self) -> Path:
-        """How many members ended how, and what it took."""
-        return self.path / "summary.json"
 
     @property
     def is_sweep(self) -> bool:
@@ -140,6 +126,7 @@ class SweepFolder:
         """
         ours = {"config.toml", "tiles", "dataset.h5", "summary.json"}
         try:
+            self.refuse_a_file()
             self.path.mkdir(parents=True, exist_ok=True)
             there = [p for p in self.path.iterdir() if not p.name.startswith(".")]
             for path in there:
@@ -159,9 +146,7 @@ class SweepFolder:
                     shutil.rmtree(self.tiles)
             self.remove_torn()
         except OSError as error:
-            raise RunFolderError(
-                f"{self.path}: can't be written: {error.strerror or error}; choose another {OUT}"
-            ) from None
+            raise self.unwritable(error) from None
 
     def remove_torn(self) -> None:
         """Delete what killed processes were writing."""
@@ -169,57 +154,6 @@ class SweepFolder:
             for path in folder.glob(".*.partial"):
                 if not _alive(path):
                     path.unlink(missing_ok=True)
-
-    @contextmanager
-    def locked(self, *, shared: bool = False) -> Iterator[None]:
-        """Keep other processes out; the lock goes with the process, however it ends.
-
-        Args:
-            shared: others that compute a share of the tiles may be at work here, too.
-
-        Raises:
-            RunFolderError: another process works there, or the folder can't be written.
-        """
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(self.path, os.O_RDONLY)
-        except OSError as error:
-            raise RunFolderError(
-                f"{self.path}: can't be written: {error.strerror or error}; choose another {OUT}"
-            ) from None
-        try:
-            try:
-                fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-            except OSError:
-                raise RunFolderError(
-                    f"{self.path}: another process is at work there; wait for it, or choose another {OUT} or "
-                    "name"
-                ) from None
-            try:
-                yield
-            except OSError as error:
-                raise StoppedWritingError(
-                    f"{self.path}: can't be read or written: {error.filename or 'a file'}: "
-                    f"{error.strerror or error}; the tiles that are complete stay, and {once_mended(error)}, "
-                    f"{RESUME} computes the others"
-                ) from error
-        finally:
-            os.close(descriptor)
-
-    @property
-    def busy(self) -> bool:
-        """Whether a process is at work here."""
-        try:
-            descriptor = os.open(self.path, os.O_RDONLY)
-        except OSError:
-            return False
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return True
-        finally:
-            os.close(descriptor)
-        return False
 
     def write_summary(self, content: dict[str, Any]) -> None:
         """Write ``summary.json`` atomically."""

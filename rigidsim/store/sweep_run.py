@@ -95,7 +95,7 @@ def so_far(folder: SweepFolder) -> dict[str, Any]:
     ended = summary.get("config_sha256") == latest.config_sha256
     if summary and ended and bool(present.all()):
         return summary
-    busy = folder.busy
+    busy = folder.at_work
     done = int(sum(len(latest.members_of(int(t))) for t in np.flatnonzero(present)))
     status = "running" if busy else ("interrupted" if not ended else summary.get("status", "interrupted"))
     words = "a process is at work on it" if busy else "the tiles that are complete are kept"

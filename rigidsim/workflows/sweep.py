@@ -181,7 +181,7 @@ def run_sweep(
             observer.completing()
             return _completed(wanted, folder, time.perf_counter() - began, time.process_time() - cpu)
     except RunFolderError:
-        if share is not None and folder.busy:  # others complete it
+        if share is not None and folder.at_work:  # others complete it
             return open_sweep(folder.path)
         raise
 

@@ -1,0 +1,110 @@
+"""A folder that one process at a time works in: names of its files, its lock, and what is said of faults."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import ClassVar
+
+from rigidsim.errors import OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
+from rigidsim.scene.records import dataclass
+
+
+@dataclass(frozen=True)
+class WorkFolder:
+    """What the folders of runs and of sweeps have in common.
+
+    Attributes:
+        kept: what stays when writing stops.
+        resumed: what the command that resumes it does with the rest.
+        seen_by: the lock (of ``fcntl``) by which it is seen whether a process is at work: a shared one
+            disturbs nobody else who looks, an exclusive one sees those that share the work too.
+    """
+
+    path: Path
+    kept: ClassVar[str]
+    resumed: ClassVar[str]
+    seen_by: ClassVar[int]
+
+    @property
+    def config(self) -> Path:
+        """What is run, in one visible value per key."""
+        return self.path / "config.toml"
+
+    @property
+    def dataset(self) -> Path:
+        """Everything, when it is finished."""
+        return self.path / "dataset.h5"
+
+    @property
+    def summary(self) -> Path:
+        """How it ended, and what it took."""
+        return self.path / "summary.json"
+
+    @contextmanager
+    def locked(self, *, shared: bool = False) -> Iterator[None]:
+        """Keep other processes out; the lock goes with the process, however it ends.
+
+        Args:
+            shared: others that share the work may be here, too.
+
+        Raises:
+            RunFolderError: another process works there, or the folder can't be written.
+        """
+        try:
+            self.refuse_a_file()
+            self.path.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(self.path, os.O_RDONLY)  # the folder itself: no file is left behind
+        except OSError as error:
+            raise self.unwritable(error) from None
+        try:
+            try:
+                fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            except OSError:
+                raise RunFolderError(
+                    f"{self.path}: another process is at work there; wait for it, or choose another {OUT} or "
+                    "name"
+                ) from None
+            try:
+                yield
+            except OSError as error:
+                raise StoppedWritingError(
+                    f"{self.path}: can't be read or written: {error.filename or 'a file'}: "
+                    f"{error.strerror or error}; {self.kept}, and {once_mended(error)}, {RESUME} "
+                    f"{self.resumed}"
+                ) from error
+        finally:
+            os.close(descriptor)
+
+    @property
+    def at_work(self) -> bool:
+        """Whether a process is at work here, as far as can be told."""
+        try:
+            descriptor = os.open(self.path, os.O_RDONLY)
+        except OSError:
+            return False
+        try:
+            fcntl.flock(descriptor, self.seen_by | fcntl.LOCK_NB)
+        except OSError:
+            return True
+        finally:
+            os.close(descriptor)
+        return False
+
+    def refuse_a_file(self) -> None:
+        """Where the folder should be.
+
+        Raises:
+            RunFolderError: there is one.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
+
+    def unwritable(self, error: OSError) -> RunFolderError:
+        """What to say where nothing can be written."""
+        return RunFolderError(
+            f"{self.path}: can't be written: {error.strerror or error}; choose another {OUT}"
+        )
