@@ -16,7 +16,7 @@ import numpy as np
 import xarray
 
 from rigidsim.formats.angles import converted
-from rigidsim.formats.tables import Column, Table, columns_of
+from rigidsim.formats.tables import BLOCK_NUMBERS, Column, Table, columns_of
 from rigidsim.look.angle_units import AngleUnit
 from rigidsim.scene.records import dataclass
 from rigidsim.store.sweep_dataset import boxes
@@ -26,7 +26,6 @@ REASON = "failed_reason"
 _FAILED = "failed"
 _LONG = ("time", "sample", "line")
 _FIRST = ("status", "warnings", "steps")
-_BLOCK_NUMBERS = 1 << 21  # of a block of all columns: 16 MB
 
 
 @dataclass(frozen=True)
@@ -37,11 +36,13 @@ class MemberTable(Table):
         members: dimensions of the members.
         values: the columns of what is kept, among ``columns``.
         reasons: by member, of those that didn't end well.
+        block_numbers: of all columns that are held in memory at once.
     """
 
     members: tuple[str, ...] = ()
     values: tuple[Column, ...] = ()
     reasons: dict[int, str] = field(default_factory=dict)
+    block_numbers: int = BLOCK_NUMBERS
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -80,8 +81,8 @@ class MemberTable(Table):
         """See ``Table.blocks``; how many rows a block has follows from the number of columns."""
         wanted = self.columns if columns is None else columns
         numbers = sum(len(column.parts) for column in self.columns)
-        for first, shape, flat in boxes(self.shape, self.each * numbers, _BLOCK_NUMBERS):
-            width = self.each if len(flat) > 1 else min(self.each, max(1, _BLOCK_NUMBERS // numbers))
+        for first, shape, flat in boxes(self.shape, self.each * numbers, self.block_numbers):
+            width = self.each if len(flat) > 1 else min(self.each, max(1, self.block_numbers // numbers))
             for low in range(0, self.each, width):
                 here = {dim: slice(i, i + n) for dim, i, n in zip(self.members, first, shape, strict=True)}
                 steps = range(low, min(low + width, self.each))
@@ -141,7 +142,10 @@ class _Block:
 
 
 def member_tables(
-    dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits: int = 53
+    dataset: xarray.Dataset,
+    angle_unit: AngleUnit | None = None,
+    bits: int = 53,
+    block_numbers: int = BLOCK_NUMBERS,
 ) -> list[MemberTable]:
     """The table of the members, then the long ones.
 
@@ -149,6 +153,7 @@ def member_tables(
         dataset: of a sweep.
         angle_unit: that angles are converted to.
         bits: of the members' precision, or more.
+        block_numbers: that are held in memory at once.
     """
     members = tuple(map(str, dataset["status"].dims))
     axes = [str(name) for name, variable in dataset.variables.items() if "swept_key" in variable.attrs]
@@ -174,7 +179,9 @@ def member_tables(
         columns += values
         if dim == MEMBER and reasons:
             columns.append(_made(REASON, "U", "why a member didn't end well"))
-        found.append(MemberTable(dim, tuple(columns), dataset, bits, members, tuple(values), reasons))
+        found.append(
+            MemberTable(dim, tuple(columns), dataset, bits, members, tuple(values), reasons, block_numbers)
+        )
     return found
 
 

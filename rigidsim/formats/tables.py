@@ -21,6 +21,7 @@ from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.variables import LABELS, parts_in
 
 BLOCK_ROWS = 2 * CHUNK_ROWS
+BLOCK_NUMBERS = 1 << 21  # 16 MB
 
 
 @dataclass(frozen=True)

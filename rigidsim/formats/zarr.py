@@ -18,7 +18,7 @@ from rigidsim.store.sweep_dataset import chunk_shape
 from rigidsim.store.variables import parts_in
 
 BLOCK_ROWS = 8 * CHUNK_ROWS
-_SLAB_NUMBERS = 1 << 24  # 128 MB
+_SLAB_BLOCKS = 8  # 128 MB at once: each is an append
 
 
 def write_zarr(table: Table, path: Path, source: Source) -> None:
@@ -33,7 +33,7 @@ def write_zarr(table: Table, path: Path, source: Source) -> None:
     attributes = {str(key): _json(value) for key, value in source.attributes.items()}
     members = table.members if isinstance(table, MemberTable) else ()
     dim = members[0] if members else table.dim
-    rows = _slab(dataset, members) if members else BLOCK_ROWS
+    rows = _slab(table) if isinstance(table, MemberTable) else BLOCK_ROWS
     along = dataset[[name for name in dataset.variables if dim in dataset[name].dims]]
     for first in range(0, max(dataset.sizes[dim], 1), rows):
         block = _plain(along.isel({dim: slice(first, first + rows)}), source)
@@ -90,10 +90,11 @@ def _chunks(variable: xarray.DataArray, members: Sequence[str]) -> tuple[int, ..
     return chunk_shape(variable.shape[:of_members], variable.shape[of_members:])
 
 
-def _slab(dataset: xarray.Dataset, members: Sequence[str]) -> int:
+def _slab(table: MemberTable) -> int:
     """Values of the first axis whose members are held in memory at once."""
-    numbers = sum(found.size for found in dataset.variables.values() if members[0] in found.dims)
-    return max(1, _SLAB_NUMBERS * dataset.sizes[members[0]] // max(numbers, 1))
+    dataset, first = table.dataset, table.members[0]
+    numbers = sum(found.size for found in dataset.variables.values() if first in found.dims)
+    return max(1, _SLAB_BLOCKS * table.block_numbers * dataset.sizes[first] // max(numbers, 1))
 
 
 def _json(value: Any) -> Any:

@@ -12,9 +12,10 @@ from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.angles import angle_unit_named
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.registry import Format, Source, format_named
-from rigidsim.formats.tables import Table, tables_of
+from rigidsim.formats.tables import BLOCK_NUMBERS, Table, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.store import atomic
+from rigidsim.store.run import SavedRun
 from rigidsim.store.variables import parts_in
 from rigidsim.workflows.read import parse
 
@@ -24,79 +25,96 @@ if TYPE_CHECKING:
     import xarray
 
     from rigidsim.look.angle_units import AngleUnit
-    from rigidsim.store.run import SavedRun
     from rigidsim.store.sweep_run import SavedSweep
 
 
 def export(
-    run: SavedRun,
+    saved: SavedRun | SavedSweep,
     file_format: str,
     out: str | Path | None = None,
     *,
     force: bool = False,
     naming: Naming | None = None,
     angle_unit: str | None = None,
+    block_numbers: int = BLOCK_NUMBERS,
 ) -> list[Path]:
-    """Write a run, finished or partial, in another format; block by block, so that memory stays small.
+    """Write a run, finished or partial, or the members of a finished sweep in another format; block by block,
+    so that memory stays small.
 
     Args:
-        run: from ``open_run``.
-        file_format: one of ``rigidsim.formats.FORMATS``.
+        saved: from ``open_run`` or ``open_sweep``.
+        file_format: one of ``rigidsim.formats.FORMATS``; csv, parquet or zarr of a sweep.
         out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default. In csv and
-            parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``.
+            parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``; of a
+            sweep the file has a row per member, and whole series, occurrences of an event and spectral lines
+            go to long tables beside it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
         force: replace what is there.
-        naming: what the run's config leaves open of epoch, axes and names, for aem and oem.
+        naming: what the run's config leaves open of epoch, axes and names, for aem and oem; empty for sweeps.
         angle_unit: that angles are written in, one of ``rigidsim.look.angle_units.ANGLE_UNITS``; rad by
             default. For csv, parquet and zarr.
+        block_numbers: of a sweep that are held in memory at once; no digit depends on it.
 
     Returns:
-        What was written; the table along time first.
+        What was written; the table along time, or of the members, first.
 
     Raises:
-        RigidsimError: unknown format or unit, a package is missing, or the format can't hold the run.
-        RunFolderError: the run is damaged or empty.
+        RigidsimError: unknown format or unit, a package is missing, or the format can't hold what is saved.
+        RunFolderError: the run is damaged or empty, or the sweep isn't finished.
     """
-    found, unit = _asked(file_format, angle_unit)
-    name = run.folder.path.resolve().name
-    target = Path(f"{name}.{file_format}") if out is None else Path(out)
+    found = format_named(file_format)
+    unit = _unit(angle_unit, file_format, found)
+    target = Path(f"{_name(saved)}.{file_format}") if out is None else Path(out)
+    if isinstance(saved, SavedRun):
+        read = _run_read(saved, naming or Naming(), unit)
+    else:
+        _refuse_for_sweeps(saved, file_format, naming)
+        read = _sweep_read(saved, unit, block_numbers)
+    with read as (tables, source):
+        return _written(tables, target, found, source, force)
+
+
+def _name(saved: SavedRun | SavedSweep) -> str:
+    return saved.folder.path.resolve().name
+
+
+def _unit(name: str | None, file_format: str, found: Format) -> AngleUnit | None:
+    """The unit of angles; None for the format's own.
+
+    Raises:
+        RigidsimError: it is unknown, or the format prescribes another.
+    """
+    unit = None if name is None else angle_unit_named(name)
+    if unit is not None and not found.angles:
+        raise RigidsimError(
+            f"--angle-unit: given {name}, but {file_format} prescribes its units; leave it out"
+        )
+    return unit
+
+
+Read = tuple[Sequence[Table], Source]
+"""Tables of an open dataset, the main one first, and what they are of."""
+
+
+@contextmanager
+def _run_read(run: SavedRun, naming: Naming, unit: AngleUnit | None) -> Iterator[Read]:
     with run.opened(indexed=False) as dataset:  # sample times are not loaded as an index
         bits = _bits(dataset)
         attributes = dict(dataset.attrs, status=run.status)
-        source = Source(name, bits, attributes, naming or Naming(), unit)
-        return _written(tables_of(dataset, unit, bits), target, found, source, force)
+        yield tables_of(dataset, unit, bits), Source(_name(run), bits, attributes, naming, unit)
 
 
-def export_sweep(
-    sweep: SavedSweep,
-    file_format: str,
-    out: str | Path | None = None,
-    *,
-    force: bool = False,
-    naming: Naming | None = None,
-    angle_unit: str | None = None,
-) -> list[Path]:
-    """Write the members of a finished sweep in another format; block by block, so that memory stays small.
-
-    Args:
-        sweep: from ``open_sweep``.
-        file_format: csv, parquet or zarr.
-        out: as in ``export``. In csv and parquet it has a row per member; whole series, occurrences
-            of an event and spectral lines go to long tables beside it: ``NAME.time.csv``,
-            ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
-        force: replace what is there.
-        naming: must be empty: what it says is for messages and dates, which sweeps don't have.
-        angle_unit: as in ``export``.
-
-    Returns:
-        What was written; the table of the members first.
-
-    Raises:
-        RigidsimError: unknown format or unit, a package is missing, or the format can't hold a sweep.
-        RunFolderError: the sweep isn't finished, or it is damaged.
-    """
+@contextmanager
+def _sweep_read(sweep: SavedSweep, unit: AngleUnit | None, block_numbers: int) -> Iterator[Read]:
     from rigidsim.formats.member_tables import member_tables
 
-    found, unit = _asked(file_format, angle_unit)
+    with sweep.dataset as dataset:
+        bits = _bits_of_members(dataset)
+        source = Source(_name(sweep), bits, dict(dataset.attrs), Naming(), unit)
+        yield member_tables(dataset, unit, bits, block_numbers), source
+
+
+def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | None) -> None:
+    """What holds a single motion, or is said of one; and sweeps that aren't finished."""
     if file_format not in FOR_SWEEPS:
         raise RigidsimError(
             f"--format: given {file_format}, which holds a single motion, but {sweep.place} is a sweep; "
@@ -110,28 +128,6 @@ def export_sweep(
         )
     if not sweep.finished:
         raise RunFolderError(f"{sweep.place}: the sweep is {sweep.status}; {RESUME} completes it")
-    name = sweep.folder.path.resolve().name
-    target = Path(f"{name}.{file_format}") if out is None else Path(out)
-    with sweep.dataset as dataset:
-        bits = _bits_of_members(dataset)
-        tables = member_tables(dataset, unit, bits)
-        source = Source(name, bits, dict(dataset.attrs), Naming(), unit)
-        return _written(tables, target, found, source, force)
-
-
-def _asked(file_format: str, angle_unit: str | None) -> tuple[Format, AngleUnit | None]:
-    """The format and the unit of angles.
-
-    Raises:
-        RigidsimError: one is unknown, or they don't go together.
-    """
-    found = format_named(file_format)
-    unit = None if angle_unit is None else angle_unit_named(angle_unit)
-    if unit is not None and not found.angles:
-        raise RigidsimError(
-            f"--angle-unit: given {angle_unit}, but {file_format} prescribes its units; leave it out"
-        )
-    return found, unit
 
 
 def _written(tables: Sequence[Table], target: Path, found: Format, source: Source, force: bool) -> list[Path]:

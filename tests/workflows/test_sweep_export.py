@@ -15,7 +15,7 @@ import rigidsim
 from rigidsim.cli.app import app
 from rigidsim.errors import RunFolderError
 from rigidsim.store.sweep_run import SavedSweep
-from rigidsim.workflows.export import export_sweep
+from rigidsim.workflows.export import export
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import sweep as run_sweep
 
@@ -144,16 +144,13 @@ def test_series_and_events_are_long_tables(box: SavedSweep, tmp_path: Path) -> N
     assert [float(row["middle_times"]) for row in found] == times[~np.isnan(times)].tolist()
 
 
-def test_tables_are_the_same_read_in_small_blocks(
-    box: SavedSweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_tables_are_the_same_read_in_small_blocks(box: SavedSweep, tmp_path: Path) -> None:
     pytest.importorskip("zarr")
     whole = [path.read_bytes() for path in written(box, "csv", tmp_path)]
     for numbers in (30, 100):  # two samples of a member, or a few members
-        monkeypatch.setattr("rigidsim.formats.member_tables._BLOCK_NUMBERS", numbers)
-        assert [path.read_bytes() for path in written(box, "csv", tmp_path, "--force")] == whole
-    monkeypatch.setattr("rigidsim.formats.zarr._SLAB_NUMBERS", 1)
-    (store,) = written(box, "zarr", tmp_path)
+        found = export(box, "csv", tmp_path / "out.csv", force=True, block_numbers=numbers)
+        assert [path.read_bytes() for path in found] == whole
+    (store,) = export(box, "zarr", tmp_path / "out.zarr", block_numbers=1)
     with xarray.open_zarr(store) as found:
         xarray.testing.assert_identical(found.load().drop_attrs(), box.dataset.load().drop_attrs())
 
@@ -237,6 +234,6 @@ def test_what_makes_no_sense_is_refused(box: SavedSweep, tmp_path: Path) -> None
 def test_an_unfinished_sweep_is_not_exported(box: SavedSweep, tmp_path: Path) -> None:
     begun = SavedSweep(box.folder, {**box.summary, "status": "interrupted"})
     with pytest.raises(RunFolderError, match=r"is interrupted; .* completes it"):
-        export_sweep(begun, "csv", tmp_path / "out.csv")
+        export(begun, "csv", tmp_path / "out.csv")
     assert list(tmp_path.iterdir()) == []
     assert rigidsim.open_sweep(box.place).finished

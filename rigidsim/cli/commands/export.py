@@ -59,20 +59,12 @@ def export(
     from rigidsim.formats.naming import Naming
     from rigidsim.store.run import open_run
     from rigidsim.store.sweep_folder import is_sweep
+    from rigidsim.store.sweep_run import open_sweep
     from rigidsim.workflows.export import export as write
-    from rigidsim.workflows.export import export_sweep
 
     given = {"epoch": epoch, "axes": axes, "object_name": object_name}
     naming = Naming(**{key: value for key, value in given.items() if value is not None})
-    if is_sweep(run_path):
-        from rigidsim.store.sweep_run import open_sweep
-
-        written = export_sweep(
-            open_sweep(run_path), file_format, out, force=force, naming=naming, angle_unit=angle_unit
-        )
-    else:
-        written = write(
-            open_run(run_path), file_format, out, force=force, naming=naming, angle_unit=angle_unit
-        )
+    saved = open_sweep(run_path) if is_sweep(run_path) else open_run(run_path)
+    written = write(saved, file_format, out, force=force, naming=naming, angle_unit=angle_unit)
     for path in written:
         print(path)
