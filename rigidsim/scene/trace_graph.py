@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -84,3 +86,61 @@ class Graph:
         """Note a decision of the representative."""
         self.guards.setdefault(Guard(kind, left, right, bool(outcome), whole))
         return bool(outcome)
+
+
+class Node:
+    """A number of a graph, and how it compares: whatever is decided by it is noted as a guard.
+
+    Attributes:
+        whole: whether it is one of the graph's whole numbers.
+    """
+
+    __slots__ = ("graph", "node")
+    whole: bool
+
+    def __init__(self, graph: Graph, node: int) -> None:
+        self.graph, self.node = graph, node
+
+    @property
+    def value(self) -> Any:
+        """The representative's."""
+        return self._values[self.node]
+
+    @property
+    def _values(self) -> Sequence[Any]:
+        return self.graph.whole_values if self.whole else self.graph.values
+
+    @abstractmethod
+    def _other(self, other: Any) -> int:
+        """The node of another number, plain ones included."""
+
+    def _less(self, left: int, right: int) -> bool:
+        outcome = self._values[left] < self._values[right]
+        return self.graph.decide("<", left, right, outcome, whole=self.whole)
+
+    def __hash__(self) -> int:
+        return 0  # whether two are equal is always decided by a guard
+
+    def __eq__(self, other: object) -> bool:
+        if other is None or isinstance(other, str):
+            return False
+        there = self._other(other)
+        if there == self.node:
+            return True
+        outcome = self._values[self.node] == self._values[there]
+        return self.graph.decide("=", self.node, there, outcome, whole=self.whole)
+
+    def __lt__(self, other: Any) -> bool:
+        return self._less(self.node, self._other(other))
+
+    def __gt__(self, other: Any) -> bool:
+        return self._less(self._other(other), self.node)
+
+    def __le__(self, other: Any) -> bool:
+        return not self > other
+
+    def __ge__(self, other: Any) -> bool:
+        return not self < other
+
+    def __bool__(self) -> bool:
+        return self != 0

@@ -12,21 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from rigidsim.scene.trace_graph import Graph, Untraceable
+from rigidsim.scene.trace_graph import Node, Untraceable
 
 
-class Traced:
+class Traced(Node):
     """A number of a graph; see the module."""
 
-    __slots__ = ("graph", "node")
-
-    def __init__(self, graph: Graph, node: int) -> None:
-        self.graph, self.node = graph, node
-
-    @property
-    def value(self) -> Any:
-        """The representative's (mpf)."""
-        return self.graph.values[self.node]
+    __slots__ = ()
+    whole = False
 
     def _other(self, other: Any) -> int:
         if isinstance(other, Traced):
@@ -116,36 +109,6 @@ class Traced:
 
     def __abs__(self) -> Any:
         return self._made("absolute", (self.node,), abs(self.value))
-
-    # --- decisions ------------------------------------------------------------------------------------------
-
-    def __hash__(self) -> int:
-        return 0  # whether two are equal is always decided by a guard
-
-    def __eq__(self, other: object) -> bool:
-        if other is None or isinstance(other, str):
-            return False
-        there = self._other(other)
-        if there == self.node:
-            return True
-        return self.graph.decide("=", self.node, there, self.value == self.graph.values[there])
-
-    def __lt__(self, other: Any) -> bool:
-        there = self._other(other)
-        return self.graph.decide("<", self.node, there, self.value < self.graph.values[there])
-
-    def __gt__(self, other: Any) -> bool:
-        there = self._other(other)
-        return self.graph.decide("<", there, self.node, self.graph.values[there] < self.value)
-
-    def __le__(self, other: Any) -> bool:
-        return not self > other
-
-    def __ge__(self, other: Any) -> bool:
-        return not self < other
-
-    def __bool__(self) -> bool:
-        return self != 0
 
     def __float__(self) -> float:
         return float(self._decided())

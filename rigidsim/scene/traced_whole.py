@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from rigidsim.scene.trace_graph import Graph
+from rigidsim.scene.trace_graph import Node
 from rigidsim.scene.traced import Traced
 
 
-class TracedWhole:
+class TracedWhole(Node):
     """A whole number that depends on traced ones, such as the binary exponent of a unit."""
 
-    __slots__ = ("graph", "node")
-
-    def __init__(self, graph: Graph, node: int) -> None:
-        self.graph, self.node = graph, node
-
-    @property
-    def value(self) -> int:
-        """The representative's."""
-        return self.graph.whole_values[self.node]
+    __slots__ = ()
+    whole = True
 
     def _other(self, other: Any) -> int:
         if isinstance(other, TracedWhole):
@@ -55,35 +48,8 @@ class TracedWhole:
     def __abs__(self) -> TracedWhole:
         return self._made("absolute", (self.node,), abs(self.value))
 
-    def __hash__(self) -> int:
-        return 0
-
-    def __eq__(self, other: object) -> bool:
-        there = self._other(other)
-        return self._decide("=", self.node, there, self.value == self.graph.whole_values[there])
-
-    def __lt__(self, other: Any) -> bool:
-        there = self._other(other)
-        return self._decide("<", self.node, there, self.value < self.graph.whole_values[there])
-
-    def __gt__(self, other: Any) -> bool:
-        there = self._other(other)
-        return self._decide("<", there, self.node, self.graph.whole_values[there] < self.value)
-
-    def __le__(self, other: Any) -> bool:
-        return not self > other
-
-    def __ge__(self, other: Any) -> bool:
-        return not self < other
-
-    def __bool__(self) -> bool:
-        return self != 0
-
-    def _decide(self, kind: str, left: int, right: int, outcome: bool) -> bool:
-        return self.graph.decide(kind, left, right, outcome, whole=True)
-
     def __index__(self) -> int:
-        self._decide("=", self.node, self._other(self.value), True)
+        self.graph.decide("=", self.node, self._other(self.value), outcome=True, whole=True)
         return self.value
 
     __int__ = __index__
