@@ -81,6 +81,10 @@ class ConfigError(RigidsimError):
         return ConfigError(self.problems, source)
 
 
+class MemberError(ConfigError):
+    """A member of a sweep can't be run; ``problems`` name it beside the key."""
+
+
 class RunFolderError(RigidsimError):
     """A run folder is missing, unfinished, damaged, in use, or would be overwritten."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 
 from rigidsim.session.verdict import Soundness, verdict_on
+from rigidsim.solve.status import Status
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Advice, AdviceCode
 
@@ -53,9 +54,10 @@ def next_lines(status: str, exit_code: int, place: str) -> list[str]:
     if not place:
         return []
     where = shlex.quote(place)
-    if exit_code == 0 and status.startswith("finished"):
+    if exit_code == 0 and status in _DONE:
         return [f"rigidsim view {where}", f"rigidsim plot {where}"]
     return [f"rigidsim resume {where}"] if exit_code == 130 or status in _RESUMABLE else []
 
 
-_RESUMABLE = ("running", "stopped: wall_time", "stopped: max_steps")
+_DONE = {s.value for s in (Status.FINISHED, Status.EVENT)}
+_RESUMABLE = {s.value for s in (Status.RUNNING, Status.WALL_TIME, Status.MAX_STEPS)}

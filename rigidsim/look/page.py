@@ -15,6 +15,9 @@ from rigidsim.look.roles import drifts
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable
 
+_AVERAGED = ("spin_averaged", "orbit_averaged")
+"""Levels of the model whose datasets have axes, but no attitude."""
+
 
 def read_config(dataset: Table) -> dict[str, Any]:
     """The embedded config as a dictionary; empty when there is none or it can't be read."""
@@ -75,7 +78,7 @@ def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
 
 def is_averaged(attributes: Mapping[str, Any]) -> bool:
     """Whether a dataset with these attributes is of an averaged model: it has axes, but no attitude."""
-    return str(attributes.get("formulation", "")).endswith("averaged")
+    return attributes.get("formulation") in _AVERAGED
 
 
 def notes_page(kind: str, notes: list[str]) -> str:

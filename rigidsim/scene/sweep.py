@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from functools import cached_property, lru_cache
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, MemberError, Problem
 from rigidsim.scene.config import Experiment, parse, validated
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import apply_overrides, key_steps
@@ -187,8 +187,10 @@ class Sweep:
         except ConfigError as error:
             raise self.blamed(member, error) from None
 
-    def blamed(self, member: int, error: ConfigError) -> ConfigError:
-        """An error that names the member beside the key."""
+    def blamed(self, member: int, error: ConfigError) -> MemberError:
+        """The error naming the member beside the key; one that does is left as it is."""
+        if isinstance(error, MemberError):
+            return error
         named = ", ".join(
             f"{axis.name} = {shown_text(text)}"
             for axis, text in zip(self.axes, self.texts(member), strict=True)
@@ -197,7 +199,7 @@ class Sweep:
             Problem(f"[sweep] member {member} ({named})", f"{problem.where}: {problem.what}")
             for problem in error.problems
         ]
-        return ConfigError(problems, self.experiment.source)
+        return MemberError(problems, self.experiment.source)
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -42,14 +42,14 @@ def check_sweep(sweep: Sweep, *, every: bool = True) -> InitialValueProblem:
         first = prepare(sweep.worked_out(0))
         refuse_taken_names(first)
     except ConfigError as error:
-        raise _blamed(sweep, 0, error) from None
+        raise sweep.blamed(0, error) from None
     problems: list[Problem] = []
     for member in _tried(sweep):
         try:
             experiment = sweep.worked_out(member)
             check_start(build_scene(experiment))
         except ConfigError as error:
-            problems += _blamed(sweep, member, error).problems
+            problems += sweep.blamed(member, error).problems
             if len(problems) >= _MOST_TOLD:
                 break
     if not problems and every and sweep.count > _ALL:
@@ -67,17 +67,11 @@ def _of_families(sweep: Sweep) -> list[Problem]:
     for begin in range(0, sweep.count, _AT_ONCE):
         refused, shared = batches.refused(range(begin, min(begin + _AT_ONCE, sweep.count)), _MOST_TOLD)
         if refused:
-            errors = [_blamed(sweep, member, refused[member]) for member in sorted(refused)]
+            errors = [sweep.blamed(member, refused[member]) for member in sorted(refused)]
             return [problem for error in errors for problem in error.problems]
         if not shared:
             break
     return []
-
-
-def _blamed(sweep: Sweep, member: int, error: ConfigError) -> ConfigError:
-    if error.problems[0].where.startswith("[sweep] member"):
-        return error
-    return sweep.blamed(member, error)
 
 
 def _tried(sweep: Sweep) -> Iterator[int]:

@@ -63,7 +63,7 @@ class ReferenceThread(threading.Thread):
         self, experiment: Experiment, plan: Plan, deadline: float, grace: float, *, wanted: bool
     ) -> None:
         super().__init__(daemon=True)
-        self._experiment, self._plan, self._deadline, self._grace = experiment, plan, deadline, grace
+        self._experiment, self._deadline, self._grace = experiment, deadline, grace
         self._exact = closed_form_to(LEAST_DIGITS).setting
         self._tasks: list[Task] = []
         if plan.closed:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.angle_units import angle_unit
-from rigidsim.look.page import is_averaged
+from rigidsim.look.page import is_averaged, read_config
 from rigidsim.look.readable_time import span_text
 from rigidsim.look.stages.bodies import Subject, direction_of, source_arrows
 from rigidsim.look.stages.parts import (
@@ -50,8 +50,8 @@ def axis_in_space(dataset: Table, axis: str) -> Array | None:
     found = signals.pole(dataset, axis)
     if found is None and "obliquity" in dataset and "node_longitude" in dataset:
         pair = signals.orientation(dataset, axis)
-        plane = str(dataset["obliquity"].attrs.get("reference_plane", "XY"))
-        if pair is not None and plane.startswith("XY"):
+        against_space = read_config(dataset).get("frame", {}).get("reference", "space") == "space"
+        if pair is not None and against_space:
             tilt, node = pair
             found = np.stack(
                 [np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1
