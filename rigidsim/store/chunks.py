@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 import os
+import zlib
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -17,30 +18,55 @@ import h5py
 import numpy as np
 from h5py import h5d, h5z
 
+from rigidsim.scene.records import dataclass
+
+Deflate = Callable[..., bytes]
+"""Of bytes, at a level."""
+ZLIB: tuple[Deflate, int] = zlib.compress, 4
 try:
-    from isal.isal_zlib import compress as _deflate
+    from isal import isal_zlib
 
-    _LEVEL = 1  # levels 2 and 3 take 1.2 and 2.2 times as long for 0.02 and 0.2 % less
+    # levels 2 and 3 take 1.2 and 2.2 times as long for 0.02 and 0.2 % less
+    FASTEST: tuple[Deflate, int] = isal_zlib.compress, 1
 except ImportError:
-    from zlib import compress as _deflate
-
-    _LEVEL = 4
-
-_MOST_THREADS = 4  # more of them wait for the disk
-_MOST_WAITING = 64  # chunks, of 64 kB for each component
-_FEWEST_FOR_THREADS = 250_000  # numbers: some milliseconds of work
+    FASTEST = ZLIB
 
 
-def packed(values: np.ndarray) -> bytes:
+@dataclass(frozen=True)
+class Threads:
+    """When chunks are compressed in threads of their own.
+
+    Attributes:
+        most: of them; more than four wait for the disk. None: as many of four as there are idle processors.
+        fewest: numbers from which on there are any: some milliseconds of work.
+        waiting: chunks that may wait to be written, of 64 kB for each component.
+    """
+
+    most: int | None = None
+    fewest: int = 250_000
+    waiting: int = 64
+
+    @property
+    def count(self) -> int:
+        """How many to begin with now."""
+        return min(4, _processors()) if self.most is None else self.most
+
+
+THREADS = Threads()
+
+
+def packed(values: np.ndarray, by: tuple[Deflate, int] = FASTEST) -> bytes:
     """Doubles as they stand in a chunk: all first bytes, all second bytes, ..., deflated."""
+    deflate, level = by
     octets = np.ascontiguousarray(values, "<f8").view(np.uint8).reshape(-1, 8)
-    return bytes(_deflate(np.ascontiguousarray(octets.T), _LEVEL))
+    return bytes(deflate(np.ascontiguousarray(octets.T), level))
 
 
 class Compressor:
     """Compresses chunks, in threads as soon as there is enough to do; see ``close``."""
 
-    def __init__(self) -> None:
+    def __init__(self, threads: Threads = THREADS) -> None:
+        self.threads = threads
         self._pool: ThreadPoolExecutor | None = None
         self._numbers = 0
 
@@ -52,8 +78,8 @@ class Compressor:
         """
         done: list[Future[bytes]] = [Future() for _ in chunks]
         self._numbers += sum(chunk.size for chunk in chunks)
-        if self._pool is None and self._numbers > _FEWEST_FOR_THREADS:
-            threads = min(_MOST_THREADS, _processors())
+        if self._pool is None and self._numbers > self.threads.fewest:
+            threads = self.threads.count
             self._pool = ThreadPoolExecutor(threads, "rigidsim-chunks") if threads else None
         if self._pool is not None:
             self._pool.submit(_pack, chunks, done)
@@ -80,7 +106,7 @@ class ChunkWriter:
     """Writes chunks in the order in which they come, while later ones are compressed."""
 
     def __init__(self, compressor: Compressor) -> None:
-        self._compressor = compressor
+        self._compressor, self._most = compressor, compressor.threads.waiting
         self._waiting: deque[tuple[h5d.DatasetID, tuple[int, ...], Future[bytes]]] = deque()
 
     def put(self, target: h5d.DatasetID, place: tuple[int, ...], values: np.ndarray) -> None:
@@ -91,7 +117,7 @@ class ChunkWriter:
             values: not to be changed from now on.
         """
         self._waiting.append((target, place, *self._compressor.packed([values])))
-        while self._waiting and (len(self._waiting) > _MOST_WAITING or self._waiting[0][2].done()):
+        while self._waiting and (len(self._waiting) > self._most or self._waiting[0][2].done()):
             self._write_next()
 
     def finish(self) -> None:
@@ -219,9 +245,11 @@ def _packed_alike(saved: h5d.DatasetID) -> bool:
 
 
 @contextmanager
-def chunked(variables: Mapping[str, h5d.DatasetID]) -> Iterator[dict[str, ChunkedVariable]]:
+def chunked(
+    variables: Mapping[str, h5d.DatasetID], threads: Threads = THREADS
+) -> Iterator[dict[str, ChunkedVariable]]:
     """The chunks of compressed variables, whose rows are added inside the block; written when it ends."""
-    compressor = Compressor()
+    compressor = Compressor(threads)
     writer = ChunkWriter(compressor)
     chunks = {name: ChunkedVariable(target, writer) for name, target in variables.items()}
     try:

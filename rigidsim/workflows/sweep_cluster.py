@@ -18,7 +18,6 @@ from rigidsim.workflows.sweep_ways import task
 
 _AHEAD = 2  # tiles for each thread
 _MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
-_CONNECT_SECONDS = 20
 _LOOK_SECONDS = 5
 _ALONE_SECONDS = 120  # without any worker, after which nobody waits any more
 
@@ -28,10 +27,11 @@ class Cluster:
 
     Args:
         address: of the scheduler, such as ``tcp://10.0.0.1:8786``.
+        patience: seconds in which it must answer.
     """
 
-    def __init__(self, address: str) -> None:
-        self._address = address
+    def __init__(self, address: str, patience: float = 20.0) -> None:
+        self._address, self._patience = address, patience
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
         """See ``Way``.
@@ -42,7 +42,7 @@ class Cluster:
         """
         distributed = _distributed()
         try:
-            client = distributed.Client(self._address, timeout=_CONNECT_SECONDS, set_as_default=False)
+            client = distributed.Client(self._address, timeout=self._patience, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise RigidsimError(
                 f"--scheduler {self._address}: no Dask scheduler answers ({error or type(error).__name__}); "

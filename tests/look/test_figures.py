@@ -439,15 +439,13 @@ def test_rates_only_and_moving_runs_have_their_panels(symmetric_top: Build) -> N
     assert axes.get_xlabel() == "X [Mm]"
 
 
-def test_largest_drift_is_that_of_every_sample(symmetric_top: Build, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_largest_drift_is_that_of_every_sample(symmetric_top: Build) -> None:
     dataset = symmetric_top(count=9999)
     dataset["energy_drift"][4567] = -3e-9  # between the samples that the curves show
-    monkeypatch.setattr(composing, "ROWS", 500)
-    shown = composing.shown_rows(dataset)
+    shown = composing.shown_rows(dataset, 500)
     assert shown.rows.sizes["time"] <= 500
     assert (shown.largest, shown.complete) == ({"energy": 3e-9}, True)
-    monkeypatch.setattr(composing, "FULL_READ", 5000)
-    shown = composing.shown_rows(dataset)
+    shown = composing.shown_rows(dataset, 500, 5000)
     assert (shown.largest, shown.complete) == ({"energy": pytest.approx(1e-16 * 9998)}, False)
     assert ("largest drift, energy", "≥ 1.0e-12") in composing.facts_of(shown)
 

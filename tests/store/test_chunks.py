@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from rigidsim.store import chunks, netcdf
-from rigidsim.store.chunks import ChunkedVariable, chunked, packed
+from rigidsim.store.chunks import THREADS, ZLIB, ChunkedVariable, Threads, chunked, packed
 from rigidsim.store.netcdf_file import writing
 
 ROWS = 70
@@ -29,7 +29,9 @@ def table(rows: int = ROWS) -> np.ndarray:
 
 
 @contextmanager
-def under_construction(path: Path, rows: int) -> Iterator[dict[str, ChunkedVariable]]:
+def under_construction(
+    path: Path, rows: int, threads: Threads = THREADS
+) -> Iterator[dict[str, ChunkedVariable]]:
     """Rates and a number, in chunks of 16 rows."""
     with path.open("w+b") as target, writing(target) as file:
         file.dimension("time", rows)
@@ -38,21 +40,16 @@ def under_construction(path: Path, rows: int) -> Iterator[dict[str, ChunkedVaria
             name: file.variable(name, dims, {}, chunk_rows=16, gzip=netcdf.GZIP_LEVEL)
             for name, dims in (("rates", ("time", "body_axis")), ("energy", ("time",)))
         }
-        with chunked(created) as made:
+        with chunked(created, threads) as made:
             yield made
 
 
 @pytest.mark.parametrize("threads", [0, 3])
 @pytest.mark.parametrize("cuts", [[ROWS], [1] * ROWS, [16, 16, 38], [5, 40, 0, 25], [15, 17, 1, 37]])
-def test_rows_in_any_pieces_come_out_in_order(
-    cuts: list[int], threads: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(chunks, "_FEWEST_FOR_THREADS", 0)
-    monkeypatch.setattr(chunks, "_MOST_WAITING", 2)
-    monkeypatch.setattr(chunks, "_processors", lambda: threads)
+def test_rows_in_any_pieces_come_out_in_order(cuts: list[int], threads: int, tmp_path: Path) -> None:
     values, path, first = table(), tmp_path / "d.h5", 0
     columns = np.asfortranarray(values)  # as they come from compiled functions
-    with under_construction(path, ROWS) as made:
+    with under_construction(path, ROWS, Threads(threads, fewest=0, waiting=2)) as made:
         for rows in cuts:
             made["rates"].add(columns[first : first + rows])
             made["energy"].add(values[first : first + rows, 1:2])
@@ -72,13 +69,11 @@ def test_a_chunk_is_what_hdf5_would_have_written(tmp_path: Path) -> None:
     assert zlib.decompress(packed(values)) == zlib.decompress(theirs)
 
 
-def test_without_isal_the_content_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_isal_the_content_is_the_same() -> None:
     pytest.importorskip("isal")
-    fast = packed(table())
-    monkeypatch.setattr(chunks, "_deflate", zlib.compress)
-    monkeypatch.setattr(chunks, "_LEVEL", 4)
-    assert packed(table()) != fast  # another library's choice of words
-    assert zlib.decompress(packed(table())) == zlib.decompress(fast)
+    fast, slow = packed(table()), packed(table(), ZLIB)
+    assert slow != fast  # another library's choice of words
+    assert zlib.decompress(slow) == zlib.decompress(fast)
 
 
 def test_chunks_that_fit_are_taken_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,13 +109,11 @@ def test_chunks_of_another_make_are_not_taken(options: dict[str, object], tmp_pa
         made["energy"].add(table()[:, 0])
 
 
-def test_an_error_ends_the_threads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunks, "_FEWEST_FOR_THREADS", 0)
-    monkeypatch.setattr(chunks, "_processors", lambda: 2)
-
+def test_an_error_ends_the_threads(tmp_path: Path) -> None:
     def interrupted() -> None:
-        with under_construction(tmp_path / "d.h5", ROWS) as made:
+        with under_construction(tmp_path / "d.h5", ROWS, Threads(2, fewest=0)) as made:
             made["rates"].add(table())
+            assert any(thread.name.startswith("rigidsim-chunks") for thread in threading.enumerate())
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -12,6 +12,7 @@ import pytest
 from rigidsim.errors import RigidsimError
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import SweepObserver, sweep
+from rigidsim.workflows.sweep_cluster import Cluster
 
 distributed = pytest.importorskip("distributed")
 
@@ -60,7 +61,8 @@ def test_a_cluster_makes_the_same_dataset_though_a_worker_dies(tmp_path: Path) -
         np.testing.assert_array_equal(found.dataset[name].values, alone.dataset[name].values)
 
 
-def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rigidsim.workflows.sweep_cluster._CONNECT_SECONDS", 0.5)
+def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path) -> None:
+    begun = sweep(parse(CONFIG), out=tmp_path)
+    (generation,) = begun.folder.generations()
     with pytest.raises(RigidsimError, match="no Dask scheduler answers"):
-        sweep(parse(CONFIG), out=tmp_path, scheduler="tcp://127.0.0.1:9")
+        next(Cluster("tcp://127.0.0.1:9", patience=0.5).images(generation, [0]))

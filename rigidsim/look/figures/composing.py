@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ROWS = 20_000  # of a dataset that a figure shows at most
-FULL_READ = 2_000_000  # samples up to which all drifts are read for their largest value
+ROWS, FULL_READ = 20_000, 2_000_000  # that a figure draws; that are read for the largest drift
 
 _CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
@@ -45,8 +44,8 @@ class Shown:
     """A dataset's rows as a figure shows them, in memory, and what was found in all of them.
 
     Attributes:
-        rows: at most `ROWS`, evenly strided.
-        start: the first `ROWS`, every one.
+        rows: evenly strided, not too many.
+        start: as many from the start on, every one.
         largest: magnitude of each invariant's drift.
         complete: whether every sample was read for it.
     """
@@ -57,20 +56,24 @@ class Shown:
     complete: bool
 
 
-def shown_rows(dataset: xarray.Dataset) -> Shown:
+def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ) -> Shown:
     """What a figure needs of a dataset, which may be lazy and of any length.
+
+    Args:
+        most: rows that it shows.
+        read: samples up to which all drifts are read for their largest value.
 
     Raises:
         ValueError: no time coordinate, or no samples.
     """
-    rows = thin(dataset, ROWS).assign_attrs(dataset.attrs)
+    rows = thin(dataset, most).assign_attrs(dataset.attrs)
     # A figure of few points shouldn't understate the drifts, unless reading them all takes long.
-    complete = dataset.sizes["time"] <= max(FULL_READ, rows.sizes["time"])
+    complete = dataset.sizes["time"] <= max(read, rows.sizes["time"])
     whole = dataset if complete else rows
     largest = {name: largest_drift(drift) for name, drift in drifts(whole).items()}
     start = rows
     if dataset.sizes["time"] > rows.sizes["time"]:
-        start = thin(dataset.isel(time=slice(0, ROWS)), ROWS).assign_attrs(dataset.attrs)
+        start = thin(dataset.isel(time=slice(0, most)), most).assign_attrs(dataset.attrs)
     return Shown(rows, start, largest, complete)
 
 
