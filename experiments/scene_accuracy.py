@@ -20,6 +20,8 @@ import numpy as np
 
 import rigidsim
 from rigidsim.accuracy.error_law import round_off_law
+from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import try_setting
 
 EPSILON = 2.0**-52
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -34,11 +36,19 @@ def run(path: Path, out: str, *overrides: str) -> rigidsim.Run:
 
 
 def quaternions(result: rigidsim.Run) -> np.ndarray:
-    """With the residuals of 80-bit runs."""
+    """Of unit length."""
     with result.dataset as dataset:
-        values = dataset["quaternion"].values.astype(np.longdouble)
-        if "quaternion_lo" in dataset:
-            values = values + dataset["quaternion_lo"].values
+        return unit(dataset["quaternion"].values.astype(np.longdouble))
+
+
+def better(path: Path) -> np.ndarray:
+    """The same in 80-bit arithmetic; in code that compiles in a tenth of the time."""
+    trial = try_setting(rigidsim.load(path), Setting("extended"), compact=True)
+    return unit(sum((part.astype(np.longdouble) for part in trial.attitudes), np.longdouble(0)))
+
+
+def unit(values: np.ndarray) -> np.ndarray:
+    """Without the error of the norm."""
     return values / np.sqrt((values * values).sum(axis=1))[:, None]
 
 
@@ -50,7 +60,7 @@ def largest_angle(p: np.ndarray, q: np.ndarray) -> float:
 
 def rows(path: Path, out: str) -> list[str]:
     """The table's rows of one scene."""
-    reference = quaternions(run(path, out, 'integrator.precision="extended"'))
+    reference = better(path)
     found = []
     for formulation in FORMULATIONS:
         overrides = [f'integrator.formulation="{formulation}"']

@@ -29,6 +29,18 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
         return (yield)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that say how many seconds they take (``slow(seconds)``) begin first, the longest of them at once:
+    no worker is left alone with one at the end.
+    """
+
+    def seconds(item: pytest.Item) -> float:
+        marker = item.get_closest_marker("slow")
+        return marker.args[0] if marker and marker.args else 0.0
+
+    items.sort(key=seconds, reverse=True)  # stable: the others in their files' order
+
+
 @pytest.fixture
 def runs(tmp_path: Path) -> Path:
     """An empty folder for run folders."""

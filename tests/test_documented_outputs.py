@@ -1,8 +1,9 @@
 """Outputs that the documentation shows are those of the code.
 
-Above a shown output stands a marker, ``<!-- output: COMMAND -->`` (or ``slow output``, for the long stage). A
-fenced block below it is all that the command prints on stdout, a table below it the command's table, row by
-row. ``python tests/test_documented_outputs.py [FILE...]`` writes them anew: when numbers are meant to move.
+Above a shown output stands a marker, ``<!-- output: COMMAND -->`` (or ``slow output``, for the long stage;
+``studies output``: the tests of the studies compare it, study by study). A fenced block below it is all that
+the command prints on stdout, a table below it the command's table, row by row.
+``python tests/test_documented_outputs.py [FILE...]`` writes them anew: when numbers are meant to move.
 
 They agree in every word, and number by number:
 
@@ -34,10 +35,11 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), ROOT / "experiments" / "README.md"]
 _BLOCK = r"(```\n.*?^```$|(?:\|[^\n]*\n)+)"
-_MARKER = re.compile(rf"<!-- (slow )?output: (.+?) -->\n+{_BLOCK}", re.MULTILINE | re.DOTALL)
+_MARKER = re.compile(rf"<!-- (?:(slow|studies) )?output: (.+?) -->\n+{_BLOCK}", re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.]*\w)")
 _TIME = re.compile(r"(?<![\w.])\d[\d.]* (?:ns|us|ms|s|min|h)\b")
 _ROUNDING = 1e-13
+_MARKS = {"": (), "slow": pytest.mark.slow(60)}
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,12 @@ class Shown:
     """An output as it is shown.
 
     Attributes:
+        stage: "slow", "studies" or "", as in the marker.
         span: of its lines in the page's text.
     """
 
     page: Path
-    slow: bool
+    stage: str
     command: str
     text: str
     span: tuple[int, int]
@@ -81,7 +84,7 @@ def shown_in(page: Path) -> list[Shown]:
     """All marked outputs of a page."""
     text = page.read_text(encoding="utf-8")
     found = _MARKER.finditer(text)
-    return [Shown(page, match[1] is not None, match[2], match[3], match.span(3)) for match in found]
+    return [Shown(page, match[1] or "", match[2], match[3], match.span(3)) for match in found]
 
 
 OUTPUTS = [shown for page in PAGES for shown in shown_in(page)]
@@ -140,8 +143,9 @@ def close(one: str, other: str) -> bool:
 @pytest.mark.parametrize(
     "shown",
     [
-        pytest.param(shown, id=f"{shown.page.name}: {shown.command}", marks=[pytest.mark.slow] * shown.slow)
+        pytest.param(shown, id=f"{shown.page.name}: {shown.command}", marks=_MARKS[shown.stage])
         for shown in OUTPUTS
+        if shown.stage in _MARKS
     ],
 )
 def test_what_is_shown_is_what_is_printed(shown: Shown, tmp_path: Path) -> None:
@@ -153,7 +157,7 @@ def test_what_is_shown_is_what_is_printed(shown: Shown, tmp_path: Path) -> None:
 def test_every_marker_has_its_output() -> None:
     markers = sum(len(re.findall(r"<!--.*output", page.read_text(encoding="utf-8"))) for page in PAGES)
     assert markers == len(OUTPUTS) >= 3
-    assert any(not shown.slow for shown in OUTPUTS)
+    assert {shown.stage for shown in OUTPUTS} == {"", "slow", "studies"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))

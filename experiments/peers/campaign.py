@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import os
@@ -137,6 +138,7 @@ def _note(
         measured.notes.append(note)
 
 
+@functools.cache
 def reference(name: str, end: float) -> list[Any]:
     """The final quaternion by heyoka in 128-bit arithmetic, tolerance 1e-32."""
     from experiments.peers.bare_heyoka import reference as integrated

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from test_documented_outputs import differences, shown_in
 
 ROOT = Path(__file__).parents[2]
 
@@ -19,25 +19,31 @@ from experiments import all as everything  # noqa: E402
 from experiments import closed_forms, common, measure  # noqa: E402
 from experiments.common import Check  # noqa: E402
 
-SLOW = {
-    "averaged_motions",
-    "flip_period",
-    "heavy_top_regimes",
-    "hyperion",
-    "luni_solar_precession",
-    "precession_and_nutation",
-    "satellite_stability",
+GUIDE = ROOT / "experiments" / "README.md"
+SLOW = {  # about how many seconds they take
+    "averaged_motions": 100,
+    "flip_period": 15,
+    "heavy_top_regimes": 15,
+    "hyperion": 40,
+    "luni_solar_precession": 15,
+    "precession_and_nutation": 40,
+    "satellite_stability": 15,
+    "spectral_lines": 15,
 }
-SLOW |= {"spectral_lines"}
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in everything.STUDIES]
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow(SLOW[name]) if name in SLOW else ())
+        for name in everything.STUDIES
+    ],
 )
-def test_study_passes_and_draws(name: str, tmp_path: Path) -> None:
-    checks = importlib.import_module(f"experiments.{name}").study(False, tmp_path)
+def test_study_passes_and_draws_and_the_guide_shows_its_rows(name: str, tmp_path: Path) -> None:
+    checks, broken = everything.run_studies([name], False, tmp_path)
     failed = [check.row for check in checks if not check.passed]
     assert checks
+    assert not broken
     assert not failed, "\n".join(failed)
     assert all(check.source for check in checks)
     pixels = imread(tmp_path / f"{name}.png")[:, :, :3]
@@ -45,11 +51,26 @@ def test_study_passes_and_draws(name: str, tmp_path: Path) -> None:
     assert pixels.shape[0] >= 500
     assert pixels.shape[1] >= 1000
     assert 0.01 < inked < 0.9
+    head, rows = shown_in_the_guide()
+    shown = [row for row in rows if row.startswith(f"| {name}: ")]
+    made = [line for line in common.table(checks).splitlines() if line.startswith("|")]
+    found = differences("\n".join([*head, *shown]), "\n".join(made))
+    assert not found, "\n".join(["experiments/README.md, the table of all studies", *found])
 
 
-def test_every_study_of_the_folder_is_in_the_list() -> None:
+def shown_in_the_guide() -> tuple[list[str], list[str]]:
+    """The table of all studies: its two lines of head, and its rows."""
+    (shown,) = (shown for shown in shown_in(GUIDE) if shown.stage == "studies")
+    lines = shown.text.splitlines()
+    return lines[:2], lines[2:]
+
+
+def test_every_study_of_the_folder_is_in_the_list_and_in_the_guide() -> None:
     found = {path.stem for path in (ROOT / "experiments").glob("*.py") if "\ndef study(" in path.read_text()}
     assert found == set(everything.STUDIES)
+    assert list(dict.fromkeys(row[2:].split(":")[0] for row in shown_in_the_guide()[1])) == [
+        *everything.STUDIES
+    ]
 
 
 @pytest.mark.slow
@@ -59,7 +80,8 @@ def test_a_wrong_expected_value_makes_the_exit_code_1(
     from experiments import earth_free_nutation as earth
 
     arguments = ["--out", str(tmp_path)]
-    assert common.main(earth.study, earth.NAME, arguments) == 0
+    assert everything.main(["earth_free_nutation", "free_flight_energy", *arguments]) == 0
+    assert "all passed" in capsys.readouterr().out
     monkeypatch.setattr(earth, "FLATTENING", "0.003273795")  # the eighth digit
     assert common.main(earth.study, earth.NAME, arguments) == 1
     assert "FAILED" in capsys.readouterr().out
