@@ -20,8 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "gallery.md"
 PICTURES = ROOT / "docs" / "figures" / "gallery"
 CONFIGS = sorted((ROOT / "configs").glob("*.toml"))
-_DOTS_PER_INCH = 64
-_COLOURS = 64  # of a picture's palette
+_DOTS_PER_INCH = 100
+_COLOURS = 256  # of a picture's palette
 _COLUMNS = (
     "config",
     "states",
@@ -91,7 +91,7 @@ def picture(run: rigidsim.Run, name: str) -> None:
     figure.savefig(data, format="png", dpi=_DOTS_PER_INCH)
     pyplot.close(figure)
     data.seek(0)
-    image = Image.open(data).convert("RGB").quantize(_COLOURS)
+    image = Image.open(data).convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE)
     PICTURES.mkdir(parents=True, exist_ok=True)
     image.save(PICTURES / f"{name}.png", optimize=True)
 

@@ -187,7 +187,10 @@ def plot_view(plot: Plot) -> rrb.TimeSeriesView:
     corner = rrb.Corner2D.RightBottom if plot.place == "drift" else rrb.Corner2D.LeftTop
     return rrb.TimeSeriesView(
         origin="/plots",
-        contents=[plot_path(plot, series.name) for series in plot.series],
+        contents=[
+            *(plot_path(plot, series.name) for series in plot.series),
+            *(plot_path(plot, level.key) for level in plot.levels),
+        ],
         name=plot.title,
         plot_legend=rrb.PlotLegend(visible=True, corner=corner),
         # Independent axes of infinite range: a long run opens whole.

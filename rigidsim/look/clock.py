@@ -12,11 +12,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look.readable_time import DAY, YEAR
 from rigidsim.scene.records import dataclass
 
 _LARGEST = 2.0**62  # int64 with room for differences and for the viewer's own sentinels
 _LARGEST_NANOSECONDS = 9.2e18  # 291.5 years, just below 2**63 ns
 _UNITS = {0: "s", -3: "ms", -6: "µs", -9: "ns", -12: "ps", -15: "fs", -18: "as"}
+_WHOLE = (("yr", YEAR), ("d", DAY))
+_EXACT = 4 * np.finfo(np.float64).eps
 _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be at most
 
 
@@ -41,9 +44,9 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
     """The clock for sample times `seconds` (rows,).
 
     Nanoseconds are taken when the run stays within 291 years and either every time is a whole
-    number of nanoseconds or the smallest step has at least 1000 of them. Otherwise the tick is
-    the power of 1000 seconds that resolves the smallest step to 1e-3, or as close to that as
-    62 bits allow.
+    number of nanoseconds or the smallest step has at least 1000 of them. Otherwise, where every time is a
+    whole number of years or days, the tick is that: the viewer's axes are read then. Else it is the power of
+    1000 seconds that resolves the smallest step to 1e-3, or as close to that as 62 bits allow.
 
     Raises:
         ValueError: a time that isn't finite.
@@ -61,6 +64,11 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
         if smallest * _RESOLUTION >= 1e-9 or _whole(times, ticks):
             return Clock("time", ticks, 1e-9, True)
 
+    for symbol, unit in _WHOLE:
+        whole = np.rint(times / unit)
+        exact = bool((np.abs(times - whole * unit) <= _EXACT * np.abs(times)).all())
+        if exact and unit <= smallest and largest / unit < 2.0**53:
+            return Clock(f"time [{symbol}]", whole.astype(np.int64), unit, False)
     exponent = 3 * math.floor(math.log10(smallest * _RESOLUTION * (1 + 1e-9)) / 3)
     while largest / 10.0**exponent > _LARGEST:
         exponent += 3
@@ -80,4 +88,4 @@ def _nanoseconds(times: NDArray[np.float64]) -> NDArray[np.int64]:
 def _whole(times: NDArray[np.float64], ticks: NDArray[np.int64]) -> bool:
     """Whether the ticks give the times back to the last bits of float64."""
     error = np.abs(ticks * 1e-9 - times)
-    return bool((error <= 4 * np.finfo(np.float64).eps * np.abs(times)).all())
+    return bool((error <= _EXACT * np.abs(times)).all())

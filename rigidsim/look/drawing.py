@@ -15,7 +15,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rigidsim.look.solids import Mesh, ball
-from rigidsim.look.stages.parts import BODY, Arrow, Color, Shell, Stage, Trail
+from rigidsim.look.stages.parts import BODY, Arrow, Color, Line, Shell, Stage, Trail
 from rigidsim.look.symbols import graticule, sharp_edges
 
 Columns = Iterable[rr.ComponentColumn]
@@ -26,6 +26,7 @@ SCENE_ROWS = 20_000
 """Rows of arrows and trails, from which on those are thinned whose motion allows it."""
 _STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
 _SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
+_CHORDS = 5000  # of a trail that are looked at, to know how smooth it is
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
@@ -69,15 +70,13 @@ def draw_static(recording: rr.RecordingStream, stages: Sequence[Stage]) -> None:
 
 
 def _draw_mesh(recording: rr.RecordingStream, path: str, mesh: Mesh, edges: bool = True) -> None:
-    recording.log(
-        path,
-        rr.Mesh3D(
-            vertex_positions=mesh.vertices.astype(np.float32),
-            triangle_indices=mesh.triangles,
-            vertex_colors=mesh.colors,
-        ),
-        static=True,
+    worn: dict[str, Any] = {"vertex_colors": mesh.colors}
+    if mesh.picture is not None:
+        worn = {"albedo_texture": mesh.picture, "vertex_texcoords": mesh.places}
+    surface = rr.Mesh3D(
+        vertex_positions=mesh.vertices.astype(np.float32), triangle_indices=mesh.triangles, **worn
     )
+    recording.log(path, surface, static=True)
     sharp = sharp_edges(mesh) if edges else np.empty((0, 2, 3))
     if len(sharp):
         strips = rr.LineStrips3D(sharp.astype(np.float32), colors=[_EDGE], radii=rr.Radius.ui_points(0.9))
@@ -108,13 +107,20 @@ def _draw_surroundings(recording: rr.RecordingStream, stage: Stage) -> None:
 
     for solid in stage.solids:
         _draw_mesh(recording, at(solid.place, solid.name), solid.mesh, edges=False)
+    # Lines of one kind together: the viewer is slowed by entities, not by strips.
+    together: dict[tuple[object, ...], list[Line]] = {}
     for line in stage.lines:
+        folder = line.name.partition("/")[0]
+        key = (line.place, folder, line.color, line.width, line.strength)
+        together.setdefault(key, []).append(line)
+    for lines in together.values():
+        first = lines[0]
         strips = rr.LineStrips3D(
-            [line.points.astype(np.float32)],
-            colors=[(*line.color, round(255 * line.strength))],
-            radii=rr.Radius.ui_points(line.width / 2),
+            [line.points.astype(np.float32) for line in lines],
+            colors=[(*first.color, round(255 * first.strength))],
+            radii=rr.Radius.ui_points(first.width / 2),
         )
-        recording.log(at(line.place, line.name), strips, static=True)
+        recording.log(at(first.place, first.name), strips, static=True)
     for vector in stage.vectors:
         path = at(vector.place, vector.name)
         arrow = rr.Arrows3D(
@@ -277,7 +283,8 @@ def trail_stride(trail: Trail) -> int:
     middle = trail.points - np.nanmean(trail.points, axis=0)
     radius = float(np.nanmax(np.abs(middle))) if np.isfinite(middle).any() else 0.0
     for stride in (16, 8, 4, 2):
-        chords = np.abs(trail.points[stride::stride] - trail.points[:-stride:stride]).max(axis=1)
+        looked = np.arange(0, count - stride, max(count // _CHORDS, 1))
+        chords = np.abs(trail.points[looked + stride] - trail.points[looked]).max(axis=1)
         if np.isfinite(chords).all() and float(np.percentile(chords, 99)) <= _SMOOTH * radius:
             return stride
     return 1

@@ -15,7 +15,7 @@ from rigidsim.look.readable_time import TimeWords
 from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Plane
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.states import States, sections_of, states_of
+from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.thinning import thinned_indices
 from rigidsim.scene.records import dataclass
 
@@ -79,7 +79,7 @@ class DrawnRun:
             subject=subject,
             plots=plots,
             planes=[*picture.planes, *sections_of(dataset)],
-            states=states_of(dataset, float(seconds[0]), float(seconds[-1])),
+            states=[*states_of(dataset, float(seconds[0]), float(seconds[-1])), *charts_of(told)],
             clock=clock,
             seconds=seconds,
             steps=steps,
@@ -121,6 +121,8 @@ class DrawnRun:
             recording.log(f"/{name.lower()}", document, static=True)
         drawing.draw_static(recording, self.picture.stages)
         plotting.draw_plot_styles(recording, self.plots)
+        ends = [0, len(self.seconds) - 1]
+        plotting.draw_levels(recording, self.plots, self._times(self.clock.ticks[ends], self.steps[ends]))
         plotting.draw_planes(recording, self.planes)
         lanes = [self._times(self._ticks(lane.seconds)) for lane in self.states]
         plotting.draw_states(recording, self.states, lanes)
@@ -136,13 +138,15 @@ class DrawnRun:
         from rigidsim.look import drawing, plotting
 
         times = self._times(self.clock.ticks[rows], self.steps[rows])
+        known = {(rows.start, rows.step or 1): times}
         for stage in self.picture.stages:
             if stage.root not in self.strides:
                 self.strides[stage.root] = drawing.strides_of(stage)
             for path, picked, columns in drawing.stage_columns(stage, rows, self.strides[stage.root]):
-                mine = times
-                if picked != rows:
+                mine = known.get((picked.start, picked.step or 1))
+                if mine is None:
                     mine = self._times(self.clock.ticks[picked], self.steps[picked])
+                    known[picked.start, picked.step or 1] = mine
                 recording.send_columns(path, indexes=mine, columns=columns)
         plotting.draw_plot_rows(recording, self.plots, times, rows)
         plotting.draw_plane_rows(recording, self.planes, times, rows)
@@ -174,6 +178,7 @@ def _turns(dataset: Table, seconds: np.ndarray) -> float:
     """Turns of the body during the run, from its mean rate; 0 when the rate isn't known."""
     if "angular_velocity" not in dataset:
         return 0.0
-    rate = np.linalg.norm(np.asarray(dataset["angular_velocity"].values, dtype=float), axis=-1)
+    rates = np.asarray(dataset["angular_velocity"].values, dtype=float)
+    rate = np.sqrt(np.einsum("ij,ij->i", rates, rates))
     mean = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
     return mean * float(abs(seconds[-1] - seconds[0])) / (2 * np.pi)

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rigidsim.look.plots import pretty_unit
 from rigidsim.look.readable_time import TimeWords
-from rigidsim.look.roles import drifts
+from rigidsim.look.roles import drifts, is_averaged
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable
-
-_AVERAGED = ("spin_averaged", "orbit_averaged")
-"""Levels of the model whose datasets have axes, but no attitude."""
 
 
 def read_config(dataset: Table) -> dict[str, Any]:
@@ -71,14 +67,10 @@ def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
         drift = "largest drift" if complete else "largest drift of the rows shown"
         # across, not down: a page that must be scrolled isn't read
         names, initial, largest = zip(*invariants, strict=True)
-        rows = [("initial", *initial), (drift, *largest)]
+        rows = [("initial", *initial)] if any(initial) else []  # none of their values was recorded
+        rows.append((drift, *largest))
         lines += _table(("invariant", *names), rows)
     return legible("\n".join(lines))
-
-
-def is_averaged(attributes: Mapping[str, Any]) -> bool:
-    """Whether a dataset with these attributes is of an averaged model: it has axes, but no attitude."""
-    return attributes.get("formulation") in _AVERAGED
 
 
 def notes_page(kind: str, notes: list[str]) -> str:

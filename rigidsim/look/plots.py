@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.angle_units import angle_unit
-from rigidsim.look.roles import drift_of, put_back_of
+from rigidsim.look.roles import drift_of, is_averaged, put_back_of
 from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ RED: Color = (235, 97, 89)
 GREEN: Color = (104, 190, 110)
 BLUE: Color = (92, 148, 235)
 GREY: Color = (170, 170, 175)
+_ERROR: Color = (245, 245, 245)
 _VECTOR = (RED, GREEN, BLUE)
 _PALETTE: tuple[Color, ...] = (
     (240, 190, 60),
@@ -61,8 +62,18 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Level:
+    """A value that holds for the whole run, drawn as a level line."""
+
+    key: str
+    label: str
+    color: Color
+    value: float
+
+
+@dataclass(frozen=True)
 class Plot:
-    """One plot: a title with the unit, a place on the page and its variables.
+    """One plot: a title with the unit, a place on the page, its variables and levels.
 
     `place` is one of "leading", "more", "drift".
     """
@@ -71,6 +82,7 @@ class Plot:
     title: str
     place: str
     series: list[Series] = field(default_factory=list)
+    levels: list[Level] = field(default_factory=list)
 
 
 def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
@@ -109,6 +121,8 @@ def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
         if place == "leading" and unit == "rad":
             series = replace(series, error=_uncertainty(dataset, series.values, factor))
         plot.series.append(series)
+    if "drift" in plots:
+        plots["drift"].levels.extend(_announced(dataset))
     order = {name: number for number, name in enumerate(first)}
     return sorted(
         plots.values(), key=lambda plot: (_ORDER.index(plot.place), order.get(plot.key, len(order)))
@@ -136,13 +150,23 @@ def _uncertainty(dataset: Table, values: NDArray[np.float64], factor: float) -> 
     return np.asarray(float(error) * factor * share**1.5)
 
 
+def _announced(dataset: Table) -> list[Level]:
+    """The announced error at the end of the run beside the drifts: far above them where errors grew."""
+    error = float(dataset.attrs.get("attitude_error", 0.0))
+    if not (np.isfinite(error) and error > 0):
+        return []
+    what = "axis" if is_averaged(dataset.attrs) else "attitude"
+    return [Level("attitude_error", f"error of the {what} at the end, rad", _ERROR, float(np.log10(error)))]
+
+
 def drift_floor(drifts: list[NDArray[np.float64]]) -> float:
     """What a drift of exactly zero is drawn at: a tenth of the low end of all that isn't zero.
 
     A zero has no logarithm. A fixed floor would flatten the curves of double precision or stand above
     those of quadruple precision.
     """
-    magnitude = np.abs(np.concatenate([values.ravel() for values in drifts])) if drifts else np.empty(0)
+    some = [values[:: max(len(values) // _FLOOR_ROWS, 1)].ravel() for values in drifts]
+    magnitude = np.abs(np.concatenate(some)) if some else np.empty(0)
     nonzero = magnitude[np.isfinite(magnitude) & (magnitude > 0)]
     return max(float(np.percentile(nonzero, 2)) / 10, 1e-300) if len(nonzero) else 1e-20
 
@@ -151,6 +175,8 @@ _ORDER = ("leading", "more", "drift")
 _USUAL = ("angular_velocity", "euler_angles", "quaternion")
 MOST_LEADING = 3
 _SIGNS = ("°", "″")
+_FLOOR_ROWS = 5000  # of each drift that are looked at for the floor
+_TOGETHER = 3e-3  # of a curve's range: what lies nearer is covered by its line
 _SEEN = 2e-3  # of a curve's range: a narrower band is no wider than the line
 
 
@@ -211,7 +237,29 @@ def _series(variable: Variable, position: int, floor: float) -> Series:
     if len(labels) != count:
         base = labels[0] if labels else name.replace("_", " ")
         labels = [f"{base} {k}" for k in range(count)]
-    return Series(name, labels, _colors(variable, count, position), values)
+    colors = _colors(variable, count, position)
+    if across == "axis":
+        labels, colors, values = _told_apart(labels, colors, values)
+    return Series(name, labels, colors, values)
+
+
+def _told_apart(
+    labels: list[str], colors: list[Color], values: NDArray[np.float64]
+) -> tuple[list[str], list[Color], NDArray[np.float64]]:
+    """Of axes that lie together the first, with all their names: the last would cover the others."""
+    kept: list[int] = []
+    names: list[str] = []
+    for column, label in enumerate(labels):
+        shown = values[np.isfinite(values[:, column])]
+        for place, first in enumerate(kept):
+            apart = np.abs(shown[:, column] - shown[:, first])
+            if len(shown) and apart.max() <= _TOGETHER * np.ptp(shown[:, column]):
+                names[place] += f", {label}"
+                break
+        else:
+            kept.append(column)
+            names.append(label)
+    return names, [colors[k] for k in kept], values[:, kept]
 
 
 def _colors(variable: Variable, count: int, position: int) -> list[Color]:

@@ -72,6 +72,21 @@ def draw_plot_rows(
             recording.send_columns(path, indexes=times, columns=columns)
 
 
+def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list[rr.TimeColumn]) -> None:
+    """Values that hold for the whole run, as level lines.
+
+    Args:
+        ends: times of the first and the last row.
+    """
+    for plot in plots:
+        for level in plot.levels:
+            path = plot_path(plot, level.key)
+            style = rr.SeriesLines(names=[level.label], colors=[level.color], widths=[1.0])
+            recording.log(path, style, static=True)
+            columns = rr.Scalars.columns(scalars=[level.value, level.value])
+            recording.send_columns(path, indexes=ends, columns=columns)
+
+
 def _measured(series: Series, rows: slice) -> rr.ComponentColumnList:
     """Values with a band of their uncertainty to both sides (the viewer draws the root of a variance)."""
     assert series.error is not None
@@ -92,8 +107,12 @@ def aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.Aggreg
         return rr.components.AggregationPolicy.Max
     step = max(len(values) // PIXELS, 1)
     change = np.abs(values[step:] - values[:-step]) if len(values) > step else np.zeros(1)
-    range_ = np.nanmax(values) - np.nanmin(values) if np.isfinite(values).any() else 0.0
-    smooth = not np.isfinite(change).any() or np.nanmax(change) <= 0.1 * range_
+    largest, range_ = float(change.max(initial=0.0)), float(np.ptp(values)) if values.size else 0.0
+    if not np.isfinite(largest + range_):
+        finite = values[np.isfinite(values)]
+        range_ = float(np.ptp(finite)) if len(finite) else 0.0
+        largest = float(change[np.isfinite(change)].max(initial=0.0))
+    smooth = largest <= 0.1 * range_
     policies = rr.components.AggregationPolicy
     return policies.Average if smooth else policies.MinMax
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable
+
+
+_AVERAGED = ("spin_averaged", "orbit_averaged")
+"""Levels of the model whose datasets have axes, but no attitude."""
 
 
 def is_residual(variable: Variable) -> bool:
@@ -31,6 +36,11 @@ def drifts(dataset: Table) -> dict[str, Variable]:
 def put_backs(dataset: Table) -> dict[str, Variable]:
     """What was put back of the projected invariants, by their name."""
     return _by_invariant(dataset, "put_back_of")
+
+
+def is_averaged(attributes: Mapping[str, Any]) -> bool:
+    """Whether a dataset with these attributes is of an averaged model: it has axes, but no attitude."""
+    return attributes.get("formulation") in _AVERAGED
 
 
 def _named(variable: Variable, attribute: str) -> str | None:

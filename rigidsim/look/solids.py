@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,25 +43,24 @@ class Mesh:
         triangles: (T, 3) indices into `vertices`, anticlockwise as seen from outside.
         normals: (3 T, 3), outward unit normals of the smooth surface.
         colors: (3 T, 3) uint8, red green blue, constant over a triangle.
+        picture: (height, width, 3) uint8 that it wears in place of its colours; None for none.
+        places: (3 T, 2) in the picture, across and down, of its sizes.
     """
 
     vertices: Array
     triangles: NDArray[np.uint32]
     normals: Array
     colors: NDArray[np.uint8]
+    picture: NDArray[np.uint8] | None = None
+    places: Array | None = None
 
     def moved(self, rotation: Array, shift: Array) -> Mesh:
         """The mesh rotated by `rotation` (3, 3), then moved by `shift` (3,), metres."""
-        return Mesh(
-            self.vertices @ rotation.T + shift,
-            self.triangles,
-            self.normals @ rotation.T,
-            self.colors,
-        )
+        return replace(self, vertices=self.vertices @ rotation.T + shift, normals=self.normals @ rotation.T)
 
     def scaled(self, factor: float) -> Mesh:
         """The mesh with all lengths multiplied by `factor` > 0."""
-        return Mesh(self.vertices * factor, self.triangles, self.normals, self.colors)
+        return replace(self, vertices=self.vertices * factor)
 
     def volume(self) -> float:
         """Enclosed volume in m^3 (divergence theorem), positive when normals point outwards."""

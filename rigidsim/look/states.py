@@ -1,4 +1,4 @@
-"""What happened when, as lanes of states: the events of a run, and how it ended."""
+"""What happened when, as lanes of states: events, changes of chart, and how a run ended."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look import signals
+from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
 from rigidsim.scene.records import dataclass
 
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
 
 MOST_EVENTS = 2000
 """Of one kind that a lane shows; of more it shows the first."""
+CHART_LEFT = 0.5
+"""Singular factor below which a chart of Euler angles is left, as the solver has it."""
 _SHADES: tuple[Color, Color] = ((92, 148, 235), (240, 190, 60))
 _SECTION_POINTS = 8
 """At least, for a section to be drawn."""
@@ -57,6 +61,37 @@ def states_of(dataset: Table, start: float, end: float) -> list[States]:
             States("run", np.array([start, end]), list(middle), {"running": _SHADES[0], words: PULL})
         )
     return lanes
+
+
+def charts_of(dataset: Table) -> list[States]:
+    """A lane for a run in Euler angles: which of its two sequences carried it.
+
+    A chart is left at the first step after which its singular factor is below ``CHART_LEFT``. Of steps a
+    dataset knows nothing: a change is shown at the first sample from which it is certain, and one that lies
+    between two sparse samples isn't seen.
+
+    Args:
+        dataset: in memory, or its rows that are shown.
+    """
+    asked, partner = (
+        str(dataset.attrs.get(f"euler_{word}", "")) for word in ("sequence", "partner_sequence")
+    )
+    attitude = signals.values(dataset, "quaternion")
+    if dataset.attrs.get("formulation") != "euler_angles" or not (asked and partner) or attitude is None:
+        return []
+    turned = rotation_matrix(attitude)
+    # of an intrinsic sequence i j k the entry (i, k) is the cosine or sine that its middle angle leaves
+    entries = [turned[:, "xyz".index(name[0]), "xyz".index(name[2])] for name in (asked, partner)]
+    near = [np.sqrt(np.maximum(1 - entry**2, 0.0)) < CHART_LEFT for entry in entries]
+    first = int(near[0][0])
+    chart, changes = first, []
+    for row in np.flatnonzero(near[0] | near[1]):
+        if near[chart][row]:
+            chart = 1 - chart
+            changes.append(row)
+    begins = signals.seconds(dataset)[[0, *changes[:MOST_EVENTS]]]
+    values = [(asked, partner)[(first + k) % 2] for k in range(len(begins))]
+    return [States("chart", begins, values, dict(zip((asked, partner), _SHADES, strict=True)))]
 
 
 def events_of(dataset: Table) -> list[str]:

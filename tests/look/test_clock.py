@@ -58,6 +58,15 @@ def test_horizon_beyond_292_years_leaves_nanoseconds() -> None:
     assert beyond.ticks[-1] * beyond.seconds_per_tick == 9.3e9
 
 
+@pytest.mark.parametrize(("symbol", "unit"), [("yr", 31_557_600.0), ("d", 86_400.0)])
+def test_long_runs_of_whole_years_or_days_count_these(symbol: str, unit: float) -> None:
+    times = 4 * unit * np.arange(0, 500_000, 7)
+    clock = build_clock(times)
+    assert (clock.name, clock.duration, clock.seconds_per_tick) == (f"time [{symbol}]", False, unit)
+    np.testing.assert_array_equal(clock.ticks, 4 * np.arange(0, 500_000, 7))
+    assert build_clock(times * (1 + 1e-12)).name != clock.name  # not whole ones
+
+
 def test_small_steps_on_a_long_horizon_fit_62_bits() -> None:
     clock = build_clock(np.array([0.0, 1e-9, 1e14]))
     assert 0 < clock.ticks[-1] <= 2**62

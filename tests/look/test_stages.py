@@ -18,7 +18,7 @@ from rigidsim.look.stages.bodies import FIELD, camera
 from rigidsim.look.stages.orbits import local_frame
 from rigidsim.look.stages.parts import Picture, Stage, quaternion_of, trail
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.states import sections_of, states_of
+from rigidsim.look.states import charts_of, sections_of, states_of
 from rigidsim.look.symbols import globe, sharp_edges, spinning_top
 
 Build = Callable[..., xarray.Dataset]
@@ -336,6 +336,40 @@ def test_events_have_a_lane_and_a_section(symmetric_top: Build) -> None:
     assert len(plane.points) == 12
     stopped = states_of(dataset.assign_attrs(status="max_drift"), 0.0, 20.0)[-1]
     assert (stopped.values, stopped.seconds.tolist()) == (["running", "max drift"], [0.0, 20.0])
+
+
+def test_a_run_in_euler_angles_has_a_lane_of_its_charts(symmetric_top: Build) -> None:
+    """The asked sequence is left where its middle angle nears 0 or half a turn, and found again later."""
+    dataset = symmetric_top(count=721)
+    turn = np.linspace(0.0, 2 * np.pi, 721)  # about X: sin of the middle angle of zxz is that of the turn
+    zero = np.zeros(721)
+    dataset["quaternion"] = (
+        ("time", "quaternion_component"),
+        np.stack([np.cos(turn / 2), np.sin(turn / 2), zero, zero], axis=1),
+    )
+    assert charts_of(dataset) == []
+    named = dataset.assign_attrs(
+        formulation="euler_angles", euler_sequence="zxz", euler_partner_sequence="zxy"
+    )
+    (lane,) = charts_of(named)
+    # it begins in the singularity; the partner's factor, abs(cos), falls below a half at 60 degrees
+    assert (lane.name, lane.values) == ("chart", ["zxy", "zxz", "zxy", "zxz", "zxy"])
+    degrees = 360 * lane.seconds[1:] / dataset["time"].values[-1]
+    np.testing.assert_allclose(degrees, [60, 150, 240, 330], atol=0.51)
+    assert charts_of(named.drop_vars("quaternion")) == []
+
+
+def test_the_announced_error_is_a_level_beside_the_drifts(symmetric_top: Build) -> None:
+    def levels(dataset: xarray.Dataset) -> list[tuple[str, float]]:
+        return [(level.label, level.value) for plot in plan_plots(dataset) for level in plot.levels]
+
+    dataset = symmetric_top(count=11)
+    assert levels(dataset) == []
+    assert levels(dataset.assign_attrs(attitude_error=1e-8)) == [
+        ("error of the attitude at the end, rad", -8.0)
+    ]
+    averaged = dataset.assign_attrs(attitude_error=1e-6, formulation="orbit_averaged")
+    assert levels(averaged) == [("error of the axis at the end, rad", pytest.approx(-6.0))]
 
 
 def test_a_page_has_only_letters_that_the_viewer_can_draw() -> None:

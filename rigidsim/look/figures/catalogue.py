@@ -86,10 +86,10 @@ DRIFT = Panel(lambda dataset: bool(drifts(dataset)), drift.drift_panel)
 POLAR_MOTION = Panel(
     lambda dataset: signals.polar_motion(dataset) is not None, timelines.polar_motion, begins=True
 )
-OBLIQUITY = Panel(_has_orientation, timelines.obliquity)
-LONGITUDE = Panel(_has_orientation, timelines.longitude)
+OBLIQUITY = Panel(_has_orientation, timelines.obliquity, begins=True)
+LONGITUDE = Panel(_has_orientation, timelines.longitude, begins=True)
 LIBRATION = Panel(has("libration"), timelines.libration)
-ROLL_PITCH_YAW = Panel(_regular, timelines.roll_pitch_yaw)
+ROLL_PITCH_YAW = Panel(_regular, timelines.roll_pitch_yaw, begins=True)
 TILT = Panel(lambda dataset: has("tilt")(dataset) or is_top(dataset), timelines.tilt, begins=True)
 PRECESSION = Panel(has("precession_angle"), timelines.precession, begins=True)
 WOBBLE = Panel(_has_wobble, timelines.wobble)

@@ -10,9 +10,9 @@ import numpy as np
 from rigidsim.look import signals
 from rigidsim.look.figures import timelines
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
-from rigidsim.look.page import is_averaged, largest_drift, read_config
+from rigidsim.look.page import largest_drift, read_config
 from rigidsim.look.readable_time import unit_for
-from rigidsim.look.roles import drifts
+from rigidsim.look.roles import drifts, is_averaged
 from rigidsim.look.thinning import thin
 from rigidsim.scene.records import dataclass
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ROWS, FULL_READ = 20_000, 2_000_000  # that a figure draws; that are read for the largest drift
 
+_TELLING = 0.5  # changes of sign to a sample: four samples a swing
 _CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
@@ -89,10 +90,13 @@ def beginning(axes: Axes, shown: Shown) -> float:
     for line in axes.get_lines():
         values = np.asarray(line.get_ydata(), dtype=np.float64)
         values = values[np.isfinite(values)]
-        if len(values) < 50 or line.get_linestyle() == "None" or not timelines.moves(values):
+        if len(values) < 50 or not timelines.moves(values):
             continue
         values = values - values.mean()
-        most = max(most, int(np.count_nonzero(np.diff(np.signbit(values)))))
+        changes = int(np.count_nonzero(np.diff(np.signbit(values))))
+        if line.get_linestyle() == "None" and changes > _TELLING * len(values):
+            continue  # samples too sparse to tell swings from a pattern
+        most = max(most, changes)
     if length <= 0 or most / 2 * span / length <= _MANY:
         return 0.0
     return 2 * _CYCLES * length / most
@@ -177,6 +181,10 @@ def _curve_panel(axes: Axes, panel: Panel, shown: Shown) -> tuple[Axes, xarray.D
             if not str(start.attrs.get("time_unit") or ""):
                 start = start.assign_attrs(time_unit=unit_for(begins).symbol)
             panel.draw(axes, start)
+            legend = axes.get_legend()
+            for line in (*axes.get_lines(), *(legend.get_lines() if legend else ())):
+                if line.get_linestyle() == "None":  # few enough now to be told apart, and to be followed
+                    line.set(linestyle="-", linewidth=0.6, markersize=5.0)
             return axes, start, begins
         if shown.start is shown.rows:
             return axes, shown.rows, 0.0
@@ -204,6 +212,9 @@ def facts_of(shown: Shown) -> list[tuple[str, str]]:
         )
         if value not in (None, "")
     ]
+    if "attitude_error" in dataset.attrs:
+        what = "axis integrated to" if is_averaged(dataset.attrs) else "attitude uncertain by"
+        lines.append((what, f"{float(dataset.attrs['attitude_error']):.1e} rad"))
     bound = "" if shown.complete else "≥ "  # of the samples that were read
     for name, drift in shown.largest.items():
         lines.append(

@@ -13,6 +13,7 @@ from rigidsim.scene.records import dataclass
 Array = NDArray[np.float64]
 _TURN = 2 * np.pi
 _LINES, _ENOUGH = 4, 64  # sinusoids that are fitted beside a straight line, to so many samples or more
+_REFINEMENTS, _LEAST_CYCLES = 6, 1.2  # of the lines' frequencies; fewer cycles are like a straight line
 _UNIFORM = 0.1  # by which the rates of both halves of a run may differ: swings within a turn do so, too
 
 
@@ -32,8 +33,8 @@ class Line:
 def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
     """Straight line through an angle (rows,) that swings about it.
 
-    Evenly sampled, its strongest sinusoids of at least 1.5 periods are fitted with it, so that a broken swing
-    at the ends doesn't tilt it; all is weighted by a Hann window.
+    Evenly sampled, its strongest sinusoids of at least 1.5 periods are fitted with it, their periods too, so
+    that a broken swing at the ends doesn't tilt it; all is weighted by a Hann window.
 
     Args:
         level: only the mean, without a rate.
@@ -46,6 +47,7 @@ def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
     weight = np.sin(np.pi * s) ** 2 * np.gradient(s)
     weight /= weight.sum()
     columns = [np.ones_like(s)] if level else [np.ones_like(s), s - 0.5]
+    polynomial, lines = len(columns), list[float]()
     root = np.sqrt(weight)
     middle = float(y[len(y) // 2])  # large angles lose fewer digits
     found = _solve(columns, y - middle, root)
@@ -55,11 +57,44 @@ def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
             cycles = _peak(rest * weight)
             if cycles is None:
                 break
-            columns += [np.cos(2 * np.pi * cycles * s), np.sin(2 * np.pi * cycles * s)]
+            lines.append(cycles)
+            columns = [*columns[:polynomial], *_sinusoids(lines, s)]
             found = _solve(columns, y - middle, root)
+        found = _refined(columns[:polynomial], lines, found, s, y - middle, root)
     slope = 0.0 if level else float(found[1])
     rate = slope / (t[-1] - t[0])
     return Line(middle + float(found[0]) - slope * 0.5 + rate * (time[0] - t[0]), rate, float(time[0]))
+
+
+def _sinusoids(lines: list[float], s: Array) -> list[Array]:
+    """Cosine and sine of each line, of so many cycles over the whole."""
+    return [wave(2 * np.pi * cycles * s) for cycles in lines for wave in (np.cos, np.sin)]
+
+
+def _refined(
+    base: list[Array], lines: list[float], found: Array, s: Array, values: Array, root: Array
+) -> Array:
+    """Coefficients with the frequencies fitted as well (Gauss-Newton): lines pull at each other's peaks."""
+
+    def misfit(columns: list[Array], coefficients: Array) -> float:
+        return float(np.linalg.norm(root * (values - np.stack(columns, axis=1) @ coefficients)))
+
+    if not lines:
+        return found
+    left = misfit([*base, *_sinusoids(lines, s)], found)
+    for _ in range(_REFINEMENTS):
+        waves = _sinusoids(lines, s)
+        a, b = found[len(base) :: 2], found[len(base) + 1 :: 2]
+        slopes = [2 * np.pi * s * (b[k] * waves[2 * k] - a[k] * waves[2 * k + 1]) for k in range(len(lines))]
+        shifts = _solve([*base, *waves, *slopes], values, root)[-len(lines) :]
+        moved = [c + float(np.clip(d, -0.5, 0.5)) for c, d in zip(lines, shifts, strict=True)]
+        columns = [*base, *_sinusoids(moved, s)]
+        better = _solve(columns, values, root)
+        now = misfit(columns, better)
+        if not now < left or min(moved) < _LEAST_CYCLES:
+            break
+        lines, found, left = moved, better, now
+    return found
 
 
 def _solve(columns: list[Array], values: Array, root: Array) -> Array:
@@ -135,9 +170,11 @@ def leading_ellipse(time: Array, plane: Array) -> Ellipse | None:
         return None
     z = plane[:, 0] + 1j * plane[:, 1]
     z = z - z.mean()
+    middle = (time - time.mean()) / (time[-1] - time[0])
+    trend = middle * (middle @ z) / (middle @ middle)  # of a slower swing that the run has a part of
     window = np.sin(np.pi * (np.arange(len(z)) + 0.5) / len(z)) ** 2
     padded = 8 * len(z)
-    power = np.abs(np.fft.fft(z * window, padded)) ** 2
+    power = np.abs(np.fft.fft((z - trend) * window, padded)) ** 2
     frequencies = np.fft.fftfreq(padded, steps.mean())
     both = power[1 : padded // 2] + power[:0:-1][: padded // 2 - 1]
     k = int(both.argmax()) + 1
@@ -149,6 +186,6 @@ def leading_ellipse(time: Array, plane: Array) -> Ellipse | None:
     shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
     rate = _TURN * (k + float(np.clip(shift, -0.5, 0.5))) / (padded * steps.mean())
     wave = np.exp(1j * rate * (time - time[0]))
-    basis = np.stack([np.ones_like(wave), wave, wave.conj()], axis=1)
+    basis = np.stack([wave, wave.conj(), np.ones_like(wave), middle, middle**2], axis=1)
     found, *_ = np.linalg.lstsq(basis, z, rcond=None)
-    return Ellipse(complex(found[1]), complex(found[2]), float(rate), float(time[0]))
+    return Ellipse(complex(found[0]), complex(found[1]), float(rate), float(time[0]))

@@ -34,6 +34,7 @@ IN_PLANE, OVER_TIME = 0.4, 0.8
 """Radii between neighbours up to which samples are joined by lines: some sixteen and eight samples a turn."""
 _KEY_ROW = 12.4  # height of a row of a key, points
 _KEY_LETTER, _TITLE_LETTER = 4.9, 6.1  # mean widths of a letter, points
+_LATER = "lighter: later"
 _HEADING = (0.34, 0.26)  # inches of the page's two heading lines
 
 STYLE: dict[str, Any] = {
@@ -183,14 +184,14 @@ def curve(axes: Axes, x: Array, y: Array, *, in_plane: bool = False, **style: An
 def trace(axes: Axes, x: Array, y: Array) -> None:
     """A path in a plane: of many turns about the origin the first stand out, else coloured by time.
 
-    The start is marked. Turns that stand out and the others have a label each.
+    The start is marked. All that stands out has a label.
     """
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection
 
     points = np.stack([x, y], axis=1)
     many = len(x) > MOST_VECTOR_POINTS
-    axes.plot(x[0], y[0], "o", color=START, ms=4.5, zorder=5)
+    axes.plot(x[0], y[0], "o", color=START, ms=4.5, zorder=5, lw=0, label="start")
     if not joined(points):
         size = float(np.clip(9000 / max(len(x), 1), 1.2, 12.0))
         axes.scatter(
@@ -204,6 +205,7 @@ def trace(axes: Axes, x: Array, y: Array) -> None:
             lw=0,
             rasterized=many,
         )
+        axes.plot([], [], ".", color=colormaps["plasma"](0.6), lw=0, label=_LATER)
         return
     first, label = _first_turns(points)
     if first:
@@ -217,6 +219,7 @@ def trace(axes: Axes, x: Array, y: Array) -> None:
     parts = [points[a : b + 1] for a, b in itertools.pairwise(edges)]
     hues = colormaps["plasma"](np.linspace(0.0, 0.86, pieces))
     axes.add_collection(LineCollection(parts, colors=hues, linewidths=1.4, rasterized=many))
+    axes.plot([], [], color=colormaps["plasma"](0.6), label=_LATER)
 
 
 def _first_turns(points: Array) -> tuple[int, str]:
@@ -231,7 +234,7 @@ def _first_turns(points: Array) -> tuple[int, str]:
     rows = int(np.flatnonzero(np.abs(angle - angle[0]) > 2 * np.pi * count)[0]) + 1
     radius = np.hypot(*points.T)
     if radius[:rows].max() < 0.6 * radius.max():  # it spirals out of the centre
-        return len(points) // 5 + 2, "first fifth"
+        return int(np.flatnonzero(radius > 0.98 * radius.max())[0]) + 2, "first way out"
     if np.ptp(radius) < 1e-3 * radius.max():  # all turns are one circle
         return rows, ""
     return rows, "first turn" if count == 1 else f"first {count} turns"

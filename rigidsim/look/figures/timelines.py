@@ -12,7 +12,7 @@ from rigidsim.look import signals
 from rigidsim.look.figures.fits import secular
 from rigidsim.look.figures.scales import angle_scale, angle_text, number, si_scale
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key, titled
-from rigidsim.look.readable_time import TimeAxis, span_text, time_axis_of, unit_for
+from rigidsim.look.readable_time import DAY, TimeAxis, named_unit, span_text, time_axis_of, unit_for
 from rigidsim.look.solids import rotation_matrix
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 AXIS_COLORS = {"figure": BLUE, "spin": ORANGE, "momentum": VIOLET}
 _STILL = 1e-9  # of its size, below which what a curve does is rounding
+_QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is told in the axis' own unit
 _TURNS = 720.0  # degrees, from which the mean growth of an angle is taken off
 
 
@@ -163,8 +164,10 @@ def longitude(axes: Axes, dataset: xarray.Dataset) -> None:
     scale, unit = angle_scale(table)
     hues = [AXIS_COLORS[name] for name in shown]
     lines(axes, dataset, table / scale, [f"{name} axis" for name in shown], hues)
-    rate = angle_text(trend.rate * axis.unit.seconds, 3)
-    key(axes, f"Longitude of the node less its mean motion, {rate}/{axis.unit.symbol}")
+    # precession is told by the year, whatever the axis of time is in
+    unit = axis.unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
+    rate = angle_text(trend.rate * unit.seconds, 3)
+    key(axes, f"Longitude of the node less its mean motion, {rate}/{unit.symbol}")
     axes.set_ylabel(f"longitude − line [{unit}]")
 
 
@@ -226,11 +229,15 @@ def one_angle(axes: Axes, dataset: xarray.Dataset, name: str, title: str, symbol
     assert angle is not None
     seconds = signals.seconds(dataset)
     label = symbol
-    if np.nanmax(angle) - np.nanmin(angle) > 2 * np.pi:
+    span = float(np.nanmax(angle) - np.nanmin(angle))
+    if span > 2 * np.pi:
         trend = secular(seconds, angle)
-        angle = angle - trend.at(seconds)
-        title += f" less its mean motion, {turning(trend.rate)}"
-        label = f"{symbol} − line"
+        rest = angle - trend.at(seconds)
+        if np.nanmax(np.abs(rest)) > _STILL * span:
+            angle, label = rest, f"{symbol} − line"
+            title += f" less its mean motion, {turning(trend.rate)}"
+        else:  # what is left of it is rounding
+            title += f": uniform, {turning(trend.rate)}"
     scale, unit = angle_scale(angle)
     lines(axes, dataset, angle[:, None] / scale, [name], (hue,))
     steady(axes, angle[:, None] / scale)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look import signals, surroundings
+from rigidsim.look.page import read_config
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages.parts import (
@@ -161,8 +162,8 @@ def vectors_of(
 
 
 def source_arrows(dataset: Table, subject: Subject, length: float) -> list[Arrow]:
-    """Directions to what pulls, in space: by their orbits; of an ephemeris by the nadir that was recorded."""
-    arrows = []
+    """Directions to what pulls, in space: by orbits, recorded point masses, or the recorded nadir."""
+    arrows = _mass_arrows(dataset, length)
     listed = surroundings.told(dataset, "source")
     nadir = column(dataset, "nadir", 3)
     for number, one in enumerate(listed):
@@ -176,6 +177,29 @@ def source_arrows(dataset: Table, subject: Subject, length: float) -> list[Arrow
         name = surroundings.called(known, str(one.get("ephemeris", "source")))
         color = known.color if known else SOURCE
         arrows.append(Arrow(f"source{number}", f"to {name}", color, way, False, f"direction of {name}"))
+    return arrows
+
+
+def _mass_arrows(dataset: Table, length: float) -> list[Arrow]:
+    """Directions to the point masses whose positions were recorded, from the one that the body is."""
+    positions = signals.values(dataset, "point_mass_position")
+    body = read_config(dataset).get("body", {})
+    host = str(body.get("host", "")) if isinstance(body, dict) else ""
+    if positions is None or "point_mass" not in dataset["point_mass_position"].coords:
+        return []
+    names = [str(name) for name in dataset["point_mass_position"].coords["point_mass"].values]
+    if host not in names:
+        return []
+    arrows = []
+    for number, name in enumerate(names):
+        if name == host:
+            continue
+        way = positions[:, number] - positions[:, names.index(host)]
+        way = length * way / np.linalg.norm(way, axis=1, keepdims=True)
+        known = next((one for one in surroundings.GLOBES if one.name.lower() == name.lower()), None)
+        called = surroundings.called(known, name)
+        color = known.color if known else SOURCE
+        arrows.append(Arrow(f"mass{number}", f"to {called}", color, way, False, f"direction of {called}"))
     return arrows
 
 

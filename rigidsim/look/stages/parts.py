@@ -258,17 +258,21 @@ def trail(
 def joined(points: Array) -> bool:
     """Whether samples are dense enough that joining them doesn't cut across the curve."""
     first = np.arange(0, len(points) - 1, max(len(points) // 20_000, 1))
-    chords = np.linalg.norm(points[first + 1] - points[first], axis=1)
+    between = points[first + 1] - points[first]
+    chords = np.sqrt(np.einsum("ij,ij->i", between, between))
     chords = chords[np.isfinite(chords)]
     if not len(chords):
         return True
     points = points[first]
-    radius = float(np.nanmax(np.linalg.norm(points - np.nanmean(points, axis=0), axis=1)))
+    radius = longest(points - np.nanmean(points, axis=0))
     return float(np.percentile(chords, 95)) <= 0.35 * max(radius, 1e-6)
 
 
 def longest(vectors: Array) -> float:
     """The largest norm of vectors (rows, 3); 0 where none is finite."""
+    largest = float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max()))
+    if np.isfinite(largest):
+        return largest
     norms = np.linalg.norm(vectors, axis=1)
     return float(np.nanmax(norms)) if np.isfinite(norms).any() else 0.0
 
@@ -276,7 +280,7 @@ def longest(vectors: Array) -> float:
 def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:
     """(rows, 4) w x y z of any norm as the viewer takes it: x y z w, unit, float32."""
     # Normalised in float64 first: the viewer takes the float32 numbers as they are.
-    unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    unit = quaternion / np.sqrt(np.einsum("ij,ij->i", quaternion, quaternion))[:, None]
     return np.ascontiguousarray(unit[:, [1, 2, 3, 0]], dtype=np.float32)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.look import signals, surroundings
+from rigidsim.look.coasts import earth
 from rigidsim.look.stages import precession
 from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, source_arrows
 from rigidsim.look.stages.parts import (
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
 _LARGE = 1e5  # m: a smaller body is no globe
 _ROUND = 0.9  # of the smallest over the largest semi-axis
+_ALIKE = 1e-3  # of a radius, for a body to be taken for one that is known
 _UNKNOWN: Color = (128, 148, 170)
 EQUATOR: Color = (150, 205, 110)
 _LEADING = (
@@ -46,7 +48,6 @@ _LEADING = (
     "node_longitude",
     "wobble_angle",
     "rotation_angle",
-    "angular_velocity",
 )
 
 
@@ -55,10 +56,10 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     axes = _semi_axes(subject)
     if axes is None or subject.position is not None or not (signals.near_axis(dataset) or _poles(dataset)):
         return None
-    name = str(subject.solids[0].get("name", ""))
-    known = next((one for one in surroundings.GLOBES if one.name.lower() == name), None)
+    known = _known(str(subject.solids[0].get("name", "")), float(axes.max()))
+    name = str(subject.solids[0].get("name", "")) or (known.name.lower() if known else "")
     half = axes / axes.max()
-    mesh = globe(half, known.color if known else _UNKNOWN)
+    mesh = earth(half) if name == "earth" else globe(half, known.color if known else _UNKNOWN)
     figure = signals.figure_direction(dataset)
     turns = subject.attitude is not None
     if not turns and "angular_velocity" not in dataset:
@@ -75,6 +76,8 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
         stage.lines.append(Line("prime_meridian", PALE, graticule(half, 180.0, 1.006)[0], BODY, 1.6))
     stage.lines.append(Line("equator", EQUATOR, circle(1.01, figure), BODY, 1.8, 1.0, "equator"))
     notes: list[str] = []
+    if name == "earth":
+        notes.append("continents: Natural Earth; the body's x axis is at longitude zero")
     planes = _pole_planes(dataset)
     if subject.attitude is None:
         _in_its_own_axes(dataset, stage, figure, notes)
@@ -96,6 +99,14 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
         )
     stage = replace(stage, camera=_eye(np.array([0.0, 0.0, 0.05]), 1.95))
     return Picture(f"rotation of {_article(name)} in space", [stage], planes, _LEADING, notes)
+
+
+def _known(name: str, radius: float) -> surroundings.Globe | None:
+    """Who it is: by its name, else by its equatorial radius, m."""
+    if name:
+        return next((one for one in surroundings.GLOBES if one.name.lower() == name), None)
+    near = min(surroundings.GLOBES, key=lambda one: abs(one.radius - radius))
+    return near if abs(near.radius / radius - 1) < _ALIKE else None
 
 
 def _largest_turn(dataset: Table) -> float:

@@ -13,8 +13,9 @@ import numpy as np
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.angle_units import angle_unit
-from rigidsim.look.page import is_averaged, read_config
+from rigidsim.look.page import read_config
 from rigidsim.look.readable_time import span_text
+from rigidsim.look.roles import is_averaged
 from rigidsim.look.stages.bodies import Subject, direction_of, source_arrows
 from rigidsim.look.stages.parts import (
     FAINT,
@@ -176,5 +177,5 @@ def plane_of(key: str, title: str, color: Color, path: Array, names: tuple[str, 
     reach = size * unit.per_radian
     power = 10.0 ** np.floor(np.log10(reach))
     step = next(s for s in (5, 2, 1, 0.5) if s * power <= 0.75 * reach) * power
-    rings = tuple((k * step, f"{k * step:.3g} {unit.symbol}") for k in (1, 2) if k * step < 1.6 * reach)
+    rings = tuple((k * step, f"{k * step:.3g} {unit.symbol}") for k in (1, 2) if k * step < 1.3 * reach)
     return Plane(key, f"{title} [{unit.symbol}]", color, shown, rings=rings, names=names)
