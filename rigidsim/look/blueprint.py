@@ -72,7 +72,7 @@ def build_blueprint(
         row_shares=[PIXELS * 0.7 - height, height, PIXELS * 0.3],
     )
     right: list[rrb.View | rrb.Container] = [plot_view(plot) for plot in plots if plot.place == "leading"]
-    heights = [3.0] * len(right)
+    heights = [3.0 if len(right) < 3 else 2.2] * len(right)
     small = [plot_view(plot) for plot in plots if plot.place == "drift"]
     if small or more:
         right.append(tabs([*small, *more]))
@@ -193,6 +193,7 @@ def plot_view(plot: Plot) -> rrb.TimeSeriesView:
         ],
         name=plot.title,
         plot_legend=rrb.PlotLegend(visible=True, corner=corner),
+        axis_y=None if plot.range is None else rrb.ScalarAxis(range=plot.range),
         # Independent axes of infinite range: a long run opens whole.
         axis_x=rrb.TimeAxis(
             link=LinkAxis.Independent,

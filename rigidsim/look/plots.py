@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rigidsim.look.angle_units import angle_unit
 from rigidsim.look.roles import drift_of, is_averaged, put_back_of
+from rigidsim.look.si_prefixes import si_scale
 from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
@@ -84,6 +85,23 @@ class Plot:
     series: list[Series] = field(default_factory=list)
     levels: list[Level] = field(default_factory=list)
 
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """Of a plot whose curves all stay where they are: limits that don't magnify their rounding errors."""
+        if self.place == "drift" or not self.series:
+            return None
+        middles = []
+        for series in self.series:
+            error = 0.0 if series.error is None else float(np.nanmax(series.error, initial=0.0))
+            for column in series.values.T:
+                finite = column[np.isfinite(column)]
+                if not len(finite) or np.ptp(finite) > max(_STILL * np.abs(finite).max(), 2 * error):
+                    return None
+                middles.append(float(finite.mean()))
+        low, high = min(middles), max(middles)
+        margin = 0.05 * max(abs(low), abs(high)) or 1.0
+        return low - margin, high + margin
+
 
 def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
     """Plots for every numeric variable along time, in the order in which they are shown.
@@ -131,6 +149,9 @@ def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
 
 def _reading(variable: Variable, unit: str) -> tuple[float, str]:
     """Factor to, and symbol of, the unit that suits a variable."""
+    if unit == "rad/s":
+        divisor, prefixed = si_scale(_columns(variable), unit)
+        return 1 / divisor, prefixed
     if unit != "rad":
         return 1.0, unit
     values = _columns(variable)
@@ -172,10 +193,11 @@ def drift_floor(drifts: list[NDArray[np.float64]]) -> float:
 
 
 _ORDER = ("leading", "more", "drift")
-_USUAL = ("angular_velocity", "euler_angles", "quaternion")
+_USUAL = ("angular_velocity", "euler_angles")
 MOST_LEADING = 3
 _SIGNS = ("°", "″")
 _FLOOR_ROWS = 5000  # of each drift that are looked at for the floor
+_STILL = 1e-9  # of a curve's size, below which what it does is rounding
 _TOGETHER = 3e-3  # of a curve's range: what lies nearer is covered by its line
 _SEEN = 2e-3  # of a curve's range: a narrower band is no wider than the line
 

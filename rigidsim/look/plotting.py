@@ -155,7 +155,8 @@ def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
                 rr.LineStrips2D([ring], colors=[_FAINT], radii=rr.Radius.ui_points(0.5), draw_order=-1.0),
                 static=True,
             )
-            place = [(radius * np.cos(0.9), radius * np.sin(0.9))]
+            at = 0.9 - 0.35 * (number % 2)  # neighbours' labels lie apart
+            place = [(radius * np.cos(at), radius * np.sin(at))]
             text = rr.Points2D(place, labels=[label], colors=[_INK], radii=0.0, show_labels=True)
             recording.log(f"{path}/rings/{number}/label", text, static=True)
         if plane.moves:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.solids import Mesh, ball, revolved
+from rigidsim.look.solids import MINOR_SEGMENTS, Mesh, ball, revolved
 from rigidsim.scene.outlines import Line
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
+_BELTS = MINOR_SEGMENTS // 2  # each of two rings of faces, so that their edges are even
 _SHARP = np.cos(np.deg2rad(25.0))  # between the normals of two faces: what counts as an edge
 
 
@@ -38,7 +39,7 @@ def globe(half_sizes: Array, color: Color) -> Mesh:
     """An ellipsoid in belts of two shades of a colour, brighter towards its north pole."""
     mesh = ball(*half_sizes)
     height = mesh.vertices[mesh.triangles].mean(axis=1)[:, 2] / half_sizes[2]
-    belt = (np.floor((np.arcsin(np.clip(height, -1, 1)) / np.pi + 0.5) * 12).astype(int) % 2) * 0.07
+    belt = (np.floor((np.arcsin(np.clip(height, -1, 1)) / np.pi + 0.5) * _BELTS).astype(int) % 2) * 0.07
     shade = (0.78 + 0.2 * height - belt)[:, None]
     colors = np.clip(np.array(color) * shade, 0, 255).astype(np.uint8)
     return Mesh(mesh.vertices, mesh.triangles, mesh.normals, np.repeat(colors, 3, axis=0))

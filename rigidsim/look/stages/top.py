@@ -82,7 +82,7 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
         stage.spots.append(Spot("center_of_mass", "centre of mass", PULL, com, BODY, 6.0))
     elevation = np.deg2rad(20.0)
     direction = np.cos(elevation) * (0.55 * across[0] - 0.83 * across[1]) + np.sin(elevation) * up
-    radius = 1.62 if drop == 0 else 1.85
+    radius = 1.62 if drop == 0 else 2.05
     target = (0.55 if drop == 0 else 0.1) * up
     camera = Camera(target + radius / np.sin(FIELD / 2) * direction, target, up)
     stage = replace(stage, camera=camera)
@@ -151,5 +151,5 @@ def _from_above(tip: Array, up: Array, across: tuple[Array, Array]) -> Plane:
     # its tilt, not its height, is what rings can tell
     rings = tuple((float(np.sin(np.deg2rad(t))), f"{t}°") for t in (10, 30, 60, 90))
     largest = float(np.nanmax(np.linalg.norm(plane, axis=1)))
-    shown = tuple(ring for ring in rings if ring[0] <= 1.6 * largest) or rings[:1]
+    shown = tuple(ring for ring in rings if ring[0] <= 1.3 * largest) or rings[:1]
     return Plane("tip_from_above", "Axis from above", FIGURE, plane, rings=shown, names=("X", "Y"))
