@@ -11,8 +11,11 @@ import time
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Self
+from urllib.parse import quote
 
 LOOPBACK = "127.0.0.1"  # rerun's own default would listen on every interface
+WEB_PORT, DATA_PORT = 9090, 9876
+"""Of 127.0.0.1, on which the page for browsers and its recording are served: rerun's own."""
 QUIET = {"CI": "1"}  # the one variable that keeps the viewer from sending usage statistics (0.41)
 
 
@@ -54,8 +57,10 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
     if not web and not has_display():
         raise NoDisplay(NO_DISPLAY)
     command = [str(viewer_binary()), str(recording), "--bind", LOOPBACK]
-    command += ["--serve-web"] if web else ["--port", "auto"]
-    process = subprocess.Popen(command, env=os.environ | QUIET)
+    command += _served(DATA_PORT) if web else ["--port", "auto"]
+    process = subprocess.Popen(command, env=_terse() if web else os.environ | QUIET)
+    if web:
+        print(web_words(DATA_PORT), flush=True)
     try:
         return process.wait()
     except KeyboardInterrupt:
@@ -74,9 +79,31 @@ def start_empty(*, web: bool = False) -> tuple[subprocess.Popen[bytes], int]:
     if not web and not has_display():
         raise NoDisplay(NO_DISPLAY)
     port = _free_port()
-    command = [str(viewer_binary()), "--bind", LOOPBACK, "--port", str(port)]
-    command += ["--serve-web"] if web else ["--expect-data-soon"]
-    return subprocess.Popen(command, env=os.environ | QUIET), port
+    command = [str(viewer_binary()), "--bind", LOOPBACK]
+    command += _served(port) if web else ["--port", str(port), "--expect-data-soon"]
+    process = subprocess.Popen(command, env=_terse() if web else os.environ | QUIET)
+    if web:
+        print(web_words(port), flush=True)
+    return process, port
+
+
+def _served(port: int) -> list[str]:
+    return ["--serve-web", "--port", str(port), "--web-viewer-port", str(WEB_PORT)]
+
+
+def _terse() -> dict[str, str]:
+    """The environment of a viewer that says what goes wrong, and nothing else."""
+    return {"RUST_LOG": "warn"} | os.environ | QUIET
+
+
+def web_words(port: int) -> str:
+    """Where the page is, and how to end it.
+
+    Args:
+        port: on which the recording is served.
+    """
+    source = quote(f"rerun+http://{LOOPBACK}:{port}/proxy", safe="")
+    return f"open http://{LOOPBACK}:{WEB_PORT}?url={source} in a browser on this machine; Ctrl-C ends it"
 
 
 def wait_for(process: subprocess.Popen[bytes], port: int, seconds: float) -> None:

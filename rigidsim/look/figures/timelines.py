@@ -165,9 +165,9 @@ def longitude(axes: Axes, dataset: xarray.Dataset) -> None:
     hues = [AXIS_COLORS[name] for name in shown]
     lines(axes, dataset, table / scale, [f"{name} axis" for name in shown], hues)
     # precession is told by the year, whatever the axis of time is in
-    unit = axis.unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
-    rate = angle_text(trend.rate * unit.seconds, 3)
-    key(axes, f"Longitude of the node less its mean motion, {rate}/{unit.symbol}")
+    per = axis.unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
+    rate = angle_text(trend.rate * per.seconds, 3)
+    key(axes, f"Longitude of the node less its mean motion, {rate}/{per.symbol}")
     axes.set_ylabel(f"longitude − line [{unit}]")
 
 
