@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import mpmath
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from rigidsim.analysis.result import Analysis, Line, SignalAnalysis
     from rigidsim.workflows.analyse import Saved
 
+_WIDE = 100  # columns, from which the tables of lines have all of theirs
+_SURE = 5.0  # errors, from which a secular rate is told once more
 _DEGREE = math.pi / 180
 _ANGLES = (
     (_DEGREE, "deg"), (_DEGREE / 3600, "arcsec"), (_DEGREE / 3.6e6, "mas"), (_DEGREE / 3.6e9, "µas"),
@@ -62,6 +65,7 @@ def print_analysis(analysis: Analysis, saved: Saved | None = None, out: Console 
     )
     for signal in analysis.signals:
         _print_signal(signal, out)
+    _print_secular(analysis.signals, out)
     if analysis.known:
         out.print(_known(analysis))
     if analysis.attitude_error is not None and analysis.rounding is not None:
@@ -75,6 +79,17 @@ def print_analysis(analysis: Analysis, saved: Saved | None = None, out: Console 
     if saved is not None:
         out.print(Text(f"dataset   {saved.dataset}"), soft_wrap=True)
         out.print(Text(f"figure    {saved.figure}"), soft_wrap=True)
+
+
+def _print_secular(signals: Sequence[SignalAnalysis], out: Console) -> None:
+    """Once more, below all lines: what moves for good, and how fast."""
+    moving = [one for one in signals if one.rate is not None and abs(one.rate.real) > _SURE * one.rate_error]
+    if moving:
+        out.print()
+    for one in moving:
+        digits = max(int(one.bits * 0.30103), 15)
+        words = _rate(one, one.units == "rad", digits)
+        out.print(Text.assemble("secular   ", (one.name, "bold"), f"  {words}"), soft_wrap=True)
 
 
 def _known(analysis: Analysis) -> Table:
@@ -94,7 +109,7 @@ def _print_signal(signal: SignalAnalysis, out: Console) -> None:
     out.print()
     out.print(Text.assemble((signal.name, "bold"), f"  {_secular(signal, angle, digits)}"), soft_wrap=True)
     if signal.lines:
-        out.print(_lines(signal, angle, digits))
+        out.print(_lines(signal, angle, digits, narrow=out.width < _WIDE))
     else:
         out.print(Text("  no line stands out of what is left", style="dim"))
     left = _with_unit(signal.left, signal.units)
@@ -111,24 +126,32 @@ def _secular(signal: SignalAnalysis, angle: bool, digits: int) -> str:
     unit, symbol = angle_unit(float(signal.value.real)) if angle else (1.0, signal.units)
     value = justified(signal.value.real / unit, signal.value_error / unit, digits)
     text = f"{value} {symbol} at mid-span".replace(" 1 at", " at")
-    if signal.rate is None:
-        return text
+    return text if signal.rate is None else f"{text}; secular rate {_rate(signal, angle, digits)}"
+
+
+def _rate(signal: SignalAnalysis, angle: bool, digits: int) -> str:
     unit, symbol = rate_unit(float(signal.rate.real)) if angle else (1.0, f"{signal.units}/s")
     rate = justified(signal.rate.real / unit, signal.rate_error / unit, digits)
-    return f"{text}; secular rate {rate} +- {signal.rate_error / unit:.1e} {symbol}"
+    return f"{rate} +- {signal.rate_error / unit:.1e} {symbol}"
 
 
 def _with_unit(value: float, units: str) -> str:
     return f"{value:.1e}" + (f" {units}" if units not in ("", "1") else "")
 
 
-def _lines(signal: SignalAnalysis, angle: bool, digits: int) -> Table:
+def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) -> Table:
+    """Of the lines.
+
+    Args:
+        narrow: the errors of frequencies, whose digits tell them, make way for the names.
+    """
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     largest = float(signal.lines[0].amplitude)
     unit, symbol = angle_unit(largest) if angle else (1.0, signal.units)
     table.add_column("period", justify="right", no_wrap=True)
     table.add_column("rad/s", no_wrap=True)
-    table.add_column("error", no_wrap=True)
+    if not narrow:
+        table.add_column("error", no_wrap=True)
     table.add_column(f"amplitude{'' if symbol in ('', '1') else ', ' + symbol}", no_wrap=True)
     table.add_column("phase, deg", justify="right", no_wrap=True)
     table.add_column("line", overflow="fold")
@@ -136,7 +159,7 @@ def _lines(signal: SignalAnalysis, angle: bool, digits: int) -> Table:
         table.add_row(
             _period(line),
             justified(line.frequency, line.frequency_error, digits),
-            f"{line.frequency_error:.0e}",
+            *(() if narrow else (f"{line.frequency_error:.0e}",)),
             justified(line.amplitude / unit, line.amplitude_error / unit, 7),
             justified(line.phase / _DEGREE, line.phase_error / _DEGREE, 6),
             _label(line),

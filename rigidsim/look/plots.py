@@ -28,7 +28,7 @@ RED: Color = (235, 97, 89)
 GREEN: Color = (104, 190, 110)
 BLUE: Color = (92, 148, 235)
 GREY: Color = (170, 170, 175)
-_ERROR: Color = (245, 245, 245)
+_ERROR: Color = (165, 168, 176)  # seen on dark and on light ground
 _VECTOR = (RED, GREEN, BLUE)
 _PALETTE: tuple[Color, ...] = (
     (240, 190, 60),

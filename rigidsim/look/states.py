@@ -84,12 +84,12 @@ def charts_of(dataset: Table) -> list[States]:
     entries = [turned[:, "xyz".index(name[0]), "xyz".index(name[2])] for name in (asked, partner)]
     near = [np.sqrt(np.maximum(1 - entry**2, 0.0)) < CHART_LEFT for entry in entries]
     first = int(near[0][0])
-    chart, changes = first, []
+    chart, changes = first, [0]
     for row in np.flatnonzero(near[0] | near[1]):
         if near[chart][row]:
             chart = 1 - chart
-            changes.append(row)
-    begins = signals.seconds(dataset)[[0, *changes[:MOST_EVENTS]]]
+            changes.append(int(row))
+    begins = signals.seconds(dataset)[np.array(changes[: MOST_EVENTS + 1])]
     values = [(asked, partner)[(first + k) % 2] for k in range(len(begins))]
     return [States("chart", begins, values, dict(zip((asked, partner), _SHADES, strict=True)))]
 

@@ -97,13 +97,14 @@ def _terse() -> dict[str, str]:
 
 
 def web_words(port: int) -> str:
-    """Where the page is, and how to end it.
+    """Where the page is, dark as its colours are made for, and how to end it.
 
     Args:
         port: on which the recording is served.
     """
     source = quote(f"rerun+http://{LOOPBACK}:{port}/proxy", safe="")
-    return f"open http://{LOOPBACK}:{WEB_PORT}?url={source} in a browser on this machine; Ctrl-C ends it"
+    page = f"http://{LOOPBACK}:{WEB_PORT}?theme=dark&url={source}"
+    return f"open {page} in a browser on this machine; Ctrl-C ends it"
 
 
 def wait_for(process: subprocess.Popen[bytes], port: int, seconds: float) -> None:

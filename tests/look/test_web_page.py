@@ -131,7 +131,7 @@ def test_the_page_shows_body_arrows_and_plots(tmp_path: Path) -> None:
         running(view, stdout=output, stderr=output),
         running(browser, **quiet),
     ):
-        address = waited_for(lambda: re.search(r"http://\S+\?url=\S+", log.read_text()))[0]
+        address = waited_for(lambda: re.search(r"http://\S+\?\S+", log.read_text()))[0]
         port = waited_for(lambda: (tmp_path / "profile" / "DevToolsActivePort").read_text().split())[0]
         picture, complaints = asyncio.run(seen(address, int(port)))
     from PIL import Image
