@@ -245,7 +245,7 @@ def test_tip_of_a_top_is_seen_from_above_with_its_first_turn() -> None:
     assert rows == pytest.approx(2001 / 3, abs=2)
     np.testing.assert_allclose(np.transpose(first.get_data()), dataset["tip"].values[:rows, :2] * 1e3)
     assert titles(page)[0] == "Tilt against the vertical"
-    assert titles(page)[1] == "Precession less its mean motion, 1 turns/s"
+    assert titles(page)[1] == "Precession: uniform, 1 turns/s"
 
 
 def test_libration_in_time_and_in_planes() -> None:
