@@ -15,6 +15,7 @@ from rigidsim.scene.fields import (
     EulerSequence,
     Four,
     Kilogram,
+    Later,
     Metre,
     Moment,
     Triple,
@@ -139,10 +140,10 @@ class Body(Solid):
         description="symmetric, in any body axes (products are -sum m x y); results are in these axes",
         examples=[[[2, -0.1, 0], [-0.1, 3, 0], [0, 0, 4]]],
     )
-    points: Annotated[list[PointMass], Field(min_length=1)] | None = Field(
+    points: Annotated[list[Later[PointMass]], Field(min_length=1)] | None = Field(
         default=None, description="particles", examples=[[{"mass": 1, "position": [0, 0, 1]}]]
     )
-    parts: Annotated[list[Part], Field(min_length=1)] | None = Field(
+    parts: Annotated[list[Later[Part]], Field(min_length=1)] | None = Field(
         default=None, description="solids that make up the body"
     )
     preset: StrictStr | None = Field(

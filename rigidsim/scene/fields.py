@@ -14,10 +14,11 @@ from pydantic import (
     StrictStr,
     WithJsonSchema,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import PydanticCustomError, core_schema
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
+from rigidsim.scene.records import dataclass
 from rigidsim.scene.units import UnitError, time_unit
 from rigidsim.scene.validation_messages import shown
 
@@ -139,6 +140,33 @@ class ConfigTable(BaseModel):
     """A TOML table: unknown keys are errors, values never change after reading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True)
+
+
+if TYPE_CHECKING:
+    Later: TypeAlias = Annotated[T, ...]
+else:
+
+    class Later:
+        """A table inside another whose validator is built when the first such table is read, not with the
+        outer one's: most configs give few of the tables that there are.
+        """
+
+        def __class_getitem__(cls, table: type[ConfigTable]) -> Any:
+            return Annotated[table, _BuiltLater(table)]
+
+
+BUILT_LATER = "rigidsim_table"
+"""Where a core schema tells which table it stands for."""
+
+
+@dataclass(frozen=True)
+class _BuiltLater:
+    table: type[ConfigTable]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Instead of the table's own."""
+        read = self.table.model_validate
+        return core_schema.no_info_plain_validator_function(read, metadata={BUILT_LATER: self.table})
 
 
 EULER_SEQUENCES = tuple(

@@ -10,6 +10,7 @@ from rigidsim.scene.fields import (
     ConfigTable,
     Dimensionless,
     GravitationalParameter,
+    Later,
     Metre,
     Speed,
     Triple,
@@ -39,7 +40,7 @@ class PointMassBody(ConfigTable):
     )
     position: Triple[Metre] | None = Field(default=None, description="at the start, space axes")
     velocity: Triple[Speed] | None = Field(default=None, description="at the start, space axes")
-    orbit: StartingOrbit | None = Field(
+    orbit: Later[StartingOrbit] | None = Field(
         default=None,
         description="elements at the start, in place of position and velocity",
         examples=[{"about": "sun", "semi_major_axis": "1 au", "eccentricity": 0.0167}],

@@ -30,6 +30,7 @@ from rigidsim.scene.fields import (
     Dimensionless,
     Four,
     Instant,
+    Later,
     Metre,
     Momentum,
     Rate,
@@ -224,27 +225,34 @@ class Config(ConfigTable):
         description="named constants for expressions",
         examples=[{"k": 0.25, "c": "2e-4 N m s"}],
     )
-    body: Body = Field(description="what turns")
-    initial: Initial = Field(description="the state at the start")
+    body: Later[Body] = Field(description="what turns")
+    initial: Later[Initial] = Field(description="the state at the start")
     loads: list[LoadFields] = Field(default_factory=list, description=_ABOUT_LOADS)
-    bodies: list[PointMassBody] = Field(
+    bodies: list[Later[PointMassBody]] = Field(
         default_factory=list, description="point masses under mutual gravity, beside the body"
     )
-    events: list[EventTable] = Field(
+    events: list[Later[EventTable]] = Field(
         default_factory=list, description="where an expression of time and the state crosses zero"
     )
-    frame: Frame = Field(
-        default_factory=Frame, description="what the axes of space are, and what angles count from"
+    frame: Later[Frame] = Field(
+        default_factory=Frame.model_construct,
+        description="what the axes of space are, and what angles count from",
     )
-    time: Time = Field(description="how long, and where the samples lie")
-    model: Model = Field(default_factory=Model, description="how much of the motion is resolved")
-    integrator: Integrator = Field(
-        default_factory=Integrator, description="how accurately, and in which variables"
+    time: Later[Time] = Field(description="how long, and where the samples lie")
+    model: Later[Model] = Field(
+        default_factory=Model.model_construct, description="how much of the motion is resolved"
     )
-    output: Output = Field(default_factory=Output, description="what is kept and how it is shown")
-    limits: Limits = Field(default_factory=Limits, description="guards that stop the run, resumable")
-    sweep: SweepTable | None = Field(default=None, description="many members of one experiment")
-    tables: dict[StrictStr, TableText] = Field(
+    integrator: Later[Integrator] = Field(
+        default_factory=Integrator.model_construct, description="how accurately, and in which variables"
+    )
+    output: Later[Output] = Field(
+        default_factory=Output.model_construct, description="what is kept and how it is shown"
+    )
+    limits: Later[Limits] = Field(
+        default_factory=Limits.model_construct, description="guards that stop the run, resumable"
+    )
+    sweep: Later[SweepTable] | None = Field(default=None, description="many members of one experiment")
+    tables: dict[StrictStr, Later[TableText]] = Field(
         default_factory=dict,
         description="texts of tables that loads name; files beside the config are taken in here",
         examples=[{"elements.csv": {"text": "time [yr], eccentricity\n0, 0.01\n"}}],

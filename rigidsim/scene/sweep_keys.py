@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from rigidsim.scene.editor_schema import python_schema
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.validation_messages import nearest
@@ -13,7 +14,7 @@ from rigidsim.scene.validation_messages import nearest
 
 @lru_cache(maxsize=4)
 def _json_schema(model: Any) -> dict[str, Any]:
-    return dict(model.model_json_schema())
+    return python_schema(model)
 
 
 def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:

@@ -8,7 +8,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from rigidsim.cli.options import JsonOption, RunPath, print_run
+from rigidsim.cli.options import JsonOption, RunPath
+from rigidsim.cli.running import print_run
 from rigidsim.errors import RigidsimError
 
 
