@@ -39,8 +39,7 @@ class SampleStatistics:
         Args:
             drifts: relative, shape (samples,).
         """
-        size = np.abs(drifts)
-        self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.max(size)))
+        self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.abs(drifts).max()))
         self.final[invariant] = float(drifts[-1])
 
     def see_undefined(self, variable: str, values: np.ndarray, first: int, times: np.ndarray) -> None:

@@ -49,6 +49,10 @@ class StepBoundary:
     projection: np.ndarray
 
 
+_NEAR = 3
+"""Steps that are sooner taken one by one than together, with the next guess of how many they are."""
+
+
 class CorrectedStepper:
     """Takes steps and makes the corrections when they are due.
 
@@ -135,15 +139,22 @@ class CorrectedStepper:
         nothing is corrected yet; the boundary before that.
         """
         most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
+        end, goal, slow = float(self.stepper.time), float(moment), False
         self.back_to(boundary)
         while most > 1:
-            here, half = self.boundary(), most // 2
-            self.skip(half)
+            here, begin, before = self.boundary(), float(self.stepper.time), most
+            part, size = most // 2, (end - begin) / most
+            if not slow and begin < goal < end:  # where steps of one size would come to
+                part = min(max(int((goal - begin) / size), 1), most - 1)
+            self.skip(part)
             if self.stepper.time >= moment:
+                most, end = part, float(self.stepper.time)
                 self.back_to(here)
-                most = half
             else:
-                most -= half
+                most -= part
+                if goal - float(self.stepper.time) < _NEAR * size:
+                    break
+            slow = not slow and 2 * most > before
         while True:
             before = self.boundary()
             self.stepper.step()

@@ -163,6 +163,10 @@ class Evaluator:
         self._angles = JoinedAngles(system, self._compile, wrapping, precision=precision, countable=countable)
         self.continuity = self._angles.first()
         self.sparse, self.dense = self._angles.sparse, self._angles.dense
+        self._recorded = [
+            (one, np.array(one.exponents, dtype=np.int32) if any(one.exponents) else None)
+            for one in system.recorded
+        ]
         factor = system.singular_factor
         self._singular = None if factor is None else self._compile([factor])
 
@@ -215,7 +219,7 @@ class Evaluator:
             values[:, in_partner] = there
         result: RecordedParts = {}
         turned = self._turned(values, block) if self._angles else None
-        for variable in self._system.recorded:
+        for variable, exponents in self._recorded:
             columns = values[variable.first : variable.first + variable.count].T
             if turned is not None and (part := self._angles.part(variable)) is not None:
                 columns = turned[:, part]
@@ -223,8 +227,7 @@ class Evaluator:
             if angles is not None and variable.continuity == "wrapped":
                 columns[in_partner] = angles
             parts = self._precision.parts(columns)
-            exponents = np.array(variable.exponents, dtype=np.int32)
-            if exponents.any():
+            if exponents is not None:
                 parts = [np.ldexp(part, exponents) for part in parts]
             result[variable.name] = parts
         first = len(self._system.outputs) - len(self._system.invariants)
