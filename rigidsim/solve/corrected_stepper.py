@@ -142,7 +142,7 @@ class CorrectedStepper:
         end, goal, slow = float(self.stepper.time), float(moment), False
         self.back_to(boundary)
         while most > 1:
-            here, begin, before = self.boundary(), float(self.stepper.time), most
+            here, begin, whole = self.boundary(), float(self.stepper.time), most
             part, size = most // 2, (end - begin) / most
             if not slow and begin < goal < end:  # where steps of one size would come to
                 part = min(max(int((goal - begin) / size), 1), most - 1)
@@ -154,7 +154,7 @@ class CorrectedStepper:
                 most -= part
                 if goal - float(self.stepper.time) < _NEAR * size:
                     break
-            slow = not slow and 2 * most > before
+            slow = not slow and 2 * most > whole
         while True:
             before = self.boundary()
             self.stepper.step()
