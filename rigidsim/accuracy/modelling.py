@@ -21,6 +21,7 @@ import numpy as np
 from rigidsim.accuracy.trial import compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import Average, osculating
+from rigidsim.model.averaged.resonance import SlowStart
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
 from rigidsim.scene.exact import fraction_of
@@ -42,6 +43,7 @@ _FEWEST_ORBITS = 2
 _ROTATIONS = 4000  # some 20,000 steps
 _MOST_ROTATIONS = 20_000  # for the fewest orbits
 _LEAST_ROTATIONS = 50
+_LIBRATIONS = 2
 _WHOLE = 4  # windows that a run is followed to its end in place of
 _SPARE = 2.0
 """Times the extrapolated growth: it is told from three windows, and varies between them."""
@@ -122,7 +124,8 @@ def measure_modelling(
     begin, end = float(scene.start), float(scene.samples.last)
     length = min(_length(scene, average), end - begin)
     whole = end - begin <= _WHOLE * length
-    places = [(begin, list(average.start))]
+    at_start = average.slow_states(prepared.system.scaling.momentum) or list(average.start)
+    places = [(begin, at_start)]
     if not whole:
         places += _places(prepared, trail, begin, end, length)
     windows: list[Window] = []
@@ -145,6 +148,9 @@ def _length(scene: Scene, average: Average) -> float:
     """Of a window, seconds."""
     rates = [abs(float(average.motion.precession_rate)), abs(float(average.motion.wobble_rate))]
     rotation = _TURN / max(rates)
+    if average.resonance is not None:
+        libration = _TURN / average.resonance.libration_rate
+        return max(_ORBITS * _TURN / average.resonance.source.motion, _LIBRATIONS * libration)
     slowest = max((_TURN / s.motion for s in average.sources if s.motion > 0), default=0.0)
     orbits = min(_ORBITS * slowest, _ROTATIONS * rotation)
     least = min(_FEWEST_ORBITS * slowest, _MOST_ROTATIONS * rotation)
@@ -154,11 +160,11 @@ def _length(scene: Scene, average: Average) -> float:
 def _places(
     prepared: InitialValueProblem, trail: Trail | None, begin: float, end: float, length: float
 ) -> list[tuple[float, list[Any]]]:
-    """Middle and end: the samples that are nearest, with the momentum's direction there."""
+    """Middle and end: the samples that are nearest, with the states there, the momentum's direction first."""
     context, exponent = prepared.scene.context, prepared.system.scaling.time
     kept = [] if trail is None else trail.samples
     seen = [
-        (math.ldexp(float(time), exponent), [context.mpf(float(x)) for x in state[:3]])
+        (math.ldexp(float(time), exponent), [context.mpf(float(x)) for x in state])
         for _, time, state, _ in kept
     ]
     seen = [(at, state) for at, state in seen if at > begin + length]
@@ -176,16 +182,18 @@ def _window(
     average: Average,
     begin: float,
     end: float,
-    direction: Sequence[Any],
+    states: Sequence[Any],
     go_on: Callable[[], bool],
 ) -> Window | None:
     """Both models side by side; None where one doesn't get to the end."""
-    scene = _starting(prepared.scene, average, begin, end, direction)
+    exponent = prepared.system.scaling.momentum
+    scene = _starting(prepared.scene, average, begin, end, states, exponent)
+    back = average.resonance is None  # whether what averaging removed can be added back
     names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
     full = _followed(prepared, scene, FULL, True, names, go_on)
-    reduced = _followed(prepared, scene, average.level, True, names, go_on) if full else None
+    reduced = _followed(prepared, scene, average.level, back, names, go_on) if full else None
     plain = reduced
-    if reduced and not average.short_period:
+    if reduced and back and not average.short_period:
         plain = _followed(prepared, scene, average.level, False, names, go_on)
     if full is None or reduced is None or plain is None:
         return None
@@ -210,9 +218,15 @@ def _window(
     )
 
 
-def _starting(scene: Scene, average: Average, begin: float, end: float, direction: Sequence[Any]) -> Scene:
+def _starting(
+    scene: Scene, average: Average, begin: float, end: float, states: Sequence[Any], exponent: int
+) -> Scene:
     """The full scene from a time on: the body as it was at its start, turned by as little as brings its
-    momentum to where it is now.
+    momentum to where it is now; as the slow motion has it where it keeps pace with its source.
+
+    Args:
+        states: of the averaged motion.
+        exponent: binary, of the internal unit of angular momentum.
     """
     context = scene.context
     instant = fraction_of(context.mpf(begin)) if begin != float(scene.start) else scene.samples.begin
@@ -221,11 +235,15 @@ def _starting(scene: Scene, average: Average, begin: float, end: float, directio
     moved = replace(scene, start=samples.start, end=samples.last, samples=samples)
     if begin == float(scene.start):
         return moved
+    if average.resonance is not None:
+        slow = SlowStart(list(states[:4]), scene.context.ldexp(states[4], exponent))
+        quaternion, velocity = average.resonance.osculating(slow, scene, samples.start)
+        return replace(moved, quaternion=quaternion, euler_angles=None, angular_velocity=velocity)
     matrix = attitude.rotation_matrix(scene.quaternion)
     momentum = apply(matrix, apply(scene.body.inertia, scene.angular_velocity))
     size = norm(context, momentum)
     before = [x / size for x in momentum]
-    now = osculating(scene, average, direction, samples.start)
+    now = osculating(scene, average, states[:3], samples.start)
     turn = [1 + dot(before, now), *cross(before, now)]
     if dot(turn, turn) < context.mpf(2) ** -60:  # to the opposite: about any axis across
         least = min(range(3), key=lambda i: abs(before[i]))

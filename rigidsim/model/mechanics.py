@@ -34,6 +34,20 @@ class Mechanics(Kinematics):
         """Whether they are."""
         return self.turning_rate is not None
 
+    @property
+    def kept_by_average(self) -> str | None:
+        """Why the size of the angular momentum is constant where rotations are averaged over; None where it
+        isn't.
+        """
+        return None
+
+    @property
+    def commensurable_angle(self) -> tuple[Symbolic, Symbolic] | None:
+        """Sine and cosine, times a common size, of the angle that an average over rotations and orbits keeps
+        where the body keeps pace with its source; None elsewhere.
+        """
+        return None
+
     def tells(self, name: str) -> bool:
         """Whether the motion carries as much as an observable of this name takes, as far as ``needs`` can't
         say.

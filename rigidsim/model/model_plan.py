@@ -147,9 +147,12 @@ def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
     left_out = [("attitude", f'[model] level = "{average.level}" averages over the rotation')]
     if average.over_orbits:
         left_out.append(("anomalies", "the torques are averaged over the orbits"))
-    requirements = Requirements(
-        average.level, False, False, record, {"attitude": WHY[average.level]}, left_out
-    )
+    why = WHY[average.level]
+    if average.resonance is not None:
+        why = (
+            f"the body keeps pace with its source, {average.resonance.name}: the commensurable angle is kept"
+        )
+    requirements = Requirements(average.level, False, False, record, {"attitude": why}, left_out)
     scaling = replace(choose_scaling(scene), rates=(0, 0, 0))
     return ModelPlan(
         scene,

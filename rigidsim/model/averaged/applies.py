@@ -16,6 +16,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.look.readable_time import span_text
+from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.load import Load
@@ -26,6 +27,9 @@ from rigidsim.scene.scene import Scene
 LIBRATION = 2.0
 """Times the half-width of libration that a combination of frequencies must stay from zero: motions near the
 separatrix dwell, and the widths of neighbouring resonances add up."""
+AXIAL = 0.1
+"""Angle (rad) between momentum and the circled axis up to which the latter is said to point somewhere: its
+mean is along the momentum, and the whole angle is part of what averaging leaves out."""
 SWING = 0.05
 """Largest angle (rad) by which what is averaged away may swing the momentum or the figure axis: errors are of
 second order in it, so that a percent of the precession is the most that can be hoped for beyond."""
@@ -75,18 +79,32 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         raise _refused(level, against)
 
 
-def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source]) -> None:
+def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source]) -> Resonance | None:
     """Look whether the motion's frequencies are far enough apart.
 
+    Returns:
+        The resonance of spin and orbit that an average over the orbits can keep; None without one.
+
     Raises:
-        ConfigError: names the resonance, or what is too fast.
+        ConfigError: names a resonance that it can't, or what is too fast.
     """
-    for source in sources:
-        _refuse_resonance(scene, spectrum, source)
-        _refuse_forced(scene, spectrum, source)
+    found = [_refuse_resonance(scene, spectrum, source) for source in sources]
+    kept = [resonance for resonance in found if resonance is not None]
+    if len(kept) > 1:
+        what = f"the body keeps pace with [[loads]] number {kept[0].source.number} ({kept[0].name}) and "
+        what += f"number {kept[1].source.number} ({kept[1].name}) at once"
+        raise _refused(scene.config.model.level, what)
+    for source, resonance in zip(sources, found, strict=True):
+        if resonance is None:
+            _refuse_forced(scene, spectrum, source)
+    if kept and scene.config.model.short_period:
+        what = f"given true, but the body keeps pace with [[loads]] number {kept[0].source.number} "
+        what += f"({kept[0].name}), and what goes round with that orbit isn't added back; set it to false"
+        raise ConfigError(Problem("[model] short_period", what))
     if scene.config.model.level == ORBIT_AVERAGED:
         for source in sources:
             _refuse_slow_orbit(scene, spectrum, source)
+    return kept[0] if kept else None
 
 
 def separatrix_refused(level: str) -> ConfigError:
@@ -105,15 +123,16 @@ def swing_of(spectrum: BodySpectrum, source: Source) -> float:
     return strongest * float((sizes / rates).sum()) / float(spectrum.motion.momentum)
 
 
-def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> None:
+def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance | None:
+    """The one that can be kept, where there is no other."""
     found = np.flatnonzero(spectrum.oscillating.ravel())
     if not len(found):
-        return
+        return None
     sizes = np.abs(spectrum.harmonics).ravel()[found]
     keep = sizes > _WEAK * max(float(x) for x in spectrum.motion.moments)
     found, sizes = found[keep], sizes[keep]
     if not len(found):
-        return
+        return None
     i, j = (orders.ravel()[found] for orders in spectrum.orders)
     body = spectrum.frequencies.ravel()[found]
     orbit = source.harmonics
@@ -124,6 +143,19 @@ def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> N
     rate = np.abs(np.abs(body[:, None]) - k[None, :] * source.motion)
     swing = energy / (float(spectrum.motion.momentum) * np.maximum(rate, 1e-300))
     slow = LIBRATION * width + 2 * source.slow_rate
+    kept = _offered(scene, spectrum, source)
+    own = np.zeros(rate.shape, dtype=bool)
+    if kept is not None:
+        spin = 2 * float(spectrum.motion.momentum / spectrum.motion.moments[2])
+        of_spin = (i == 2) & (np.abs(np.abs(body) - spin) < abs(float(spectrum.motion.wobble_rate)))
+        own = of_spin[:, None] & (k == kept.multiple)[None, :]
+    met = bool((own & ((rate < slow) | (swing > SWING))).any())
+    keeps = scene.config.model.level == ORBIT_AVERAGED
+    remedy = 'choose level = "full"'
+    if keeps:
+        slow, swing = np.where(own, 0.0, slow), np.where(own, 0.0, swing)
+    elif met:
+        remedy = 'choose level = "orbit_averaged", which keeps its angle, or "full"'
     worst = np.unravel_index(int(np.argmax(slow / np.maximum(rate, 1e-300))), rate.shape)
     if rate[worst] < slow[worst] or swing.max() > SWING:
         if not rate[worst] < slow[worst]:
@@ -135,7 +167,22 @@ def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> N
             f"and of the mean motion n of [[loads]] number {source.number} is only "
             f"{float(rate[worst]):.3g} rad/s, once in {_period(float(rate[worst]))}, where its angle "
             f"librates within {float(width[worst]):.3g} rad/s: a resonance, which no average may pass over",
+            remedy,
         )
+    return kept if met else None
+
+
+def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance | None:
+    """The nearest resonance of the spin with a source on a Kepler orbit, of a body that turns about its axis
+    of largest moment.
+    """
+    motion = spectrum.motion
+    least, middle, most = motion.moments
+    axial = least < middle < most and motion.tilt(scene.context) <= AXIAL
+    if source.orbit is None or not axial:
+        return None
+    multiple = round(2 * float(motion.momentum / most) / source.motion)
+    return Resonance(motion, source, multiple, scene.context) if multiple > 0 else None
 
 
 def _combination(spectrum: BodySpectrum, orders: tuple[int, int, int], body: float) -> str:

@@ -9,11 +9,13 @@ Kinoshita 1977).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rigidsim.model.averaged.applies import (
+    AXIAL,
     refuse_frequencies,
     refuse_scene,
     separatrix_refused,
@@ -21,6 +23,7 @@ from rigidsim.model.averaged.applies import (
 )
 from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
 from rigidsim.model.averaged.orbit_terms import nutation
+from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
 from rigidsim.model.load import Load
@@ -32,9 +35,6 @@ from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
-_AXIAL = 0.1
-"""Angle (rad) between momentum and the circled axis up to which the latter is said to point somewhere: its
-mean is along the momentum, and the whole angle is part of what averaging leaves out."""
 _ROUNDS = 4  # each gains a factor of the nutation's size
 
 
@@ -50,6 +50,8 @@ class Average:
         swing: angle (rad) by which what averaging over the rotation leaves out swings the momentum.
         figure: +1 or -1 where the figure axis is the circled one or its opposite and stays near the momentum,
             0 elsewhere.
+        resonance: of spin and orbit, whose angle is kept; None without one.
+        slow: where that motion starts.
     """
 
     level: str
@@ -60,6 +62,8 @@ class Average:
     energy: Any
     swing: float
     figure: int
+    resonance: Resonance | None = None
+    slow: SlowStart | None = None
 
     @property
     def over_orbits(self) -> bool:
@@ -73,6 +77,16 @@ class Average:
             return Carried.ECCENTRIC
         return Carried.MEAN if self.short_period else Carried.NEITHER
 
+    def slow_states(self, exponent: int) -> Vector | None:
+        """Of a resonant average at its start; None of others.
+
+        Args:
+            exponent: binary, of the internal unit of angular momentum.
+        """
+        if self.resonance is None or self.slow is None:
+            return None
+        return [*self.slow.quaternion, self.resonance.context.ldexp(self.slow.excess, -exponent)]
+
     def rate(self, source: Source) -> Any:
         """3 (G M / a^3) excess / L (mpf, 1/s): see ``rigidsim.model.averaged.orbit_terms``."""
         return source.strength * self.motion.excess / self.motion.momentum
@@ -80,7 +94,10 @@ class Average:
     @property
     def rate_bound(self) -> Any:
         """Of the momentum's turning, rad/s (mpf)."""
-        return sum(abs(self.rate(source)) * source.nearest for source in self.sources)
+        found = sum(abs(self.rate(source)) * source.nearest for source in self.sources)
+        if self.resonance is not None:
+            found += 4 * self.resonance.strength * self.resonance.source.nearest / self.motion.momentum
+        return found
 
     def shear(self, context: Any, time: Any) -> Any:
         """By how much an angle across the precession changes the rate along it, 1/s (mpf), at the start
@@ -116,7 +133,9 @@ def average_of(scene: Scene, loads: Sequence[Load]) -> Average:
     try:
         motion = free_motion(context, body, momentum)
         spectrum = body_spectrum(motion)
-        refuse_frequencies(scene, spectrum, sources)
+        resonance = refuse_frequencies(scene, spectrum, sources)
+        if resonance is not None:
+            return _resonant(scene, resonance, sources)
         vector = apply(matrix, momentum)
         removed = _left_out_at_start(scene, spectrum, sources, unit(context, vector))
         vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
@@ -142,9 +161,31 @@ def average_of(scene: Scene, loads: Sequence[Load]) -> Average:
     return found
 
 
+def _resonant(scene: Scene, resonance: Resonance, sources: Sequence[Source]) -> Average:
+    context, table, motion = scene.context, scene.config.model, resonance.motion
+    slow = resonance.start(scene)
+    size = slow.excess + resonance.pace * motion.moments[2]
+    motion = replace(motion, momentum=size)
+    resonance = replace(resonance, motion=motion)
+    start = [row[2] for row in attitude.rotation_matrix(slow.quaternion)]
+    energy = size * size / (2 * motion.moments[2])
+    return Average(
+        table.level,
+        False,
+        motion,
+        sources,
+        unit(context, start),
+        energy,
+        0.0,
+        _figure(scene, motion),
+        resonance,
+        slow,
+    )
+
+
 def _figure(scene: Scene, motion: FreeMotion) -> int:
     along = dot(scene.figure.pole, motion.axes[2])
-    if abs(abs(along) - 1) > negligible(scene.context) or motion.tilt(scene.context) > _AXIAL:
+    if abs(abs(along) - 1) > negligible(scene.context) or motion.tilt(scene.context) > AXIAL:
         return 0
     return 1 if along > 0 else -1
 

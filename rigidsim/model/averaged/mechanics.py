@@ -59,6 +59,11 @@ class AveragedMechanics(Mechanics):
         return name in TOLD
 
     @property
+    def kept_by_average(self) -> str | None:
+        """See ``Mechanics``."""
+        return "averaged over the free rotation, a gravity gradient has no torque along the momentum"
+
+    @property
     def conserves_energy(self) -> bool:
         """It is no question here: the energy of the free rotation is a constant."""
         return False

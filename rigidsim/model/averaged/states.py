@@ -10,6 +10,7 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.mechanics import DIRECTION, TOLD, AveragedMechanics
+from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder, ScaledNumbers
@@ -29,6 +30,37 @@ WHY = {
 }
 
 
+def _resonant_states(
+    scene: Scene,
+    average: Average,
+    loads: Sequence[Load],
+    scaling: Scaling,
+    numbers: ScaledNumbers,
+    orbit_tags: Mapping[KeplerOrbit, str],
+    number: Rounder,
+) -> tuple[AveragedMechanics, list[StateBlock]]:
+    """Of a body that keeps pace with its source."""
+    resonance, initial = average.resonance, average.slow_states(scaling.momentum)
+    assert resonance is not None
+    assert initial is not None
+    q = list(hy.make_vars(*SLOW[:4]))
+    attitude = AttitudeStates(
+        average.level, SLOW[:4], [], initial[:4], [], q, "state",
+        defect=("quaternion_norm", "norm of the slow quaternion", hy.sqrt(hy.sum([x * x for x in q]))),
+    )  # fmt: skip
+    m = ResonantMechanics(
+        scene, scaling, numbers, q[:3], attitude, None, None, None, number, orbit_tags,
+        loads=list(loads), average=average,
+    )  # fmt: skip
+    why = f"the body keeps pace with [[loads]] number {resonance.source.number}, {resonance.name}: its axes "
+    why += (
+        "turned back by so many turns to a revolution, and the momentum beyond that, under torques averaged "
+    )
+    why += "over rotation and orbits"
+    exponents = [0] * 4 + [scaling.momentum]
+    return m, [StateBlock(SLOW, m.slow_derivatives, initial, exponents=exponents, why=why)]
+
+
 def refuse_untold(average: Average, record: Sequence[str] | None) -> None:
     """Look whether what is recorded can be had.
 
@@ -39,6 +71,8 @@ def refuse_untold(average: Average, record: Sequence[str] | None) -> None:
         if name in _OF_FIGURE and not average.figure:
             why = "the body tumbles, so that its figure axis points nowhere on average; record momentum_axis "
             why += "instead"
+        elif name == RESONANT_ANGLE and average.resonance is not None:
+            continue
         elif name not in TOLD:
             why = f'needs every rotation, which [model] level = "{average.level}" averages over'
         else:
@@ -58,6 +92,8 @@ def averaged_states(
     number: Rounder,
 ) -> tuple[AveragedMechanics, list[StateBlock]]:
     """The mechanical quantities of an averaged motion, and its states."""
+    if average.resonance is not None:
+        return _resonant_states(scene, average, loads, scaling, numbers, orbit_tags, number)
     s = list(hy.make_vars(*DIRECTION))
     attitude = AttitudeStates(
         average.level,

@@ -5,7 +5,7 @@ which a dataset holds it.
 """
 
 from rigidsim.model.observables import mechanical  # noqa: F401, I001  (enters what it defines)
-from rigidsim.model.observables import axes, rotation, wobble, orbit, top, point_masses  # noqa: F401
+from rigidsim.model.observables import axes, rotation, wobble, orbit, top, point_masses, resonance  # noqa: F401
 from rigidsim.model.observables.observable import (
     Angle as Angle,
     Observable as Observable,

@@ -39,7 +39,7 @@ def _torque_free(m: Mechanics) -> str | None:
 
 def _momentum_kept(m: Mechanics) -> str | None:
     if m.averaged:
-        return "averaged over the free rotation, a gravity gradient has no torque along the momentum"
+        return m.kept_by_average
     return _torque_free(m)
 
 
