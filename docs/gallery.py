@@ -19,7 +19,11 @@ import rigidsim
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "gallery.md"
 PICTURES = ROOT / "docs" / "figures" / "gallery"
-CONFIGS = sorted((ROOT / "configs").glob("*.toml"))
+CONFIGS = [
+    config
+    for folder in ("", "bodies", "tables")
+    for config in sorted((ROOT / "configs" / folder).glob("*.toml"))
+]
 _DOTS_PER_INCH = 100
 _COLOURS = 256  # of a picture's palette
 _COLUMNS = (
@@ -91,7 +95,9 @@ def picture(run: rigidsim.Run, name: str) -> None:
     figure.savefig(data, format="png", dpi=_DOTS_PER_INCH)
     pyplot.close(figure)
     data.seek(0)
-    image = Image.open(data).convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    drawn = Image.open(data).convert("RGB")
+    # colours of thin lines keep a place in the palette, and k-means moves it to where colours are
+    image = drawn.quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, kmeans=8)
     PICTURES.mkdir(parents=True, exist_ok=True)
     image.save(PICTURES / f"{name}.png", optimize=True)
 
@@ -112,7 +118,8 @@ def page(rows: list[list[str]]) -> str:
     for config in CONFIGS:
         description, look = told(config)
         parts.append(f"## {config.stem}")
-        parts.append(f"*{description}.* [{config.name}](../configs/{config.name})")
+        path = config.relative_to(ROOT).as_posix()
+        parts.append(f"*{description}.* [{config.name}](../{path})")
         parts.append(look)
         parts.append(f"![What rigidsim plot draws of it](figures/gallery/{config.stem}.png)")
     parts.append("## Sweeps")
@@ -121,7 +128,7 @@ def page(rows: list[list[str]]) -> str:
         parts.append(
             f"*{description}.* [{config.name}](../configs/sweeps/{config.name}), by `rigidsim sweep`."
         )
-    parts.append("![MEGNO over angle and rate](figures/hyperion_map.png)")
+        parts.append(f"![What rigidsim plot draws of it](figures/{config.stem}.png)")
     parts.append("## Studies")
     parts.append(
         "Questions with an answer, each one command, `python -m experiments.NAME`; "

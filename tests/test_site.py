@@ -104,8 +104,14 @@ def test_every_warning_and_status_has_its_remedy() -> None:
 def test_every_config_is_in_the_gallery() -> None:
     """``python -m docs.gallery NAME`` puts it there."""
     text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
-    names = [config.stem for config in (ROOT / "configs").glob("*.toml")]
+    names = [
+        config.stem
+        for folder in ("", "bodies", "tables")
+        for config in (ROOT / "configs" / folder).glob("*.toml")
+    ]
     assert [name for name in names if f"\n## {name}\n" not in text] == []
+    sweeps = [config.stem for config in (ROOT / "configs" / "sweeps").glob("*.toml")]
+    assert [name for name in sweeps if f"](figures/{name}.png)" not in text] == []
     assert [n for n in names if not (ROOT / "docs" / "figures" / "gallery" / f"{n}.png").exists()] == []
 
 

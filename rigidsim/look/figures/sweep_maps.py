@@ -1,8 +1,8 @@
 """Figures of a sweep: lines along one axis, a map over two, points of a section.
 
 What is drawn is a variable of the dataset: one number of each member. A vector has a line for each component,
-or the map of one of them. Where the members have more axes than two, the others are cut at their first value,
-and the page says so.
+or the map of one of them; of two axes one with few values has a line for each. Where the members have more
+axes than two, the others are cut at their first value, and the page says so.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ INDICATORS = ("megno", "fli", "lyapunov")
 _ALWAYS = ("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error")
 _BESIDE = ("failed_member", "failed_reason")
 _LAST = ("_drift_largest", "_drift_final", "_time", "_times", "_count")
+_FIRST = "_first"
+_FEW = 6  # values of a second axis up to which each has a line, and there is no map
 _SECTION = "_occurrence"  # dimension of the points of a section
 _DECADES = 1.5  # from which on values of one sign have a logarithmic scale
 _MOST_LINES = 16
@@ -50,6 +52,8 @@ def drawable(dataset: xarray.Dataset) -> list[str]:
 def _rank(dataset: xarray.Dataset, name: str) -> int:
     if name in INDICATORS:
         return INDICATORS.index(name)
+    if name.endswith(_FIRST) and name.removesuffix(_FIRST) + "_count" in dataset:
+        return 5  # when an event happened: nobody asks for one who wants something else
     if name in _ALWAYS:
         return 30 + _ALWAYS.index(name)
     if any(str(dim).endswith(_SECTION) for dim in dataset[name].dims):
@@ -63,7 +67,7 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     Args:
         dataset: of a sweep, lazy or not.
         what: name of the variable, with ``[INDEX]`` for one component; by default the first indicator, else
-            the first quantity that was kept.
+            the first time of an event, else the first quantity that was kept.
 
     Raises:
         ValueError: no such variable; names those there are.
@@ -79,8 +83,12 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
         axes, cut, said = _cut(dataset, variable)
         if component is not None:
             cut, said = _component(cut, axes, component, said)
-        if len(axes) == 1:
-            return _lines(dataset, cut, axes[0], said)
+        along = max(axes, key=lambda dim: cut.sizes[dim])
+        others = [dim for dim in axes if dim != along]
+        if len(axes) == 1 or min(cut.sizes[dim] for dim in axes) <= _FEW < cut.sizes[along]:
+            if others and set(map(str, cut.dims)) != set(axes):
+                cut, said = _component(cut, axes, 0, said)
+            return _lines(dataset, cut, along, said)
         return _map(dataset, cut, axes, said)
 
 
@@ -130,7 +138,12 @@ def _component(cut: xarray.DataArray, axes: list[str], index: int, said: str) ->
 
 
 def _label(variable: xarray.DataArray, dim: str, place: int) -> str:
-    return str(variable.coords[dim].values[place]) if dim in variable.coords else str(place)
+    if dim not in variable.coords:
+        return str(place)
+    value = variable.coords[dim].values[place]
+    if np.asarray(value).dtype.kind == "f":  # of an axis of the sweep
+        return f"{dim.replace('_', ' ')} {value:.4g}"
+    return str(value)
 
 
 # --- one axis: lines ----------------------------------------------------------------------------------------
