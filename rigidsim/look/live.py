@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import time
 from collections.abc import Callable
@@ -95,9 +96,11 @@ def follow(
         NoDisplay, FileNotFoundError: as of ``viewer.open_viewer``.
         RuntimeError: the viewer ended before it listened.
     """
+    process, port = viewer.start_empty(web=web)
+    # Ctrl-C ends the viewer, too: what was on its way there would be complained of; `process` tells enough
+    os.environ.setdefault("RUST_LOG", "off")
     import rerun as rr
 
-    process, port = viewer.start_empty(web=web)
     try:
         viewer.wait_for(process, port, _ANSWER_SECONDS)
         with rr.RecordingStream("rigidsim") as stream:
@@ -110,13 +113,13 @@ def follow(
                         recording.update(dataset)
                 if going_on:
                     _sleep(process, poll)
-        return process.wait()
+        return viewer.ended(process)
     except KeyboardInterrupt:
         return 130
     except RuntimeError:
         # sent while the viewer was being closed
         try:
-            return process.wait(timeout=_CLOSING_SECONDS)
+            return viewer.ended(process, _CLOSING_SECONDS)
         except subprocess.TimeoutExpired:
             pass
         raise

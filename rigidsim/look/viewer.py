@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from urllib.parse import quote
 LOOPBACK = "127.0.0.1"  # rerun's own default would listen on every interface
 WEB_PORT, DATA_PORT = 9090, 9876
 """Of 127.0.0.1, on which the page for browsers and its recording are served: rerun's own."""
+INTERRUPTED = 130
 QUIET = {"CI": "1"}  # the one variable that keeps the viewer from sending usage statistics (0.41)
 
 
@@ -62,11 +64,21 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
     if web:
         print(web_words(DATA_PORT), flush=True)
     try:
-        return process.wait()
+        return ended(process)
     except KeyboardInterrupt:
         process.terminate()
         process.wait()
-        return 130
+        return INTERRUPTED
+
+
+def ended(process: subprocess.Popen[bytes], timeout: float | None = None) -> int:
+    """Wait for a viewer; its exit code, 130 where Ctrl-C reached it first.
+
+    Raises:
+        TimeoutExpired: of subprocess, after so many seconds.
+    """
+    code = process.wait(timeout)
+    return INTERRUPTED if code == -signal.SIGINT else code
 
 
 def start_empty(*, web: bool = False) -> tuple[subprocess.Popen[bytes], int]:

@@ -22,6 +22,9 @@ class Observer:
     def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
         """The equations are compiled; integration begins, into a folder or into memory."""
 
+    def resumed(self, progress: Progress) -> None:
+        """After ``started``, of a run that goes on: what was done before this session."""
+
     def progressed(self, progress: Progress) -> None:
         """Called between chunks, at most some tens of times per second."""
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress_words import NOTHING_LEFT, PHASES, left, rate_text
+from rigidsim.session.progress_words import NOTHING_LEFT, PHASES, Pace
 from rigidsim.session.understood import time_words
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
@@ -41,7 +41,15 @@ class LineObserver(Observer):
         self._start = float(prepared.scene.start)
         self._last = float(prepared.scene.samples.last) - self._start
         self._words = time_words(prepared.scene)
+        self._pace = Pace()
         self._say("integrating in memory" if folder is None else f"integrating into {folder}")
+
+    def resumed(self, progress: Progress) -> None:
+        """See ``Observer``."""
+        self._pace = Pace(progress.steps, self._fraction(progress))
+
+    def _fraction(self, progress: Progress) -> float:
+        return (progress.time - self._start) / self._last if self._last else 1.0
 
     def progressed(self, progress: Progress) -> None:
         """See ``Observer``."""
@@ -50,12 +58,11 @@ class LineObserver(Observer):
             return
         self._latest = now
         elapsed = now - self._begin
-        fraction = (progress.time - self._start) / self._last if self._last else 1.0
-        rate = rate_text(progress.steps / max(elapsed, 1e-9))
+        fraction = self._fraction(progress)
+        rate, to_go = self._pace.words(elapsed, progress.steps, fraction)
         reached = self._words.short(progress.time)
         print(
-            f"{self._name}: {100 * min(fraction, 1):.1f} %, t = {reached}, {rate} steps/s, "
-            f"{left(elapsed, fraction)}",
+            f"{self._name}: {100 * min(fraction, 1):.1f} %, t = {reached}, {rate} steps/s, {to_go}",
             file=sys.stderr,
             flush=True,
         )

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, TaskID, TextColumn
 from rich.progress import Progress as Bar
 
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress_words import NOTHING_LEFT, PHASES, left, rate_text
+from rigidsim.session.progress_words import NOTHING_LEFT, PHASES, Pace
 from rigidsim.session.understood import time_words
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
@@ -48,16 +48,23 @@ class TerminalObserver(Observer):
         self._start = float(prepared.scene.start)
         self._last = last
         self._words = time_words(prepared.scene)
+        self._pace = Pace()
         self._draw(_shortened(prepared.scene.name), 1.0)
+
+    def resumed(self, progress: Progress) -> None:
+        """See ``Observer``."""
+        self._pace = Pace(progress.steps, self._fraction(progress))
+
+    def _fraction(self, progress: Progress) -> float:
+        return min(1.0, (progress.time - self._start) / self._last) if self._last else 1.0
 
     def progressed(self, progress: Progress) -> None:
         """See ``Observer``."""
         if self._task is None:
             return
-        fraction = min(1.0, (progress.time - self._start) / self._last) if self._last else 1.0
-        elapsed = time.perf_counter() - self._begin
-        rate = rate_text(progress.steps / max(elapsed, 1e-9))
-        said = f"{100 * fraction:5.1f} %  {rate:>6} steps/s  {left(elapsed, fraction)}"
+        fraction = self._fraction(progress)
+        rate, to_go = self._pace.words(time.perf_counter() - self._begin, progress.steps, fraction)
+        said = f"{100 * fraction:5.1f} %  {rate:>6} steps/s  {to_go}"
         if self._bar.console.width >= _WIDE:
             said += f"  t = {self._words.short(progress.time)}"
         self._bar.update(self._task, completed=fraction, said=said)

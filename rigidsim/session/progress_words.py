@@ -28,6 +28,28 @@ def left(elapsed: float, fraction: float) -> str:
 def rate_text(value: float) -> str:
     """A rate to three digits, with a prefix."""
     for factor, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if value >= factor:
+        if value >= 0.9995 * factor:  # what rounds to 1000 has the next prefix
             return f"{value / factor:.3g} {suffix}"
     return f"{value:.3g}"
+
+
+class Pace:
+    """How fast a session goes, by what it did itself.
+
+    Args:
+        steps: taken before it.
+        fraction: of the run that was done before it.
+    """
+
+    def __init__(self, steps: int = 0, fraction: float = 0.0) -> None:
+        self._steps, self._fraction = steps, fraction
+
+    def words(self, elapsed: float, steps: int, fraction: float) -> tuple[str, str]:
+        """Steps a second, and the time to go.
+
+        Args:
+            elapsed: seconds since the session began.
+            steps, fraction: of the whole run.
+        """
+        share = (fraction - self._fraction) / (1 - self._fraction) if self._fraction < 1 else 1.0
+        return rate_text((steps - self._steps) / max(elapsed, 1e-9)), left(elapsed, share)

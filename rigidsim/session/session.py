@@ -89,6 +89,7 @@ class Session:
         recorder.progress = loop.progress
         if resumed is not None:
             recorder.restore(resumed.statistics)
+            self.observer.resumed(loop.progress)
         with interruption.watching():
             progress = loop.run()
             if not progress.status.final:

@@ -675,9 +675,16 @@ def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[
         observer._begin -= 100.0
         observer._latest -= 100.0
         observer.progressed(Progress(11, steps=500_000, time=200.0))
+        observer.started(prepared, Path("runs/free"))
+        observer.resumed(Progress(11, steps=400_000, time=180.0))  # another session
+        observer._begin -= 100.0
+        observer._latest -= 100.0
+        observer.progressed(Progress(11, steps=500_000, time=220.0))
         observer.phase("timeline")
     assert capsys.readouterr().err.splitlines() == [
         "free: integrating into runs/free",
         "free: 25.0 %, t = 200 s, 5 k steps/s, 0:05:00 left",
+        "free: integrating into runs/free",
+        "free: 30.0 %, t = 220 s, 1 k steps/s, 0:11:40 left",
         "free: drawing timeline.rrd",
     ]

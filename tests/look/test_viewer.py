@@ -56,7 +56,7 @@ def test_viewer_listens_on_this_machine_only_and_sends_no_statistics(
             commands.append(command)
             assert env["CI"] == "1"
 
-        def wait(self) -> int:
+        def wait(self, timeout: float | None = None) -> int:
             return 7
 
     monkeypatch.setattr(subprocess, "Popen", Process)
