@@ -16,7 +16,6 @@ from rigidsim.model.equations import (
 from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.loads.gravity_gradient import GravityGradient
-from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.needs import work_is_needed
@@ -202,7 +201,7 @@ def _point_mass_blocks(m: Mechanics) -> list[StateBlock]:
     states = m.point_masses
     if states is None:
         return []
-    states.react([part for load in m.loads if isinstance(load, MovingSource) for part in load.reaction(m)])
+    states.react([part for load in m.loads for part in load.reaction(m)])
     return [states.block()]
 
 

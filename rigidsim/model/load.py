@@ -12,6 +12,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, TablePlane
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
@@ -40,6 +41,7 @@ class Load(SceneLoad):
         masses_beside: whether its source is one of the point masses that move beside the body.
         has_source: whether the direction to its source is known: nadir, roll and libration count from it.
         attracting_point: centre of its force (mpf, m, space axes), where that always points to one.
+        without_plane: why its source has an orbit, but no ``plane`` that is known.
     """
 
     title = "load"
@@ -53,6 +55,16 @@ class Load(SceneLoad):
     has_source: bool = False
     masses_beside: bool = False
     attracting_point: Vector | None = None
+    without_plane: str = ""
+
+    @property
+    def plane(self) -> OrbitPlane | None:
+        """That its source moves in, or the body about its source."""
+        if self.orbit is not None:
+            return KeplerPlane(self.orbit)
+        if self.table is not None:
+            return TablePlane(self.table)
+        return None if self.attracting_point is None else FlightPlane(self.attracting_point)
 
     # --- equations ---------------------------------------------------------------------------------------
 
@@ -66,6 +78,10 @@ class Load(SceneLoad):
 
     def force(self, m: Kinematics) -> list[Term]:
         """Acceleration of the centre of mass, space axes, in internal units of speed over time."""
+        return []
+
+    def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
+        """What the point masses beside the body feel of it, as of ``PointMassStates.react``."""
         return []
 
     def potential(self, m: Kinematics) -> Symbolic | None:

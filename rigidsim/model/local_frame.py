@@ -19,9 +19,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.load import Load
-from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.reference_plane import flight_normal
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import cross, norm
 from rigidsim.scene.records import dataclass
@@ -60,7 +58,7 @@ def first_source(loads: Sequence[Any]) -> Any | None:
 def flies_about_source(scene: Scene) -> bool:
     """Whether the source's direction is that of the body's own flight."""
     load = first_source(scene.loads)
-    return load is not None and load.attracting_point is not None
+    return load is not None and load.plane is not None and load.plane.flown
 
 
 def local_frame(m: Mechanics) -> LocalFrame:
@@ -78,33 +76,15 @@ def moves_slowly_in_orbit(m: Mechanics) -> bool:
     load: Load | None = first_source(m.loads)
     if load is None:
         return False
-    context, scene = m.scene.context, m.scene
-    if load.orbit is not None:
-        rate = abs(load.orbit.mean_motion)
-    elif isinstance(load, MovingSource):
-        rate = load.encounter(scene)[1]
-    elif load.table is not None:
-        rate = abs(load.table.mean_motion)
-    elif load.attracting_point is not None and scene.position is not None and scene.velocity is not None:
-        place = [x - a for x, a in zip(scene.position, load.attracting_point, strict=True)]
-        rate = norm(context, cross(place, scene.velocity)) / sum(x * x for x in place)
-    else:
-        return False
-    return bool(norm(context, scene.angular_velocity) <= _SLOW * rate)
+    rate = None if load.plane is None else load.plane.rate(m.scene)
+    return rate is not None and bool(norm(m.scene.context, m.scene.angular_velocity) <= _SLOW * rate)
 
 
 def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbolic], str]:
     if m.attitude is not None and m.attitude.orbital is not None:
         return m.attitude.orbital.normal, "normal of its orbit"
-    to_body = transpose(m.matrix)
-    if load.orbit is not None:
-        return apply(to_body, m.orbit(load.orbit).normal), "normal of its orbit"
-    if isinstance(load, MovingSource):
-        return apply(to_body, load.orbit_normal(m)), "normal of the osculating orbit"
-    if load.table is not None:
-        return apply(to_body, m.table(load.table).normal), "normal of its orbit, by its table"
-    if load.attracting_point is not None:
-        return apply(to_body, flight_normal(m, load.attracting_point)), "normal of the osculating orbit"
+    if load.plane is not None and load.plane.called:
+        return apply(transpose(m.matrix), load.plane.normal(m)), load.plane.called
     which, described = 2, "space Z, across the source's direction, as the normal"
     fixed = load.fixed_source(m.scene)
     if fixed is not None and all(x == 0 for x in fixed[1][:2]):

@@ -14,6 +14,7 @@ from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads.moving_source import MovingSource
+from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
@@ -131,6 +132,16 @@ class GravityGradient(Load):
         """A circular orbit in a fixed plane."""
         orbit = self.orbit
         return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
+
+    @property
+    def plane(self) -> OrbitPlane | None:
+        """Of the orbit; of the Sun's series the ecliptic."""
+        return EclipticPlane() if self.ephemeris == "sun" else super().plane
+
+    @property
+    def without_plane(self) -> str:  # type: ignore[override]
+        """See ``Load``."""
+        return "the series of the Moon alone names none" if self.ephemeris == "moon" else ""
 
     def _source(self, m: Kinematics) -> SourcePosition:
         assert self.ephemeris is not None

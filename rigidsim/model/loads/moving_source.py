@@ -18,6 +18,7 @@ from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import unit_vectors
+from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
@@ -94,16 +95,10 @@ class MovingSource(Load):
         own = m.carried(m.velocity) if host is None else states.velocities[host]
         return [x - a for x, a in zip(own, states.velocities[self.number], strict=True)]
 
-    def orbit_normal(self, m: Kinematics) -> list[Symbolic]:
-        """Unit vector of the osculating plane, space axes."""
-        found = cross(self.place(m), self.motion(m))
-        size = hy.sqrt(hy.sum([c * c for c in found]))
-        return [c / size for c in found]
-
-    def starting_normal(self, scene: Scene) -> Vector:
-        """About where that points at the start (mpf), not of unit length."""
-        place, moving = self._start(scene)
-        return cross(place, moving)
+    @property
+    def plane(self) -> OrbitPlane:
+        """The osculating one."""
+        return _OsculatingPlane(self)
 
     def geometry(self, m: Kinematics) -> tuple[list[Symbolic], list[Symbolic], Symbolic]:
         """Unit direction from the mass in space axes and in body axes, and 1/r (1/length)."""
@@ -178,9 +173,9 @@ class MovingSource(Load):
         masses, own = self.masses, scene.context.zero
         if masses.host is not None:
             own = masses.strengths[masses.host]
-        return closest(scene.context, *self._start(scene), self.strength + own)
+        return closest(scene.context, *self.start(scene), self.strength + own)
 
-    def _start(self, scene: Scene) -> tuple[Vector, Vector]:
+    def start(self, scene: Scene) -> tuple[Vector, Vector]:
         """Position and velocity of the body as seen from the mass, m and m/s (mpf)."""
         masses, n = self.masses, self.number
         if masses.host is None:
@@ -208,3 +203,30 @@ class MovingSource(Load):
         if self.masses.full:
             back = "; the bodies feel the forces of this one" if self.pulls else "; the bodies feel its shape"
         return f'{self.title}: {what} of the moving point mass "{name}", to second degree{back}'
+
+
+@dataclass(frozen=True)
+class _OsculatingPlane(OrbitPlane):
+    """Of the body's motion about a point mass that moves."""
+
+    source: MovingSource
+    described = "osculating plane of the source's orbit"
+    called = "normal of the osculating orbit"
+
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        """See ``OrbitPlane``."""
+        found = cross(self.source.place(m), self.source.motion(m))
+        size = hy.sqrt(hy.sum([c * c for c in found]))
+        return [c / size for c in found]
+
+    def at_start(self, scene: Scene) -> Vector:
+        """See ``OrbitPlane``."""
+        return cross(*self.source.start(scene))
+
+    def drift(self, scene: Scene) -> None:
+        """Nothing is known."""
+        return None
+
+    def rate(self, scene: Scene) -> Any:
+        """At the least distance."""
+        return self.source.encounter(scene)[1]

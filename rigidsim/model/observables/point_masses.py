@@ -13,7 +13,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.drift_scales import rotational_scale
-from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import SPACE, Observable, same_unit
 from rigidsim.model.rotations import Symbolic
@@ -149,7 +148,7 @@ def _flat(vectors: Sequence[list[Symbolic]]) -> list[Symbolic]:
 def _kept(m: Mechanics) -> str | None:
     if not _masses(m).full:
         return "the point masses feel each other's gravity alone"
-    if any(not isinstance(load, MovingSource) for load in m.loads):
+    if any(not load.masses_beside for load in m.loads):
         return None
     return "all forces are those of the bodies on each other"
 

@@ -1,0 +1,201 @@
+"""Planes of orbits, of sources or of the body itself: normals as expressions, at the start, how they turn.
+
+A load says which it has (``Load.plane``). The mean ecliptic of date: its pole is (P, -Q, sqrt(1 - P^2 - Q^2))
+in the ecliptic and equinox of J2000, with P = sin(pi_A) sin(Pi_A) and Q = sin(pi_A) cos(Pi_A) from Capitaine,
+Wallace & Chapront 2003 (A&A 412, 567: the precession of the ecliptic of IAU 2006).
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from fractions import Fraction
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.kinematics import Kinematics, seconds
+from rigidsim.model.rotations import Symbolic, constant
+from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tabulated_orbit import TabulatedOrbit
+
+_CENTURY = 36525 * 86400
+_ARCSEC = ExactNumber(Fraction(1, 3600 * 180), pi_power=1)
+_P = ("4.199094", "0.1939873", "-0.00022466", "-0.000000912", "0.0000000120")
+_Q = ("-46.811015", "0.0510283", "0.00052413", "-0.000000646", "-0.0000000172")
+"""Arcseconds by powers of centuries (TDB) from J2000, the first on."""
+_ECLIPTIC_DRIFT = 1e-12  # rad/s; 0.47 arcsec a year are 7e-14
+
+
+class OrbitPlane:
+    """The plane of a load's source; all of the methods' vectors are in space axes.
+
+    Attributes:
+        described: which plane it is, as a plane of reference.
+        called: what its normal is called in a local frame; empty where the source doesn't keep to it.
+        flown: whether it is that of the body's own flight.
+    """
+
+    described: str
+    called: str = ""
+    flown: bool = False
+
+    @abstractmethod
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        """Unit vector about which the motion goes in the direct sense."""
+
+    @abstractmethod
+    def at_start(self, scene: Scene) -> Vector:
+        """About where that points at the start (mpf), not of unit length."""
+
+    @abstractmethod
+    def drift(self, scene: Scene) -> Any | None:
+        """Bound of the rate (rad/s) at which it turns; None where none is known."""
+
+    def fixed(self, scene: Scene) -> Vector | None:
+        """The unit normal itself (mpf), where it never turns."""
+        return None
+
+    def rate(self, scene: Scene) -> Any | None:
+        """Angular rate (mpf, rad/s) of the motion in it, or its mean; None where nobody knows."""
+        return None
+
+
+@dataclass(frozen=True)
+class KeplerPlane(OrbitPlane):
+    """Of a prescribed orbit, whose node may move."""
+
+    orbit: KeplerOrbit
+    called = "normal of its orbit"
+
+    @property
+    def described(self) -> str:  # type: ignore[override]
+        """Which plane it is."""
+        return "plane of the source's orbit" + (", whose node moves" if self.orbit.node_rate != 0 else "")
+
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        """See ``OrbitPlane``."""
+        return m.orbit(self.orbit).normal
+
+    def at_start(self, scene: Scene) -> Vector:
+        """See ``OrbitPlane``."""
+        return self._at(scene.context, self.orbit.ascending_node + self.orbit.node_rate * scene.start)
+
+    def fixed(self, scene: Scene) -> Vector | None:
+        """See ``OrbitPlane``."""
+        moves = self.orbit.node_rate != 0
+        return None if moves else self._at(scene.context, self.orbit.ascending_node)
+
+    def drift(self, scene: Scene) -> Any:
+        """Of the node."""
+        return abs(self.orbit.node_rate)
+
+    def rate(self, scene: Scene) -> Any:
+        """The mean motion."""
+        return abs(self.orbit.mean_motion)
+
+    def _at(self, context: Any, node: Any) -> Vector:
+        sine, cosine = context.sin(self.orbit.inclination), context.cos(self.orbit.inclination)
+        return [sine * context.sin(node), -sine * context.cos(node), cosine]
+
+
+@dataclass(frozen=True)
+class TablePlane(OrbitPlane):
+    """Of an orbit by a table."""
+
+    table: TabulatedOrbit
+    described = "plane of the source's orbit, by its table"
+    called = "normal of its orbit, by its table"
+
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        """See ``OrbitPlane``."""
+        return m.table(self.table).normal
+
+    def at_start(self, scene: Scene) -> Vector:
+        """See ``OrbitPlane``."""
+        found: Vector = self.table.normal(scene.start)
+        return found
+
+    def drift(self, scene: Scene) -> Any:
+        """As neighbouring rows show."""
+        return self.table.normal_drift
+
+    def rate(self, scene: Scene) -> Any:
+        """The mean motion."""
+        return abs(self.table.mean_motion)
+
+
+@dataclass(frozen=True)
+class FlightPlane(OrbitPlane):
+    """Of the body's own flight about an attracting point (mpf, m, space axes): r x v."""
+
+    point: Vector
+    described = "osculating plane of the body's own orbit"
+    called = "normal of the osculating orbit"
+    flown = True
+
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        """See ``OrbitPlane``."""
+        context, scaling = m.scene.context, m.scaling
+        offset = []
+        for x, a in zip(m.carried(m.position), self.point, strict=True):
+            shift = context.ldexp(a, -scaling.length)
+            offset.append(x - m.number(shift) if shift != 0 else x)
+        found = cross(offset, m.carried(m.velocity))
+        size = hy.sqrt(hy.sum([c * c for c in found]))
+        return [c / size for c in found]
+
+    def at_start(self, scene: Scene) -> Vector:
+        """See ``OrbitPlane``."""
+        if scene.position is None or scene.velocity is None:
+            return [scene.context.zero, scene.context.zero, scene.context.one]
+        return cross(self._offset(scene.position), scene.velocity)
+
+    def drift(self, scene: Scene) -> None:
+        """Nothing is known."""
+        return None
+
+    def rate(self, scene: Scene) -> Any | None:
+        """At the start."""
+        if scene.position is None or scene.velocity is None:
+            return None
+        place = self._offset(scene.position)
+        return norm(scene.context, cross(place, scene.velocity)) / sum(x * x for x in place)
+
+    def _offset(self, position: Vector) -> Vector:
+        return [x - a for x, a in zip(position, self.point, strict=True)]
+
+
+class EclipticPlane(OrbitPlane):
+    """The mean ecliptic of date, which the Sun of the series keeps to but for its perturbations."""
+
+    described = "mean ecliptic of date (IAU 2006)"
+
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        """See ``OrbitPlane``."""
+        context, epoch = m.scene.context, m.scene.epoch
+        since = seconds(m)
+        if epoch is not None:
+            start = ExactNumber(epoch.since_j2000()).at(context)
+            since = since + m.number(start) if start != 0 else since
+        centuries = since * m.number(context.one / _CENTURY)
+
+        def series(terms: tuple[str, ...]) -> Symbolic:
+            total: Any = constant(0.0)
+            for term in reversed(terms):
+                total = (total + m.number(context.mpf(term) * _ARCSEC.at(context))) * centuries
+            return total
+
+        p, q = series(_P), series(_Q)
+        return [p, -q, hy.sqrt(1.0 - p * p - q * q)]
+
+    def at_start(self, scene: Scene) -> Vector:
+        """Z."""
+        return [scene.context.zero, scene.context.zero, scene.context.one]
+
+    def drift(self, scene: Scene) -> Any:
+        """Of the ecliptic."""
+        return scene.context.mpf(_ECLIPTIC_DRIFT)
