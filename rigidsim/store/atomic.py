@@ -20,6 +20,7 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         OSError: it can't be written.
     """
+    path.parent.stat()  # where there is no such folder, it is told before the work is done
     temporary = _hidden(path, "partial")
     try:
         yield temporary

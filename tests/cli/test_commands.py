@@ -245,7 +245,7 @@ def test_a_damaged_dataset_is_a_message(config: Config, rigidsim_command: Comman
     [
         ([], "runs/free/figure.png", b"\x89PNG\r\n"),
         pytest.param(["--out", "x.png"], "x.png", b"\x89PNG\r\n", marks=pytest.mark.slow),
-        (["--out", "x.svg"], "x.svg", b"<?xml"),
+        (["--what", "rates", "--out", "x.svg"], "x.svg", b"<?xml"),
     ],
 )
 def test_plot(out: list[str], path: str, begins: bytes, config: Config, rigidsim_command: Command) -> None:
