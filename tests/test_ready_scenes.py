@@ -81,7 +81,7 @@ def assert_invariants_hold(run: rigidsim.Run) -> None:
 
 
 @pytest.mark.parametrize("precision", cases(["single", "extended"], ["single"]))
-@pytest.mark.parametrize("path", CONFIGS, ids=NAMES)
+@pytest.mark.parametrize("path", SCENES, ids=NAMES)
 def test_all_invariants_hold_in_other_precisions(path: Path, precision: str, runs: Path) -> None:
     run = run_config(path, runs, f'integrator.precision="{precision}"', "output.estimate=false")
     for name, row in run.summary["invariants"].items():

@@ -187,7 +187,7 @@ def test_errors_grow_in_a_passage_that_no_beginning_shows() -> None:
     assert true <= COVERED * followed.attitude < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.slow(60)
 def test_the_path_past_a_close_pericentre_is_estimated_too() -> None:
     run = run_text(COMET)
     better = run_text(COMET, 'integrator.precision="extended"', 'name="better"')

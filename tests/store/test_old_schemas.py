@@ -45,7 +45,11 @@ def test_each_version_is_kept_and_read(version: int, folder: Path) -> None:
             dates = [np.datetime64("2016-12-31T23:59:58.5"), np.datetime64("2016-12-31T23:59:59")]
             assert dataset.date.values[:2].tolist() == [d.astype("M8[ns]").astype(int) for d in dates]
             assert np.isnat(dataset.date.values).tolist() == [False, False, False, True, True]
-    for command in (["info"], ["plot"], ["export", "--format", "csv", "--out", str(folder / "t.csv")]):
+    for command in (
+        ["info"],
+        ["plot", "--what", "drift"],
+        ["export", "--format", "csv", "--out", str(folder / "t.csv")],
+    ):
         result = CliRunner().invoke(app, [command[0], str(folder), *command[1:]])
         assert result.exit_code == 0, result.output
 

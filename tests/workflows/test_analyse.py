@@ -78,7 +78,7 @@ def test_digits_over_ten_thousand_periods(tmp_path: Path) -> None:
         assert max(wrong(analysis, exact, 1e-12)) < 2.0**-52 / 1e-12 / (2 * np.pi * 10000)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(80)
 def test_digits_of_quadruple_precision_over_ten_thousand_periods(tmp_path: Path) -> None:
     run, exact = tumbling(10000, "quadruple", "4", tmp_path)
     with mpmath.workdps(60):

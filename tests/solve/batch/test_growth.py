@@ -34,7 +34,7 @@ def motions(text: str, axes: dict[str, str]) -> dict[int, Any]:
     ("text", "axes"),
     [
         (PLANAR, RATES),
-        (FREE, RATES),
+        pytest.param(FREE, RATES, marks=pytest.mark.slow),
         pytest.param(PLANAR.replace("samples = 5", "samples = 2"), RATES, marks=pytest.mark.slow),
         pytest.param(ORBIT, RATES | {"body.principal_moments[0]": "uniform = [0.5, 1], count = 9"},
                      marks=pytest.mark.slow),
