@@ -13,7 +13,6 @@ longitude advances at the rate of Kepler's third law, or of ``period``.
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cached_property
@@ -21,31 +20,20 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.scene.element_interpolation import (
+    AXIS,
+    EXCENTRIC,
+    LONGITUDE,
+    TILTED,
+    InterpolationError,
+    interpolation_error,
+)
 from rigidsim.scene.element_table import ElementTable, TableError
-from rigidsim.scene.interpolation import ORDER, Interpolation, left_out
+from rigidsim.scene.interpolation import Interpolation
 from rigidsim.scene.kepler import eccentric_anomaly
-from rigidsim.scene.records import dataclass
 
-AXIS, LONGITUDE = "axis", "longitude"
-EXCENTRIC, TILTED = ("k", "h"), ("q", "p")
-_LARGEST_ERROR = 0.1  # rad, of the direction when every other row is left out
 _DOUBTFUL_TURN = 0.25  # of a turn, by which the mean longitude may be off what Kepler's law expects
 _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
-
-
-@dataclass(frozen=True)
-class InterpolationError:
-    """What was found where every other row was left out and interpolated from the others.
-
-    Attributes:
-        direction: of the source, rad, the largest.
-        distance: relative, the largest.
-        expected: by which both become smaller with all rows in, where they follow smooth functions.
-    """
-
-    direction: float
-    distance: float
-    expected: float = 2.0**-ORDER
 
 
 class TabulatedOrbit:
@@ -298,64 +286,11 @@ class TabulatedOrbit:
             TableError: rows so far apart that the table means little between them.
         """
         count = len(self.table.times)
-        begin = self.table.times[0]
-        times = np.array([float(t - begin) for t in self.table.times])
-        linear: Any = 0.0
-        exact: dict[str, np.ndarray] = {}
-        for name in (AXIS, *EXCENTRIC, *TILTED):
-            values = self._each(name)
-            exact[name] = np.array([float(x) for x in (values if len(values) == count else values * count)])
+        elements = {name: self._each(name) for name in (AXIS, *EXCENTRIC, *TILTED)}
+        elements = {name: rows if len(rows) == count else rows * count for name, rows in elements.items()}
         if LONGITUDE in self.moving:
-            values = self._rows[LONGITUDE]
-            linear = (values[-1] - values[0]) / (self.table.times[-1] - begin)
-            pairs = zip(values, self.table.times, strict=True)
-            exact[LONGITUDE] = np.array([float(x - values[0] - linear * (t - begin)) for x, t in pairs])
-        moving = np.array([exact[name] for name in self.moving]).T
-        rows, found = left_out(times, moving)
-        guessed = {name: values[rows] for name, values in exact.items()}
-        tabulated = dict(guessed)
-        for i, name in enumerate(self.moving):
-            guessed[name] = found[:, i]
-        direction = distance = 0.0
-        # where the anomaly isn't tabulated the worst of several places on the orbit counts
-        phases = [0.0] if LONGITUDE in self.moving else [i * math.pi / 4 for i in range(8)]
-        base = np.zeros(len(rows))
-        if LONGITUDE in self.moving:
-            base = np.array([float(self._rows[LONGITUDE][r] % (2 * self.context.pi)) for r in rows])
-        for phase in phases:
-            shift = guessed.get(LONGITUDE, 0.0) - tabulated.get(LONGITUDE, 0.0)
-            one, r_one = _places(tabulated, base + phase)
-            two, r_two = _places(guessed, base + phase + shift)
-            direction = max(direction, float(np.linalg.norm(one - two, axis=0).max()))
-            distance = max(distance, float(np.abs(r_two / r_one - 1).max()))
-        if not direction <= _LARGEST_ERROR:
-            raise TableError(
-                f"its rows are too far apart: with every other row left out, interpolation misses the "
-                f"direction by {direction:.2g} rad; {_LARGEST_ERROR} or less is allowed: give more rows"
-            )
-        return InterpolationError(direction, distance)
-
-
-def _places(elements: Mapping[str, np.ndarray], longitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (3, n) and distances (n,) of regular elements, in double precision."""
-    k, h, q, p = (elements[name] for name in (*EXCENTRIC, *TILTED))
-    eccentric = longitude + k * np.sin(longitude) - h * np.cos(longitude)
-    for _ in range(60):  # Newton; from e < 1 it converges within a few dozen steps
-        c, s = np.cos(eccentric), np.sin(eccentric)
-        step = (eccentric - k * s + h * c - longitude) / (1 - k * c - h * s)
-        eccentric = eccentric - np.clip(step, -1.0, 1.0)
-    c, s = np.cos(eccentric), np.sin(eccentric)
-    beta = 1 / (1 + np.sqrt(1 - k * k - h * h))
-    r = 1 - k * c - h * s
-    x = ((1 - h * h * beta) * c + h * k * beta * s - k) / r
-    y = ((1 - k * k * beta) * s + h * k * beta * c - h) / r
-    chi = np.sqrt(1 - p * p - q * q)
-    place = [
-        (1 - 2 * p * p) * x + 2 * p * q * y,
-        2 * p * q * x + (1 - 2 * q * q) * y,
-        2 * chi * (q * y - p * x),
-    ]
-    return np.array(place), r * elements[AXIS]
+            elements[LONGITUDE] = self._rows[LONGITUDE]
+        return interpolation_error(self.table.times, elements, self.moving)
 
 
 def _sum(one: Any, other: Any) -> Any:
