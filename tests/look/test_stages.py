@@ -372,6 +372,50 @@ def test_the_announced_error_is_a_level_beside_the_drifts(symmetric_top: Build) 
     assert levels(averaged) == [("error of the axis at the end, rad", pytest.approx(-6.0))]
 
 
+def test_a_constant_curve_is_not_magnified(symmetric_top: Build) -> None:
+    dataset = symmetric_top(count=101)
+    dataset["tilt"] = ("time", 0.5 + 1e-15 * np.arange(101), {"units": "rad"})
+    tilt, *_ = plan_plots(dataset, ("tilt",))
+    assert tilt.range == pytest.approx(np.rad2deg([0.475, 0.525]))
+    dataset["tilt"] = ("time", 0.5 + 1e-7 * np.arange(101), {"units": "rad"})
+    assert plan_plots(dataset, ("tilt",))[0].range is None
+    # unless all that it does is less than what is known of it
+    uncertain = dataset.assign_attrs(attitude_error=1e-5)
+    assert plan_plots(uncertain, ("tilt",))[0].range is not None
+
+
+def test_rates_have_prefixes_and_axes_that_lie_together_one_curve(symmetric_top: Build) -> None:
+    dataset = symmetric_top(count=101, scale=1e-13)
+    dataset["obliquity"] = (
+        ("time", "axis"),
+        np.stack([np.linspace(0.4, 0.5, 101)] * 2 + [np.linspace(0.5, 0.4, 101)], axis=1),
+        {"units": "rad"},
+    )
+    dataset = dataset.assign_coords(axis=["figure", "spin", "momentum"])
+    plots = {plot.key: plot for plot in plan_plots(dataset, ("obliquity",))}
+    assert plots["angular_velocity"].title == "Angular velocity [Trad/s]"
+    assert np.abs(plots["angular_velocity"].series[0].values).max() < 10
+    assert plots["obliquity"].series[0].labels == ["figure, spin", "momentum"]
+    assert plots["obliquity"].series[0].values.shape == (101, 2)
+
+
+def test_point_masses_beside_the_body_are_pointed_to(symmetric_top: Build) -> None:
+    """From the one that the body is, not from the origin."""
+    dataset = earth(symmetric_top(count=11))
+    place = np.zeros((11, 3, 3))
+    place[:, 0] = [-1.5e11, 0, 0]  # the Sun
+    place[:, 1] = [0, 1e9, 0]  # the Earth, where the body is
+    place[:, 2] = [0, 1e9, 4e8]
+    dataset["point_mass_position"] = (("time", "point_mass", "space_axis"), place, {"units": "m"})
+    dataset = dataset.assign_coords(point_mass=["sun", "earth", "moon"])
+    dataset = dataset.assign_attrs(config='[body]\nhost = "earth"\n')
+    arrows = {arrow.label: arrow for arrow in picture(dataset).stages[0].arrows}
+    assert {"to the Sun", "to the Moon"} <= set(arrows)
+    moon, sun = (arrows[name].vectors[0] for name in ("to the Moon", "to the Sun"))
+    np.testing.assert_allclose(moon / np.linalg.norm(moon), [0, 0, 1], atol=1e-15)
+    np.testing.assert_allclose(sun / np.linalg.norm(sun), [-1, 0, 0], atol=0.01)
+
+
 def test_a_page_has_only_letters_that_the_viewer_can_draw() -> None:
     assert legible("ω = 2π/T, naïve Größe, 10⁻³ kg m²/s ≤ ½") == "ω = 2π/T, naïve Größe, 10⁻³ kg m²/s ≤ ½"
     assert legible("a 🪐 of 質量 1") == "a ? of ?? 1"

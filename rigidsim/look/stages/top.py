@@ -83,7 +83,7 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     elevation = np.deg2rad(20.0)
     direction = np.cos(elevation) * (0.55 * across[0] - 0.83 * across[1]) + np.sin(elevation) * up
     radius = 1.62 if drop == 0 else 2.05
-    target = (0.55 if drop == 0 else 0.1) * up
+    target = (0.55 if drop == 0 else -0.1) * up
     camera = Camera(target + radius / np.sin(FIELD / 2) * direction, target, up)
     stage = replace(stage, camera=camera)
     return Picture(
