@@ -26,6 +26,8 @@ Importing this package loads nothing heavy.
 | `work_precision` | the figure of `rigidsim tradeoff`: error against cost |
 | `viewer` | `open_viewer`, `HeadlessViewer`, `screenshot` |
 | `symbols` | toy tops, globes, edges and meridians |
+| `coasts` | the Earth's continents |
+| `si_prefixes` | the prefix with which values of an SI unit read well |
 | `solids` | triangle meshes of bodies, from the outlines of their shapes |
 | `rows` | what pictures need of a dataset, as arrays |
 | `thinning` | reading a bounded number of rows of a dataset of any length |
