@@ -37,6 +37,22 @@ from rigidsim.scene.scene import Scene
 
 _ROUNDS = 4  # each gains a factor of the nutation's size
 
+DIRECTION = ["sx", "sy", "sz"]
+"""States: the momentum's direction, space axes; its mean where nothing is added back."""
+TOLD = (
+    "angular_momentum",
+    "angular_momentum_norm",
+    "energy",
+    "figure_axis",
+    "spin_axis",
+    "momentum_axis",
+    "right_ascension",
+    "declination",
+    "obliquity",
+    "node_longitude",
+)
+"""Observables that an averaged motion has."""
+
 
 @dataclass(frozen=True)
 class Average:

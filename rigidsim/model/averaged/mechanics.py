@@ -7,7 +7,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.averaged.average import Average
+from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, nutation, plane_vectors, second_order
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.table_terms import TableTerms
@@ -25,22 +25,6 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.tabulated_orbit import TabulatedOrbit
-
-DIRECTION = ["sx", "sy", "sz"]
-"""States: the momentum's direction, space axes; its mean where nothing is added back."""
-TOLD = (
-    "angular_momentum",
-    "angular_momentum_norm",
-    "energy",
-    "figure_axis",
-    "spin_axis",
-    "momentum_axis",
-    "right_ascension",
-    "declination",
-    "obliquity",
-    "node_longitude",
-)
-"""Observables that an averaged motion has."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.averaged.mechanics import TOLD, AveragedMechanics
+from rigidsim.model.averaged.average import TOLD
+from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.orbit_terms import plane_vectors
 from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source

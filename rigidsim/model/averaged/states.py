@@ -8,8 +8,8 @@ from dataclasses import replace
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.averaged.average import Average
-from rigidsim.model.averaged.mechanics import DIRECTION, TOLD, AveragedMechanics
+from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
+from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load
