@@ -5,43 +5,24 @@ from __future__ import annotations
 import heyoka as hy
 import numpy as np
 import pytest
-from support import run_text
+from support import config, run_text
 
 from rigidsim.solve.stepper import longest_step
 
-THROWN = """
-name = "thrown"
-[body]
-principal_moments = [1, 1, 1]
-mass = 1
-[initial]
-angular_velocity = [0, 0, 0]
-position = [0, 0, 10]
-velocity = [1, 0, 3]
-[[loads]]
-kind = "uniform_gravity"
-acceleration = [0, 0, -10]
-[time]
-end = 3
-samples = 2
-[[events]]
-name = "ground"
-expression = "z"
-"""
+THROWN = config(
+    "principal_moments = [1, 1, 1]\nmass = 1",
+    "angular_velocity = [0, 0, 0]\nposition = [0, 0, 10]\nvelocity = [1, 0, 3]",
+    'kind = "uniform_gravity"\nacceleration = [0, 0, -10]',
+    "end = 3\nsamples = 2",
+    more='[[events]]\nname = "ground"\nexpression = "z"',
+)
 # scene 852 of seed 5 of the campaign, in round numbers; its natural step is as long as it is let to be
-KINKED = """
-name = "kinked"
-[body]
-principal_moments = [3, 3, 3]
-[initial]
-angular_velocity = [0, 0, 0.026]
-[[loads]]
-kind = "torque"
-components = ["0", "0", "3e-6*sqrt((t - 241)^2)"]
-[time]
-end = 1738
-samples = 3
-"""
+KINKED = config(
+    "principal_moments = [3, 3, 3]",
+    "angular_velocity = [0, 0, 0.026]",
+    'kind = "torque"\ncomponents = ["0", "0", "3e-6*sqrt((t - 241)^2)"]',
+    "end = 1738\nsamples = 3",
+)
 
 
 @pytest.mark.parametrize("precision", ["single", "double", "extended", "quadruple"])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import config
 
 from rigidsim.errors import RigidsimError
 from rigidsim.workflows.read import parse
@@ -16,24 +17,18 @@ from rigidsim.workflows.sweep_cluster import Cluster
 
 distributed = pytest.importorskip("distributed")
 
-CONFIG = """\
-name = "cluster"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 1, 0.05]
-[time]
-end = 5
-samples = 6
-[integrator]
-formulation = "rates"
-[output]
-estimate = false
+CONFIG = config(
+    initial="angular_velocity = [0.1, 1, 0.05]",
+    time="end = 5\nsamples = 6",
+    integrator='formulation = "rates"',
+    more="""\
 [sweep]
 keep = ["final"]
 tile = 1
 axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 6], name = "w3"}
-"""
+""",
+    name="cluster",
+)
 
 
 @pytest.mark.slow  # five processes that import everything

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from support import config
 from typer.testing import CliRunner, Result
 
 import rigidsim
@@ -19,21 +20,12 @@ from rigidsim.workflows.export import export
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweep import sweep as run_sweep
 
-CONFIG = """\
-name = "box"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 1, 0.05]
-[time]
-end = 10
-samples = 11
-[integrator]
-formulation = "rates"
-precision = "extended"
-[output]
-estimate = false
-record = ["angular_velocity", "energy"]
+CONFIG = config(
+    initial="angular_velocity = [0.1, 1, 0.05]",
+    time="end = 10\nsamples = 11",
+    integrator='formulation = "rates"\nprecision = "extended"',
+    output='record = ["angular_velocity", "energy"]',
+    more="""\
 [[events]]
 name = "middle"
 expression = "wx"
@@ -42,29 +34,24 @@ keep = ["final", "events", "section", "series"]
 most_events = 3
 axes."initial.angular_velocity" = {values = [[0.1, 1, 0.3], [-0.3, 1, 0.1]], name = "w"}
 axes."body.principal_moments[2]" = {linspace = [2.25, 2.75, 3], name = "C"}
-"""
-ZIPPED = """\
-name = "pairs"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 1, 0.05]
-[time]
-end = 2
-samples = 3
-[[loads]]
-kind = "torque"
-components = ["0", "0", "wz^3"]
-[output]
-estimate = false
-record = ["nutation_angle"]
+""",
+    name="box",
+)
+ZIPPED = config(
+    initial="angular_velocity = [0.1, 1, 0.05]",
+    loads='kind = "torque"\ncomponents = ["0", "0", "wz^3"]',
+    time="end = 2\nsamples = 3",
+    output='record = ["nutation_angle"]',
+    more="""\
 [sweep]
 mode = "zip"
 keep = ["final", "series"]
 axes."integrator.precision" = {values = ["double", "extended", "quadruple"]}
 axes."time.end" = {values = [2, 2, 1]}
 axes."initial.angular_velocity[2]" = {values = [0.1, 3, 0.2], name = "w3"}
-"""
+""",
+    name="pairs",
+)
 
 
 def rows(path: Path) -> list[dict[str, str]]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import config
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import parse
@@ -17,80 +18,40 @@ from rigidsim.solve.batch.family import Alone, Families, batchable
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.problem import prepare
 
-FREE = """
-name = "free"
-[body]
-principal_moments = [1, 2, 2.5]
-mass = 2
-[initial]
-angular_velocity = [0.1, 1.0, 0.05]
-[time]
-end = 10
-samples = 5
-[output]
-record = ["angular_velocity", "quaternion", "energy"]
-"""
-ORBIT = """
-name = "orbit"
-[body]
-principal_moments = [1, 1.5, 1.8]
-[initial]
-angular_velocity = [0.01, 0.02, 1.1]
-euler_angles = [0.3, 0.1, 0]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = 1
-orbit = {semi_major_axis = 1, eccentricity = 0.1, inclination = 0.2, mean_anomaly = 0.4, period = "2*pi"}
-[time]
-end = 20
-samples = 5
-[output]
-record = ["angular_velocity", "quaternion"]
-"""
+FREE = config(
+    "principal_moments = [1, 2, 2.5]\nmass = 2",
+    "angular_velocity = [0.1, 1.0, 0.05]",
+    time="end = 10\nsamples = 5",
+    output='record = ["angular_velocity", "quaternion", "energy"]',
+)
+ORBIT = config(
+    "principal_moments = [1, 1.5, 1.8]",
+    "angular_velocity = [0.01, 0.02, 1.1]\neuler_angles = [0.3, 0.1, 0]",
+    'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1, '
+    'eccentricity = 0.1, inclination = 0.2, mean_anomaly = 0.4, period = "2*pi"}',
+    "end = 20\nsamples = 5",
+    output='record = ["angular_velocity", "quaternion"]',
+)
 PLANAR = (
     ORBIT.replace("[0.01, 0.02, 1.1]", "[0, 0, 1.1]")
     .replace("[0.3, 0.1, 0]", "[0.3, 0, 0]")
     .replace("inclination = 0.2", "inclination = 0")
 )
-TOP = """
-name = "top"
-[body]
-principal_moments = [1, 1, 0.5]
-mass = 1
-center_of_mass = [0, 0, 0.3]
-[initial]
-angular_velocity = [0.1, 0.2, 5]
-euler_angles = [0, 0.5, 0]
-[[loads]]
-kind = "uniform_gravity"
-acceleration = [0, 0, -9.8]
-[time]
-end = 2
-samples = 5
-[output]
-record = ["angular_velocity"]
-"""
-TORQUE = """
-name = "torque"
-[parameters]
-k = 0.1
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 0.2, 1]
-[[loads]]
-kind = "torque"
-components = ["k*sin(t)^2/2", "0", "-k*wz"]
-frame = "body"
-[time]
-end = 10
-samples = 5
-[output]
-record = ["angular_velocity", "quaternion"]
-[[events]]
-name = "flip"
-expression = "wx - k/3"
-"""
+TOP = config(
+    "principal_moments = [1, 1, 0.5]\nmass = 1\ncenter_of_mass = [0, 0, 0.3]",
+    "angular_velocity = [0.1, 0.2, 5]\neuler_angles = [0, 0.5, 0]",
+    'kind = "uniform_gravity"\nacceleration = [0, 0, -9.8]',
+    "end = 2\nsamples = 5",
+    output='record = ["angular_velocity"]',
+)
+TORQUE = config(
+    "principal_moments = [1, 2, 2.5]",
+    "angular_velocity = [0.1, 0.2, 1]",
+    'kind = "torque"\ncomponents = ["k*sin(t)^2/2", "0", "-k*wz"]\nframe = "body"',
+    "end = 10\nsamples = 5",
+    output='record = ["angular_velocity", "quaternion"]',
+    more='[parameters]\nk = 0.1\n[[events]]\nname = "flip"\nexpression = "wx - k/3"',
+)
 
 
 def swept(text: str, axes: dict[str, str], mode: str = "zip") -> Sweep:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import EPSILON, cases
+from support import EPSILON, cases, config
 from test_batch_families import FREE, ORBIT, PLANAR, TOP, TORQUE, swept
 
 import rigidsim
@@ -12,24 +12,13 @@ from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.status import Status
 
-FLIGHT = """
-name = "flight"
-[body]
-principal_moments = [1, 2, 2.5]
-mass = 3
-[initial]
-angular_velocity = [0.1, 1.0, 0.05]
-position = [0, 0, 1]
-velocity = [1, 0, 4]
-[[loads]]
-kind = "uniform_gravity"
-acceleration = [0, 0, -9.80665]
-[time]
-end = 1
-samples = 5
-[output]
-record = ["angular_velocity", "position"]
-"""
+FLIGHT = config(
+    "principal_moments = [1, 2, 2.5]\nmass = 3",
+    "angular_velocity = [0.1, 1.0, 0.05]\nposition = [0, 0, 1]\nvelocity = [1, 0, 4]",
+    'kind = "uniform_gravity"\nacceleration = [0, 0, -9.80665]',
+    "end = 1\nsamples = 5",
+    output='record = ["angular_velocity", "position"]',
+)
 
 
 def blocks_of(sweep: Sweep, members: list[int] | None = None, width: int | None = None) -> list[BatchBlock]:
