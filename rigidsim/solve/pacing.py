@@ -115,7 +115,8 @@ class WayFinder:
         self.longest = 1.5 * max(self.longest, self._corrected.stepper.largest)
 
     def choose(self, following: int, upcoming: Scalar) -> tuple[Way, int]:
-        """How to go on, and for how many steps at most.
+        """How to go on, and for how many steps at most. The last sample alone is skipped to: what a grid goes
+        past it is taken once more.
 
         Args:
             following, upcoming: index and time of the next sample.
@@ -129,7 +130,7 @@ class WayFinder:
         if self._cheap:
             left = int(min((self._last - float(stepper.time)) / size, limit))
             spacing = self._spacing(following)
-            if self._suits_grids(spacing):
+            if self._suits_grids(spacing) and following < self._clock.count - 1:
                 if stepper.at_whole_time and left >= pacing.least_grid_steps:
                     return Way.GRID, self._grid_steps(left)
                 limit = corrected.left  # to where a grid can start
@@ -147,7 +148,8 @@ class WayFinder:
     def _spacing(self, following: int) -> float:
         """Steps per sample, over the next samples."""
         ahead = min(following + self._pacing.look_ahead, self._clock.count - 1)
-        span = float(self._clock.at(ahead)) - float(self._corrected.stepper.time)
+        end = self._last if ahead == self._clock.count - 1 else float(self._clock.at(ahead))
+        span = end - float(self._corrected.stepper.time)
         return span / self.longest / max(ahead - following, 1)
 
     def _suits_grids(self, spacing: float) -> bool:

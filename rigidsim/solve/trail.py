@@ -73,7 +73,9 @@ class Waypoints:
         """The boundary of correction ``number``; one that is come to again is the same again."""
         if number % self._spacing:
             return
-        self._kept[number] = Waypoint(steps, float(time), np.array([float(x) for x in state]), chart)
+        # numbers of more than 80 bits are none of numpy's own
+        plain = state.astype(np.float64) if state.dtype.kind == "f" else [float(x) for x in state]
+        self._kept[number] = Waypoint(steps, float(time), np.array(plain), chart)
         if len(self._kept) > _MOST_WAYPOINTS:
             self._spacing *= 2
             self._kept = {n: kept for n, kept in self._kept.items() if n % self._spacing == 0}
