@@ -9,7 +9,9 @@ compiled code is warm on both sides. Of the first rows and the warm one what is 
 with them it stands beside, over at most three pairs. Absolute times depend on what else the machine does.
 
 Run: python -m experiments.benchmark [--pairs 7] [--rows sparse,dense,...] [--quick] [--out DIR]
-     [--scratch DIR] [--python numba=/other/bin/python]
+     [--scratch DIR] [--python numba=/other/bin/python] [--given FILE.json ...] [--into README.md]
+Rows of ``--given`` files aren't measured again unless ``--rows`` names them; with ``--into`` table and notes
+replace what stands between that file's lines ``<!-- benchmark -->`` and ``<!-- end of benchmark -->``.
 Exit code 1 if a ratio is above its bound (never with ``--quick``). 1e8 samples take some 15 GB of disk and
 several minutes; ``--rows`` leaves them out.
 """
@@ -22,7 +24,7 @@ import statistics
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,7 @@ class Result:
         readers: what each makes of ours.
         differences: of its numbers from the bare script's, the largest of each variable.
         note: why there is no ratio, and what else is to be said.
+        measure: which figure is compared.
     """
 
     key: str
@@ -67,6 +70,13 @@ class Result:
     readers: dict[str, str] = field(default_factory=dict)
     differences: dict[str, float] = field(default_factory=dict)
     note: str = ""
+    measure: str = "cpu"
+
+    @classmethod
+    def of(cls, kept: dict[str, Any]) -> Result:
+        """From what a JSON file keeps of it."""
+        known = {one.name for one in fields(cls)}
+        return cls(**{name: value for name, value in kept.items() if name in known})
 
     @property
     def ratio(self) -> float | None:
@@ -86,22 +96,28 @@ class Result:
             ratio, verdict = f"{self.ratio:.3g}", _VERDICTS[self.met]
             spread = f"{min(self.ratios):.3g} .. {max(self.ratios):.3g}"
         beside = f"{statistics.median(self.estimated):.3g}" if self.estimated else ""
-        wall = "" if self.wall is None else f"{self.wall[0]:.3g} / {self.wall[1]:.3g}"
+        cpu = wall = ""
+        if self.measure == "cpu" and self.ours is not None and self.bare is not None:
+            cpu = f"{self.ours:.3g} / {self.bare:.3g}"
+        if self.wall is not None:
+            wall = f"{self.wall[0]:.3g} / {self.wall[1]:.3g}"
         size = "" if self.size is None else f"{self.size[0] / 1e6:.3g} / {self.size[1] / 1e6:.3g}"
-        cells = [self.work, self.against, ratio, f"{self.bound:g}", verdict, spread, beside, wall, size]
+        cells = [self.work, self.against, ratio, f"{self.bound:g}", verdict, str(len(self.ratios)), spread]
+        cells += [beside, cpu, wall, size]
         return f"| {' | '.join(cells)} |"
 
 
 _VERDICTS = {True: "met", False: "NOT MET", None: "not judged"}
+BEGIN, END = "<!-- benchmark -->", "<!-- end of benchmark -->"
 HEAD = (
-    "| work | against | ratio | at most | | pairs | with estimates | wall s | MB of dataset |",
-    "| --- " * 9 + "|",
+    "| work | against | ratio | at most | | pairs | of them | with estimates | CPU s | wall s | MB |",
+    "| --- " * 11 + "|",
 )
 
 
 def measure(row: Row, pairs: int, scratch: Path | None, *, judged: bool = True) -> Result:
     """One row, in fresh processes."""
-    result = Result(row.key, row.work, row.against, row.bound, judged=judged)
+    result = Result(row.key, row.work, row.against, row.bound, judged=judged, measure=row.measure)
     ours: list[Figures] = []
     bare: list[Figures] = []
     with tempfile.TemporaryDirectory(dir=scratch) as warming:  # compiled code, caches of files
@@ -172,22 +188,26 @@ def draw(results: Sequence[Result], out: Path) -> Path:
         axes.plot([result.bound] * 2, [place - 0.32, place + 0.32], color="black", lw=2)
         if result.estimated:
             axes.plot([statistics.median(result.estimated)], [place], "d", color=GREY, ms=6, mfc="white")
-        axes.annotate(
-            f"{result.ratio:.3g}", (result.ratio or 0, place), (0, 9), textcoords="offset points", ha="center"
-        )
     axes.set_yticks(
         range(len(shown)), [f"{r.work}\nagainst {r.against}".replace("`", "") for r in shown], fontsize=8.5
     )
+    beside = axes.secondary_yaxis("right")
+    beside.set_yticks(range(len(shown)), [f"{r.ratio:.3g} (≤ {r.bound:g})" for r in shown], fontsize=8.5)
     axes.axvline(1, color="#999999", lw=1, ls=":")
     axes.set_ylim(-0.7, len(shown) - 0.2)
     axes.set_xlim(left=0)
-    tidy(axes, "ratio (median and range over the pairs); black: at most; diamond: with estimates", "")
+    tidy(
+        axes,
+        "ratio (median and range over the pairs); black: at most; diamond: with estimates",
+        "",
+    )
     return save(figure, out, NAME)
 
 
 def report(results: Sequence[Result]) -> str:
     """Markdown: the table, readers and notes."""
     lines = [*HEAD, *(result.line for result in results)]
+    lines.append("\nSeconds and MB of the dataset: rigidsim's and the other's, medians of the pairs.")
     for result in results:
         if result.readers:
             said = ", ".join(f"{name}: {what}" for name, what in result.readers.items())
@@ -198,12 +218,27 @@ def report(results: Sequence[Result]) -> str:
     return "\n".join(lines)
 
 
+def replaced(text: str, block: str) -> str:
+    """A text with another block between its two marks.
+
+    Raises:
+        ValueError: it has no such marks.
+    """
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"no lines {BEGIN} and {END}")
+    return f"{before}{begin}\n{block.strip()}\n{end}{after}"
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """The command."""
     parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
     known = [row.key for row in rows(quick=False)] + [SATELLITE]
     parser.add_argument("--pairs", type=int, default=7, help="of fresh processes (default: %(default)s)")
-    parser.add_argument("--rows", default=",".join(known), help="some of %(default)s")
+    parser.add_argument("--rows", help=f"some of {','.join(known)}; all by default that aren't given")
+    parser.add_argument("--given", type=Path, nargs="+", default=[], help="JSON of earlier rows")
+    parser.add_argument("--into", type=Path, help="a page that has a place for the table")
     parser.add_argument("--quick", action="store_true", help="a hundredth of the lengths, judging no ratio")
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, help="of table and figure (default: %(default)s)"
@@ -213,24 +248,38 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--python", action="append", default=[], metavar="PEER=PATH", help="of another environment"
     )
     arguments = parser.parse_args(argv)
-    wanted = arguments.rows.split(",")
+    given = [Result.of(one) for path in arguments.given for one in json.loads(path.read_text())]
+    found = {result.key: result for result in given}  # the last that is given counts
+    wanted = [] if given else known
+    if arguments.rows is not None:
+        wanted = arguments.rows.split(",")
     unknown = sorted(set(wanted) - set(known))
     if unknown:
         parser.error(f"--rows: {', '.join(unknown)}: allowed are {', '.join(known)}")
-    results: list[Result] = []
+    if arguments.into is not None:
+        replaced(arguments.into.read_text(), "")  # before anything is measured
+    measured: list[Result] = []
     for row in rows(quick=arguments.quick):
         if row.key in wanted:
-            results.append(measure(row, arguments.pairs, arguments.scratch, judged=not arguments.quick))
-            print(results[-1].line, file=sys.stderr, flush=True)
+            measured.append(measure(row, arguments.pairs, arguments.scratch, judged=not arguments.quick))
+            print(measured[-1].line, file=sys.stderr, flush=True)
     if SATELLITE in wanted:
         pythons = dict(given.split("=", 1) for given in arguments.python)
-        results += measure_satellite(arguments.pairs, pythons, quick=arguments.quick)
+        measured += measure_satellite(arguments.pairs, pythons, quick=arguments.quick)
+    found |= {result.key: result for result in measured}
+    order = {key: place for place, key in enumerate(known)}
+    for row in rows(quick=False):
+        if row.key in found:
+            found[row.key].measure = row.measure  # older files don't say it
+    results = sorted(found.values(), key=lambda result: order.get(result.key, len(order)))
     arguments.out.mkdir(parents=True, exist_ok=True)
     kept: list[dict[str, Any]] = [
         asdict(result) | {"ratio": result.ratio, "met": result.met} for result in results
     ]
     (arguments.out / f"{NAME}.json").write_text(json.dumps(kept, indent=1))
     print(report(results))
+    if arguments.into is not None:
+        arguments.into.write_text(replaced(arguments.into.read_text(), report(results)))
     if any(result.ratios for result in results):
         print(f"\nfigure: {draw(results, arguments.out)}")
     if arguments.quick:
