@@ -111,7 +111,7 @@ def judge(scene: CoverageScene) -> Judged:
     try:
         prepared = prepare(rigidsim.parse(scene.text, overrides=asked))
         prepared = replace(prepared, precision=replace(prepared.precision, compact=True))
-        seen, progress, spent, parts = _gone_through(prepared)
+        seen, progress, spent, parts = gone_through(prepared)
     except ConfigError:
         return replace(begin, cpu_seconds=time.process_time() - started)
     begin = replace(begin, ended=progress.status.value, steps=progress.steps, run_seconds=spent)
@@ -153,9 +153,10 @@ def _setting(scene: CoverageScene) -> str:
     )
 
 
-def _gone_through(
+def gone_through(
     prepared: InitialValueProblem, most: int = MOST_STEPS
 ) -> tuple[_Kept, Progress, float, Assembly]:
+    """Integrate, unless it takes too many steps: samples, how it ended, seconds of CPU, what did it."""
     parts = assemble(prepared)
     seen = _Kept(prepared, parts.evaluator)
     check: Callable[[Progress], Status | None] = lambda p: Status.MAX_STEPS if p.steps > most else None  # noqa: E731
@@ -186,7 +187,7 @@ def _truth(
     try:
         found = prepare(rigidsim.parse(scene.text, overrides=[*asked, *better]))
         found = replace(found, precision=replace(found.precision, compact=True))
-        seen, progress, *_ = _gone_through(found, 2 * MOST_STEPS)
+        seen, progress, *_ = gone_through(found, 2 * MOST_STEPS)
     except ConfigError:
         return None
     if progress.status is not Status.FINISHED:

@@ -134,6 +134,12 @@ def print_sweep(result: SavedSweep) -> None:
         f"({engines})",
         highlight=False,
     )
+    for name, error in told.get("estimated_errors", {}).items():
+        screen.print(
+            f"error    {name}: {error['median']:.2g} {error['units']} in the median, at most "
+            f"{error['largest']:.2g}, estimated of {error['members']:,} members",
+            highlight=False,
+        )
     for name, drift in told["largest_drifts"].items():
         screen.print(f"drift    {name.removesuffix('_drift')}: at most {drift:.2g}", highlight=False)
     for text in told["warnings"]:

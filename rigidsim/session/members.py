@@ -46,14 +46,14 @@ class MemberResults:
         reasons: by place among them, of those that didn't end well.
         engines: by which members were run, with their numbers.
         why_alone: code of the reason that members were run one by one; empty where none was.
-        unestimated: whether a batch ran some whose attitude's errors were to be estimated, and weren't.
+        estimating: seconds of CPU that went into estimates of errors in batches.
     """
 
     kept: Kept
     reasons: Mapping[int, str]
     engines: Mapping[str, int] = field(default_factory=dict)
     why_alone: str = ""
-    unestimated: bool = False
+    estimating: float = 0.0
 
     @classmethod
     def together(cls, parts: Sequence[MemberResults]) -> MemberResults:
@@ -68,8 +68,7 @@ class MemberResults:
             for engine, number in part.engines.items():
                 engines[engine] = engines.get(engine, 0) + number
         why = next((part.why_alone for part in parts if part.why_alone), "")
-        unestimated = any(part.unestimated for part in parts)
-        return cls(joined([part.kept for part in parts], counts), reasons, engines, why, unestimated)
+        return cls(joined([part.kept for part in parts], counts), reasons, engines, why)
 
 
 def status_variable(codes: np.ndarray) -> KeptVariable:
@@ -99,9 +98,21 @@ def warnings_variable(bits: np.ndarray) -> KeptVariable:
 
 
 def plain_variables(
-    *, steps: np.ndarray, reached: np.ndarray, bound: np.ndarray, attitude_error: np.ndarray
+    *,
+    steps: np.ndarray,
+    reached: np.ndarray,
+    bound: np.ndarray,
+    attitude_error: np.ndarray | None,
+    position_error: np.ndarray | None = None,
 ) -> Kept:
-    """What is told of every member beside how it ended: (members,) each."""
+    """What is told of every member beside how it ended: (members,) each; None where nothing is estimated, and
+    of a body that has no place.
+    """
+    unknown = np.full(len(steps), np.nan)
+    placed: Kept = {}
+    if position_error is not None:
+        labels = {"long_name": "estimated error of the position at the last sample", "units": "m"}
+        placed["position_error"] = KeptVariable((), position_error, labels)
     return {
         "steps": KeptVariable((), steps.astype(np.int64), {"long_name": "steps taken", "units": "1"}),
         "time_reached": KeptVariable((), reached, {"long_name": "time of the last sample", "units": "s"}),
@@ -110,10 +121,11 @@ def plain_variables(
         ),
         "attitude_error": KeptVariable(
             (),
-            attitude_error,
+            unknown if attitude_error is None else attitude_error,
             {"long_name": "estimated error of the attitude at the last sample; nan where none is estimated",
              "units": "rad"},
         ),
+        **placed,
     }  # fmt: skip
 
 
@@ -155,11 +167,13 @@ def run_alone(
     if summary.accuracy.certified is not None:
         error_at_end = summary.accuracy.certified
     kept |= _ended(summary.status, summary.warning_codes)
+    placed = summary.accuracy.estimated_position_error
     kept |= plain_variables(
         steps=np.array([summary.cost.steps]),
         reached=np.array([summary.time_reached]),
         bound=np.array([max(bounds, default=np.nan)]),
-        attitude_error=np.array([np.nan if error_at_end is None else error_at_end]),
+        attitude_error=None if error_at_end is None else np.array([error_at_end]),
+        position_error=None if placed is None else np.array([placed]),
     )
     if more is not None and result.blocks:
         kept |= more(result)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from rigidsim.accuracy.member_estimate import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.records import dataclass
@@ -46,12 +48,14 @@ class Batched:
         members: their places in the tile.
         left: places of those that are to be run one by one.
         why: these are, of the first of them; empty where none is.
+        estimating: seconds of CPU that estimates of errors took.
     """
 
     results: list[MemberResults]
     members: list[np.ndarray]
     left: list[int]
     why: str
+    estimating: float = 0.0
 
 
 def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
@@ -80,6 +84,7 @@ class BatchTiles:
         self._axes = AxisNumbers(sweep)
         self._known: list[Family] = []
         self._runs: dict[int, tuple[BatchRun, list[Variable]]] = {}
+        self._estimates: dict[int, MemberEstimates] = {}
 
     def run(self, members: Sequence[int], keep: Sequence[str]) -> Batched:
         """Run as many members as can be run together."""
@@ -96,9 +101,10 @@ class BatchTiles:
         for family, numbers in found.groups:
             run, variables = self._run_of(family, int(members[int(numbers.members[0])]))
             for block in run.blocks(numbers):
-                self._take(block, variables, keep, done)
-                if self._unestimated(family):
-                    done.results[-1:] = [replace(part, unestimated=True) for part in done.results[-1:]]
+                before = time.process_time()
+                errors = self._estimate_of(family, run).of(numbers, block) if self._estimated else None
+                done.estimating += time.process_time() - before
+                self._take(block, errors, variables, keep, done)
         done.left.sort()
         return done
 
@@ -124,13 +130,22 @@ class BatchTiles:
             self._runs[id(family)] = BatchRun(family), variables
         return self._runs[id(family)]
 
-    def _unestimated(self, family: Family) -> bool:
-        """Whether a single run would have estimated the errors of its attitude."""
-        carried = family.traced.system.requirements.formulation != "rates"
-        return carried and self._sweep.base.config.output.estimate
+    @property
+    def _estimated(self) -> bool:
+        return self._sweep.base.config.output.estimate
+
+    def _estimate_of(self, family: Family, run: BatchRun) -> MemberEstimates:
+        if id(family) not in self._estimates:
+            self._estimates[id(family)] = MemberEstimates(family, run.width)
+        return self._estimates[id(family)]
 
     def _take(
-        self, block: BatchBlock, variables: Sequence[Variable], keep: Sequence[str], done: Batched
+        self,
+        block: BatchBlock,
+        errors: MemberErrors | None,
+        variables: Sequence[Variable],
+        keep: Sequence[str],
+        done: Batched,
     ) -> None:
         gave_up = np.array([status is None for status in block.status], dtype=bool)
         kept = _kept(block, variables, keep, self._sweep.table.most_events, self._hidden)
@@ -141,15 +156,20 @@ class BatchTiles:
         nothing = np.zeros(len(gave_up))
         worst = np.max([np.nanmax(d, axis=0, initial=0) for d in drifts], axis=0) if drifts else nothing
         over = worst > block.drift_bound
-        drift, undefined = (warning_bits([code.value]) for code in (WarningCode.DRIFT, WarningCode.UNDEFINED))
-        kept["warnings"] = warnings_variable(np.where(over, drift, 0) | np.where(_lost(block), undefined, 0))
+        warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
+        if errors is not None:
+            gone = WarningCode.RATES_UNCERTAIN if errors.attitude is None else WarningCode.ATTITUDE_UNCERTAIN
+            warned[gone] = errors.uncertain
+        bits = [np.where(found, warning_bits([code.value]), 0) for code, found in warned.items()]
+        kept["warnings"] = warnings_variable(np.bitwise_or.reduce(bits))
         rows = np.maximum(block.reached - 1, 0)
         reached = np.where(block.reached > 0, block.times[rows], np.nan)
         kept |= plain_variables(
             steps=block.steps,
             reached=reached,
             bound=block.drift_bound,
-            attitude_error=np.full(len(statuses), np.nan),
+            attitude_error=None if errors is None else errors.attitude,
+            position_error=None if errors is None else errors.position,
         )
         chosen = np.flatnonzero(~gave_up)
         done.left += block.members[gave_up].tolist()

@@ -79,7 +79,7 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> byte
     made = {
         "engines": dict(results.engines),
         "why_alone": results.why_alone,
-        "unestimated": results.unestimated,
+        "estimate_cpu_seconds": results.estimating,
         "wall_seconds": time.perf_counter() - began,
         "cpu_seconds": time.process_time() - cpu,
         "finished_at": provenance.now(),
@@ -109,7 +109,8 @@ def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> Me
         member = partial(_run_alone, sweep, members[place])
         done.results.append(run_alone(member, keep, most, events, more, hidden))
         done.members.append(np.array([place]))
-    return replace(in_order(done.results, done.members), why_alone=done.why)
+    whole = in_order(done.results, done.members)
+    return replace(whole, why_alone=done.why, estimating=done.estimating)
 
 
 @lru_cache(maxsize=4)

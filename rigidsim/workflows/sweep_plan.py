@@ -22,6 +22,7 @@ _LARGEST_TILE_BYTES = 64e6
 _BUILD_SECONDS = 0.2  # equations compiled anew for each member that runs by itself
 _BATCH_SECONDS = 2e-5  # what is done for a member of a batch beside its integration
 _TRIED = 64
+_ESTIMATED = 2.0  # a member of a batch with its estimated errors, over one without
 
 
 def tile_length(sweep: Sweep) -> int:
@@ -39,7 +40,9 @@ def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
     seconds = float(predicted["integration_seconds"] + predicted["recording_seconds"])
     if not _side_by_side(sweep):
         return seconds + _BUILD_SECONDS
-    return seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS  # half of what lanes could gain
+    each = _ESTIMATED if sweep.base.config.output.estimate else 1.0
+    # half of what lanes could gain
+    return each * seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS
 
 
 def _side_by_side(sweep: Sweep) -> bool:

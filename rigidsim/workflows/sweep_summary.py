@@ -13,10 +13,11 @@ from rigidsim.store.sweep_dataset import Gathered, TileReader
 from rigidsim.store.sweep_sources import ALWAYS, Sources
 
 _NOT_ESTIMATED = (
-    "errors of the attitude aren't estimated of {:,} members, which ran in batches (their attitude_error is "
-    "nan): rigidsim run CONFIG --member N estimates one, [sweep] batch = false all of them in many times "
-    "the time, [output] estimate = false does without"
+    "errors of the attitude aren't estimated of {:,} members, which an earlier version ran in batches (their "
+    "attitude_error is nan): rigidsim run CONFIG --member N estimates one, --force runs all of them again"
 )
+_ERRORS = {"attitude": "rad", "position": "m"}
+"""What is estimated of members, and its units."""
 
 
 @dataclass
@@ -28,6 +29,7 @@ class _Counted:
     steps: int
     unestimated: int
     worst: dict[str, float]
+    errors: dict[str, dict[str, Any]]
 
 
 def summary_of(
@@ -81,10 +83,12 @@ def summary_of(
             "cpu_seconds": sum(made["cpu_seconds"] for made in found.made),
             "wall_seconds_of_tiles": sum(made["wall_seconds"] for made in found.made),
             "tiles": len(found.made),
+            "estimate_cpu_seconds": sum(made.get("estimate_cpu_seconds", 0.0) for made in found.made),
             "session_wall_seconds": wall,
             "session_cpu_seconds": cpu,
         },
         "largest_drifts": counted.worst,
+        "estimated_errors": counted.errors,
         "config_sha256": wanted.experiment.sha256,
         "provenance": kinds[0] if kinds else {},
         "mixed_provenance": mixed,
@@ -95,6 +99,7 @@ def _count(sources: Sources, reader: TileReader) -> _Counted:
     outcomes, warned = np.zeros(len(OUTCOMES), dtype=np.int64), np.zeros(len(WARNINGS), dtype=np.int64)
     steps = unestimated = 0
     worst: dict[str, float] = {}
+    estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
     always = sources.found[ALWAYS]
     keys = always.generation.astype(np.int64) << 32 | always.tile
     order = np.argsort(keys, kind="stable")
@@ -111,9 +116,27 @@ def _count(sources: Sources, reader: TileReader) -> _Counted:
         bits = tile.arrays["warnings"][rows]
         warned += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
         steps += int(tile.arrays["steps"][rows].sum())
+        for name, found in estimated.items():
+            if f"{name}_error" in tile.arrays:
+                values = tile.arrays[f"{name}_error"][rows]
+                found.append(values[~np.isnan(values)])
         for name, values in tile.arrays.items():
             if name.endswith("_drift_largest"):
                 largest = np.nanmax(values[rows], initial=0.0)
                 drift = name.removesuffix("_largest")
                 worst[drift] = max(worst.get(drift, 0.0), float(largest))
-    return _Counted(outcomes, warned, steps, unestimated, worst)
+    errors = {name: _told(np.concatenate(found), _ERRORS[name]) for name, found in estimated.items() if found}
+    told = {name: error for name, error in errors.items() if error["members"]}
+    return _Counted(outcomes, warned, steps, unestimated, worst, told)
+
+
+def _told(errors: np.ndarray, units: str) -> dict[str, Any]:
+    """Of the estimated errors of all members that have one."""
+    if not len(errors):
+        return {"members": 0}
+    return {
+        "members": len(errors),
+        "median": float(np.median(errors)),
+        "largest": float(errors.max()),
+        "units": units,
+    }

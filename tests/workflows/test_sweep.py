@@ -398,22 +398,24 @@ def test_info_tells_how_far_a_sweep_is(tmp_path: Path) -> None:
     assert resume_sweep(tmp_path / "box").finished
 
 
-def test_what_a_batch_does_not_estimate_is_said(tmp_path: Path) -> None:
+def test_what_a_batch_estimates_is_told_of_all_and_of_one(tmp_path: Path) -> None:
     output = CONFIG[CONFIG.index("estimate") : CONFIG.index("[[ev")]
     text = CONFIG.replace(output, "").replace('rates"', 'quaternion"')
     text += '[sweep]\naxes."initial.angular_velocity[0]" = {values = [0.1, 0.2]}\n'
     told = swept(tmp_path, text)
-    assert np.isnan(told.dataset.attitude_error).all()
-    assert told.summary["warning_codes"] == ["attitude_not_estimated"]
-    assert "of 2 members" in told.summary["warnings"][0]
+    errors = told.dataset.attitude_error.values
+    assert told.summary["warning_codes"] == []
+    assert told.summary["cost"]["estimate_cpu_seconds"] > 0
+    summed = {"members": 2, "median": np.median(errors), "largest": errors.max(), "units": "rad"}
+    assert told.summary["estimated_errors"] == {"attitude": summed}
     shown = CliRunner().invoke(app, ["info", str(tmp_path / "box")])
-    assert "[sweep] batch = false" in " ".join(shown.stdout.split())
+    assert f"attitude: {np.median(errors):.2g} rad in the median" in " ".join(shown.stdout.split())
     (tmp_path / "c.toml").write_text(text)
     out = ["--out", str(tmp_path), "--set", "output.timeline=false", "--json"]
     ran = CliRunner().invoke(app, ["run", str(tmp_path / "c.toml"), "--member", "1", *out])
     single = json.loads(ran.stdout)
     assert (tmp_path / "box_1").is_dir()
-    assert single["accuracy"]["estimated_attitude_error"] > 0
+    assert 0.1 < errors[1] / single["accuracy"]["estimated_attitude_error"] < 10
     with pytest.raises(RunFolderError, match="another experiment"):
         swept(tmp_path, text.replace("[sweep]", "[sweep]\nbatch = false"))
     alone = swept(tmp_path, text.replace("[sweep]", "[sweep]\nbatch = false"), force=True)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 INDICATORS = ("megno", "fli", "lyapunov")
-_ALWAYS = ("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error")
+_ALWAYS = ("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error", "position_error")
 _BESIDE = ("failed_member", "failed_reason")
 _LAST = ("_drift_largest", "_drift_final", "_time", "_times", "_count")
 _FIRST = "_first"

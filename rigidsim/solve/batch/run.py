@@ -49,6 +49,7 @@ class BatchBlock:
 
     Attributes:
         members: which of the sweep's they are, (m,).
+        places: of these in the numbers that they were run from, (m,).
         times: seconds, (samples,).
         values: of the recorded variables, (samples, m, components), SI; NaN from where a member ended.
         drifts: by the names of the invariants, (samples, m).
@@ -62,6 +63,7 @@ class BatchBlock:
     """
 
     members: np.ndarray
+    places: np.ndarray
     times: np.ndarray
     values: Values
     drifts: Values
@@ -124,6 +126,7 @@ class BatchRun:
         values, drifts = self._outputs.named(values_of, numbers, part)
         block = BatchBlock(
             members,
+            part,
             self._traced.prepared.clock.labels(0, len(times)),
             values,
             drifts,

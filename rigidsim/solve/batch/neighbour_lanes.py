@@ -1,0 +1,182 @@
+"""What carries the neighbours of a family's members, and tells how far apart they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.state_names import TANGENT
+from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
+from rigidsim.solve.batch.tracing import TracedSystem
+from rigidsim.solve.compiled import compiled_function
+
+_PARTS = 4
+"""Of a step, whose errors are a thousandth of its own or less: the power of 4 that is the series' order."""
+_LEAST_TOLERANCE, _ONE_ORDER = 1e-11, 7.4
+"""Whose errors in a step still stand out of rounding; others' are in proportion, which can be missed by what
+one order gains, exp(2)."""
+_ROUNDING = 16.0  # epsilons
+_PADDED = 64  # columns of a compiled function, so that their bits don't depend on their place
+_GROUPS = {
+    "rates": ("wx", "wy", "wz"),
+    "position": ("x", "y", "z"),
+    "velocity": ("vx", "vy", "vz"),
+}
+_APART = ("pace", "work", "stride")
+"""States that nothing feels."""
+
+
+class NeighbourLanes:
+    """Of the motion alone: what its tangent vectors and events are doesn't matter.
+
+    Args:
+        width: lanes of the integrators.
+        tolerance: of their steps; None for epsilon.
+
+    Attributes:
+        places: of the states that a quantity has ("rates", "attitude", "position", "velocity").
+        felt: which states anything depends on, (states,).
+        groups: (groups, states), states that are measured together by 1.
+        carried: whether there is an attitude.
+    """
+
+    def __init__(self, traced: TracedSystem, width: int, tolerance: float | None) -> None:
+        self._traced, self._width, system = traced, width, traced.system
+        self._moving = traced.moving
+        self._rights = [hy.expression(right) for _, right in system.equations[: self._moving]]
+        self._lanes = self._engine(tolerance)
+        names, attitude = list(system.states[: self._moving]), system.mechanics.attitude
+        self.places = {group: [names.index(n) for n in of if n in names] for group, of in _GROUPS.items()}
+        self.places["attitude"] = [] if attitude is None else [names.index(n) for n in attitude.names]
+        self.felt = np.array([n not in _APART and not n.startswith(TANGENT) for n in names])
+        grouped = {place for places in self.places.values() for place in places}
+        alone = [[n] for n in range(len(names)) if n not in grouped and self.felt[n]]
+        together = [*filter(None, self.places.values()), *alone]
+        self.groups = np.zeros((len(together), len(names)))
+        for row, places in enumerate(together):
+            self.groups[row, places] = 1.0
+        self.carried = attitude is not None
+        self._attitude = attitude
+        asked, self._epsilon = traced.prepared.effective_tolerance, float(traced.prepared.precision.epsilon)
+        self._loose = asked > 2 * self._epsilon
+        self._tried = max(asked, _LEAST_TOLERANCE)
+        self._share = min(asked / self._tried * _ONE_ORDER, 1.0) / self._epsilon
+
+    # --- what is compiled -----------------------------------------------------------------------------------
+
+    def _engine(self, tolerance: float | None) -> BatchEngine:
+        rights = self._traced.as_parameters(self._rights)
+        variables = self._traced.system.variables[: self._moving]
+        equations = list(zip(variables, rights, strict=True))
+        count, compact = len(self._traced.in_equations), self._traced.system.wide
+        return BatchEngine(BatchSystem(equations, [], count, tolerance, compact), self._width)
+
+    @cached_property
+    def _series(self) -> BatchEngine | None:
+        """Of the run's own tolerance, where that lets steps be wrong by more than rounding does."""
+        return self._engine(self._tried) if self._loose else None
+
+    @cached_property
+    def _slopes(self) -> Callable[..., np.ndarray]:
+        return self._function(self._rights)
+
+    @cached_property
+    def _quaternion(self) -> Callable[..., np.ndarray]:
+        assert self._attitude is not None
+        return self._function(self._attitude.quaternion)
+
+    def _function(self, expressions: Sequence[Any]) -> Callable[..., np.ndarray]:
+        """Of states (states, n), the traced system's parameters (parameters, n) and times (n,)."""
+        variables = [*self._traced.system.variables[: self._moving], *self._traced.parameters.variables]
+        compiled: Any = compiled_function(expressions, variables, compact_mode=True, fp_type=float)
+
+        def evaluate(states: np.ndarray, parameters: np.ndarray, times: np.ndarray) -> np.ndarray:
+            count = states.shape[1]
+            padded = -(-count // _PADDED) * _PADDED
+            inputs = np.empty((len(states) + len(parameters), padded))
+            inputs[: len(states), :count], inputs[len(states) :, :count] = states, parameters
+            inputs[:, count:] = inputs[:, count - 1 : count]
+            options = {}
+            if compiled.is_time_dependent:
+                options["time"] = np.concatenate([times, np.full(padded - count, times[-1])])
+            return np.asarray(compiled(inputs, **options))[:, :count]
+
+        return evaluate
+
+    # --- what they tell -------------------------------------------------------------------------------------
+
+    def slopes(self, states: np.ndarray, parameters: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Derivatives of states, (states, n)."""
+        return self._slopes(states, parameters, times)
+
+    def angles(self, states: np.ndarray, apart: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """Between the attitudes of states (states, n) and of those apart from them by little, rad, (n,).
+
+        A quaternion's chord is half the angle; nine direction cosines differ by its sqrt(2)-fold; a planar
+        motion has the angle itself.
+        """
+        attitude: AttitudeStates | None = self._attitude
+        if attitude is None:
+            return np.zeros(states.shape[1])
+        factors = {"quaternion": 2.0, "rotation_matrix": 0.5**0.5, "planar": 2.0**attitude.angle_unit}
+        if attitude.orbital is None and attitude.kind in factors:
+            chords = np.sqrt((apart[self.places["attitude"]] ** 2).sum(axis=0))
+            return np.asarray(factors[attitude.kind] * chords)
+        # at one time for all: a frame that turns with time doesn't change how far they are apart
+        nothing = np.zeros(states.shape[1])
+        here, there = (self._quaternion(x, parameters, nothing) for x in (states, states + apart))
+        return np.asarray(2.0 * np.sqrt(((there - here) ** 2).sum(axis=0)))
+
+    # --- what they do ---------------------------------------------------------------------------------------
+
+    def onward(
+        self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray, end: np.ndarray, most: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """States (states, n) and times (n,) of lanes, so many steps later or at their ends.
+
+        Args:
+            most: steps of each, (n,).
+        """
+        found, times = np.empty_like(states), np.empty_like(begin)
+        read = parameters[self._traced.in_equations]
+
+        def group(some: np.ndarray, steps: int) -> None:
+            lanes = some if len(some) == self._width else np.resize(some, self._width)
+            there, then = self._lanes.onward(
+                states[:, lanes], read[:, lanes], begin[lanes], end[lanes], steps
+            )
+            found[:, some], times[some] = there[:, : len(some)], then[: len(some)]
+
+        for steps in np.unique(most).tolist():
+            alike = np.flatnonzero(most == steps)
+            for first in range(0, len(alike), self._width):
+                some = alike[first : first + self._width]
+                group(some, steps)
+                if len(some) > 1 and not np.isfinite(found[:, some]).all():
+                    for lane in some.tolist():  # heyoka stops all lanes with one whose state is lost
+                        group(np.array([lane]), steps)
+        return found, times
+
+    def series_errors(
+        self, states: np.ndarray, parameters: np.ndarray, times: np.ndarray
+    ) -> np.ndarray | None:
+        """What the tolerance lets the step be wrong by that begins in each state, in epsilons, (states, n);
+        None where that isn't more than rounding.
+        """
+        if self._series is None:
+            return None
+        wrong, read = np.empty_like(states), parameters[self._traced.in_equations]
+        for first in range(0, states.shape[1], self._width):
+            some = np.arange(first, min(first + self._width, states.shape[1]))
+            lanes = np.resize(some, self._width)
+            wrong[:, some] = self._series.step_error(states[:, lanes], read[:, lanes], times[lanes], _PARTS)[
+                :, : len(some)
+            ]
+        wrong[np.abs(wrong) < _ROUNDING * self._epsilon * np.abs(states)] = 0.0
+        wrong[:, ~np.isfinite(wrong).all(axis=0)] = 0.0
+        return self._share * wrong

@@ -1,0 +1,301 @@
+"""Neighbours of the motions of many members, pushed at random as rounding does.
+
+The simulation of ``rigidsim.solve.neighbours``, for members side by side: each is followed at a loose
+tolerance by four lanes, itself and three neighbours. Between pushes lies a stretch of so many steps, after
+which lanes stand at slightly different times; how far they are apart is brought to one time by the equations.
+Draws are the same for every member, so that what is found of one depends on nobody beside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from rigidsim.solve.batch.neighbour_lanes import NeighbourLanes
+from rigidsim.solve.lanes import NEIGHBOURS
+from rigidsim.solve.neighbours import Pushes
+
+_STRETCHES, _SHORTEST = 12, 4
+"""Of a run, about, and steps of one at least. Half of a stretch's pushes come before it and half after, so
+that few stretches do for errors that grow as time makes them; where they grow faster these become shorter."""
+_FIRST = 2.0**-40
+"""Distance that stands for one epsilon, at first."""
+_LARGEST, _DRAWN_IN, _SATURATED, _NEARER = 2.0**-24, 2.0**-26, 2.0**-14, 2.0**-8
+"""Distance from which neighbours are drawn in, and to where; one that isn't small any more, so that the
+stretch is gone through once more; and by how much nearer where it can't be shorter."""
+_CALM, _WILD = 8.0, 64.0
+"""Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
+_MOST_ROUNDS = 20_000
+_HOPELESS_STEPS = 32_768
+"""More than were expected: the motion comes to no end."""
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Members to be followed.
+
+    Attributes:
+        initial: of the motion, (states, members); parameters: of the traced system, (parameters, members).
+        begin, end: internal units of each, (members,).
+        steps: that each took, (members,).
+        rate_units: what brings the body rates to a common unit, (3, members).
+    """
+
+    initial: np.ndarray
+    parameters: np.ndarray
+    begin: np.ndarray
+    end: np.ndarray
+    steps: np.ndarray
+    rate_units: np.ndarray
+
+    def of(self, which: np.ndarray) -> Starts:
+        """Some of them."""
+        return Starts(*(getattr(self, field.name)[..., which] for field in fields(self)))
+
+
+@dataclass(frozen=True)
+class Spreads:
+    """How far errors of one epsilon at each step came at most, (members,).
+
+    Attributes:
+        rates, attitude, position, velocity: root mean square over the neighbours, in epsilons of internal
+            units; attitude as an angle, rates relative to their size; zeros where the motion has none.
+        extent, fastest: largest distance from the origin and speed, internal units.
+        early: of the leading one (see ``leading``) after a quarter of the time.
+        whole: False where the motion could not be followed to its end.
+    """
+
+    rates: np.ndarray
+    attitude: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    extent: np.ndarray
+    fastest: np.ndarray
+    early: np.ndarray
+    whole: np.ndarray
+
+    @classmethod
+    def none(cls, members: int) -> Spreads:
+        """Before anything was seen."""
+        a, b, c, d, e, f, g = np.zeros((7, members))
+        return cls(a, b, c, d, e, f, g, np.ones(members, dtype=bool))
+
+    def put(self, places: np.ndarray, others: Spreads) -> None:
+        """What was found of some, in place of what was known of them."""
+        for field in fields(self):
+            getattr(self, field.name)[places] = getattr(others, field.name)
+
+
+def follow(lanes: NeighbourLanes, starts: Starts, pushes: Pushes, lost: float) -> Spreads:
+    """Follow members to their ends.
+
+    Args:
+        lost: spread of the attitude (or the rates) past which nothing more is to be learnt.
+    """
+    following = _Following(lanes, starts, pushes, lost)
+    for number in range(_MOST_ROUNDS):
+        going = np.flatnonzero(following.going)
+        if not len(going):
+            break
+        with np.errstate(all="ignore"):
+            following.go(going, np.random.default_rng(number))
+    following.spreads.whole[following.going] = False
+    return following.spreads
+
+
+class _Following:
+    """Members on their way.
+
+    Attributes:
+        going: which are, (members,).
+    """
+
+    def __init__(self, lanes: NeighbourLanes, starts: Starts, pushes: Pushes, lost: float) -> None:
+        self._lanes, self._starts, self._pushes, self._lost = lanes, starts, pushes, lost
+        states, members = starts.initial.shape
+        self._state = starts.initial.copy()
+        self._apart = np.zeros((states, members, NEIGHBOURS))
+        self._time = starts.begin.copy()
+        self._factor = np.full(members, _FIRST)  # distance for one epsilon
+        self._sizes = np.abs(starts.initial)  # over the latest stretch, of what moves
+        self._largest = self._sizes.copy()
+        self._longest = np.maximum(
+            2 ** np.floor(np.log2(np.maximum(starts.steps, 1) / _STRETCHES * 1.42)), _SHORTEST
+        )
+        self._stride = self._longest.copy()
+        self._taken = np.zeros(members)
+        self.spreads = Spreads.none(members)
+        self.going = starts.end > starts.begin
+        normal = np.random.default_rng(_MOST_ROUNDS).standard_normal((states, 1, NEIGHBOURS))
+        slopes = lanes.slopes(self._state, starts.parameters, self._time)
+        self._sizes[slopes == 0] = 0.0  # what stands still isn't rounded
+        everybody = np.arange(members)
+        self._add(everybody, pushes.first * np.abs(starts.initial)[:, :, None] * normal)
+        self._note(everybody)
+
+    def go(self, going: np.ndarray, random: np.random.Generator) -> None:
+        """One stretch of some of them."""
+        states, starts = len(self._state), self._starts
+        before, clock, after = (random.standard_normal((states, 1, NEIGHBOURS)) for _ in range(3))
+        walk, steady = random.standard_normal((2, NEIGHBOURS))
+        stride = self._stride[going]
+        expected = np.clip(starts.steps[going] - self._taken[going], 1, stride)
+        parameters = starts.parameters[:, going]
+        kept = self._apart[:, going].copy()
+        series = self._lanes.series_errors(self._state[:, going], parameters, self._time[going])
+        self._push(going, expected / 2, before, series, walk)
+        begun = self._apart[:, going].copy()
+        # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
+        # neighbours' lasts for the stretch
+        wrong = self._pushes.clock * np.abs(self._time[going]) * self._factor[going] / np.sqrt(expected)
+        shifts = np.concatenate([np.zeros((len(going), 1)), wrong[:, None] * clock[0]], axis=1)
+        nearby = np.concatenate([np.zeros((states, len(going), 1)), begun], axis=2)
+        there, times = self._lanes.onward(
+            (self._state[:, going, None] + nearby).reshape(states, -1),
+            np.repeat(parameters, NEIGHBOURS + 1, axis=1),
+            (self._time[going, None] + shifts).reshape(-1),
+            (starts.end[going, None] + shifts).reshape(-1),
+            np.repeat(stride, NEIGHBOURS + 1).astype(np.int64),
+        )
+        there = there.reshape(states, len(going), -1)
+        times = times.reshape(len(going), -1) - shifts
+        state, time = there[:, :, 0], times[:, 0]
+        slopes = self._lanes.slopes(np.ascontiguousarray(state), parameters, time)
+        apart = there[:, :, 1:] - there[:, :, :1] - slopes[:, :, None] * (times[:, 1:] - times[:, :1])
+        finite = np.isfinite(apart).all(axis=(0, 2)) & np.isfinite(state).all(axis=0)
+        grown = self._distances(going, np.where(finite[:, None], apart, 0.0))
+        saturated = finite & (grown >= _SATURATED)
+        self._again(going, saturated, kept)
+        lost = going[~finite]
+        self.spreads.whole[lost], self.going[lost] = False, False
+        well = finite & ~saturated
+        growth = grown / np.maximum(self._distances(going, begun), 1e-300)
+        self._arrive(
+            going[well],
+            state[:, well],
+            time[well],
+            apart[:, well],
+            growth[well],
+            expected[well],
+            slopes[:, well],
+        )
+        some = going[well]
+        self._push(some, expected[well] / 2, after, None if series is None else series[:, well], steady)
+        self._draw_in(some)
+        self._note(some)
+
+    # --- parts of a stretch ---------------------------------------------------------------------------------
+
+    def _again(self, going: np.ndarray, saturated: np.ndarray, kept: np.ndarray) -> None:
+        """Stretches that are to be gone through once more: shorter, or from nearer."""
+        which = going[saturated]
+        self._apart[:, which] = kept[:, saturated]
+        short = self._stride[which] <= _SHORTEST
+        self._stride[which] = np.maximum(self._stride[which] / 8, _SHORTEST)
+        near = which[short]
+        self._apart[:, near] *= _NEARER
+        self._factor[near] *= _NEARER
+        hopeless = near[self._factor[near] < 1e-280]
+        self.spreads.whole[hopeless], self.going[hopeless] = False, False
+
+    def _arrive(
+        self,
+        which: np.ndarray,
+        state: np.ndarray,
+        time: np.ndarray,
+        apart: np.ndarray,
+        growth: np.ndarray,
+        steps: np.ndarray,
+        slopes: np.ndarray,
+    ) -> None:
+        stride = self._stride[which]
+        shorter, longer = growth > _WILD, growth < _CALM
+        stride = np.where(shorter, np.maximum(stride / 2, _SHORTEST), stride)
+        self._stride[which] = np.where(longer, np.minimum(2 * stride, self._longest[which]), stride)
+        sizes = np.maximum(np.abs(self._state[:, which]), np.abs(state))
+        still = (self._state[:, which] == state) & (slopes == 0)
+        self._largest[:, which] = np.maximum(self._largest[:, which], sizes)
+        self._sizes[:, which] = np.where(still, 0.0, sizes)
+        self._state[:, which], self._time[which], self._apart[:, which] = state, time, apart
+        self._taken[which] += steps
+        tired = self._taken[which] > 4 * self._starts.steps[which] + _HOPELESS_STEPS
+        self.spreads.whole[which[tired]] = False
+        self.going[which] = (time < self._starts.end[which]) & ~tired
+
+    def _push(
+        self,
+        which: np.ndarray,
+        steps: np.ndarray,
+        normal: np.ndarray,
+        series: np.ndarray | None,
+        walk: np.ndarray,
+    ) -> None:
+        """Errors of so many steps (members,)."""
+        pushed = self._pushes.own * np.sqrt(steps)[:, None] * self._sizes[:, which, None] * normal
+        if series is not None:
+            # one step stands for all of them: they add up, or walk where their errors change sign
+            times = steps[:, None] + np.sqrt(steps)[:, None] * walk
+            pushed = pushed + self._pushes.series * series[:, :, None] * times
+        self._add(which, pushed)
+
+    def _add(self, which: np.ndarray, pushed: np.ndarray) -> None:
+        felt = np.where(self._lanes.felt[:, None, None], pushed, 0.0)
+        self._apart[:, which] += self._factor[which][:, None] * felt
+
+    def _draw_in(self, which: np.ndarray) -> None:
+        """Neighbours that have become too far, in the same directions."""
+        far = self._distances(which, self._apart[:, which])
+        nearer = np.where(far > _LARGEST, _DRAWN_IN / np.maximum(far, _LARGEST), 1.0)
+        self._apart[:, which] *= nearer[:, None]
+        self._factor[which] *= nearer
+
+    def _distances(self, which: np.ndarray, apart: np.ndarray) -> np.ndarray:
+        """Of the farthest neighbour, relative to the size of what is apart, (members,); states that never
+        moved are none to be near to.
+        """
+        groups = self._lanes.groups
+        squares = np.einsum("gs,smn->gmn", groups, apart * apart)
+        sizes = (groups[:, :, None] * self._largest[:, which]).max(axis=1)
+        weights = np.where(sizes > 0, 1.0 / np.maximum(sizes, 1e-150) ** 2, 0.0)
+        found: np.ndarray = np.sqrt((squares * weights[:, :, None]).max(axis=(0, 2)))
+        return found
+
+    def _note(self, which: np.ndarray) -> None:
+        lanes, places, spreads = self._lanes, self._lanes.places, self.spreads
+        state, apart, factor = self._state[:, which], self._apart[:, which], self._factor[which]
+        wrong = np.sqrt((apart**2).mean(axis=2)) / factor
+
+        def length(table: np.ndarray, group: str) -> np.ndarray:
+            return np.asarray(np.sqrt((table[places[group]] ** 2).sum(axis=0)))
+
+        def larger(row: np.ndarray, found: np.ndarray) -> None:
+            row[which] = np.maximum(row[which], found)
+
+        rates = places["rates"]
+        if rates:
+            units = self._starts.rate_units[:, which]
+            size = np.sqrt(((units * state[rates]) ** 2).sum(axis=0))
+            off = np.sqrt(((units * wrong[rates]) ** 2).sum(axis=0))
+            larger(spreads.rates, np.where(size > 0, off / np.maximum(size, 1e-300), 0.0))
+        parameters = self._starts.parameters[:, which]
+        if lanes.carried:
+            states = np.ascontiguousarray(state)
+            angles = [lanes.angles(states, apart[:, :, n], parameters) for n in range(NEIGHBOURS)]
+            larger(spreads.attitude, np.sqrt(np.mean(np.square(angles), axis=0)) / factor)
+        if places["position"]:
+            larger(spreads.position, length(wrong, "position"))
+            larger(spreads.velocity, length(wrong, "velocity"))
+            larger(spreads.extent, length(state, "position"))
+            larger(spreads.fastest, length(state, "velocity"))
+        lead = (spreads.attitude if lanes.carried else spreads.rates)[which]
+        whole = self._starts.end[which] - self._starts.begin[which]
+        gone = (self._time[which] - self._starts.begin[which]) / np.maximum(whole, 1e-300)
+        spreads.early[which] = np.where(
+            (spreads.early[which] == 0) | (gone <= 0.25), lead, spreads.early[which]
+        )
+        over = lead >= self._lost
+        if places["position"]:
+            epsilon = np.finfo(float).eps
+            over &= spreads.position[which] * epsilon > spreads.extent[which]
+        self.going[which[over]] = False

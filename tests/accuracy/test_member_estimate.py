@@ -1,0 +1,107 @@
+"""Announced errors of members that run side by side: true, their own, and no bit of the motion moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.sweep_coverage import KINDS, Found, found_of
+from rigidsim.scene.config import parse
+from rigidsim.scene.sweep import Sweep
+from rigidsim.session.members import MemberResults, warning_bits
+from rigidsim.solve.batch.lanes import BatchEngine
+from rigidsim.workflows.sweep_members import run_members
+
+MEMBERS = 6
+
+
+def results_of(kind: str, which: list[int] | None = None, output: str = "") -> MemberResults:
+    text = KINDS[kind].sweep("members", MEMBERS, 3).experiment.text
+    sweep = Sweep.of(parse(text.replace("[output]", f"[output]\n{output}")))
+    return run_members(sweep, which or list(range(MEMBERS)), ["final"])
+
+
+@pytest.fixture(scope="module")
+def satellites() -> MemberResults:
+    return results_of("satellites")
+
+
+def test_nobody_beside_a_member_changes_its_estimate(satellites: MemberResults) -> None:
+    alone = results_of("satellites", [4])
+    assert alone.engines.keys() == satellites.engines.keys() != {"alone"}
+    for name, variable in alone.kept.items():
+        assert variable.values[0].tobytes() == satellites.kept[name].values[4].tobytes(), name
+
+
+def test_estimates_move_no_bit_of_the_motion(satellites: MemberResults) -> None:
+    without = results_of("satellites", output="estimate = false")
+    assert np.isnan(without.kept["attitude_error"].values).all()
+    assert not without.estimating < 0 < satellites.estimating
+    apart = {"attitude_error", "warnings"}
+    assert without.kept.keys() == satellites.kept.keys() > apart
+    for name in without.kept.keys() - apart:
+        assert without.kept[name].values.tobytes() == satellites.kept[name].values.tobytes(), name
+
+
+def test_a_tolerance_is_part_of_the_error(satellites: MemberResults) -> None:
+    loose = results_of("satellites, 1e-9").kept["attitude_error"].values
+    assert (loose > 1e3 * satellites.kept["attitude_error"].values).all()
+
+
+def test_places_have_errors_where_bodies_fly(satellites: MemberResults) -> None:
+    kept = results_of("flights").kept
+    far = np.linalg.norm(kept["position_final"].values, axis=1)
+    assert ((kept["position_error"].values > 1e-17 * far) & (kept["position_error"].values < far)).all()
+    assert "position_error" not in satellites.kept
+
+
+def test_a_member_whose_digits_are_gone_says_so() -> None:
+    kept = results_of("satellites, long").kept
+    gone = kept["attitude_error"].values > 1e-2
+    assert gone.any()
+    assert (kept["attitude_error"].values <= np.pi).all()
+    warned = kept["warnings"].values & warning_bits(["attitude_uncertain"])
+    np.testing.assert_array_equal(warned > 0, gone)
+
+
+def test_a_lane_that_is_lost_takes_nobody_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its error is as large as can be, and those beside it keep theirs."""
+    text = KINDS["free, short"].sweep("members", MEMBERS, 3).experiment.text
+    sweep = Sweep.of(parse(text))
+    whole = run_members(sweep, range(MEMBERS), ["final"]).kept
+    onward = BatchEngine.onward
+
+    def losing(engine: BatchEngine, states: np.ndarray, *rest: object) -> tuple[np.ndarray, np.ndarray]:
+        spoilt = states.copy()
+        # by rates alone: the second member's are known from its start
+        hit = np.abs(states[:3] - target[:, None]).max(axis=0) < 1e-6
+        spoilt[:, hit] = np.nan
+        found = onward(engine, spoilt, *rest)  # type: ignore[arg-type]
+        return found
+
+    target = _first_rates(sweep, 1)
+    monkeypatch.setattr(BatchEngine, "onward", losing)
+    spoilt = run_members(sweep, range(MEMBERS), ["final"]).kept
+    expected = whole["attitude_error"].values.copy()
+    expected[1] = np.pi
+    np.testing.assert_array_equal(spoilt["attitude_error"].values, expected)
+
+
+def _first_rates(sweep: Sweep, member: int) -> np.ndarray:
+    from rigidsim.solve.batch.family import Families
+    from rigidsim.solve.batch.members import Members
+
+    (_, numbers), *_ = Families(Members.of(sweep)).sort().groups
+    return np.asarray(numbers.initial[:3, numbers.members.tolist().index(member)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["free", "satellites", "planar", "tops, asymmetric", "driven", "flights"])
+def test_announced_errors_are_true(kind: str) -> None:
+    """As `experiments/sweep_coverage.py` has it, of few members: none may be more than ten times as wrong."""
+    for _, found in found_of(kind, 16, 5):
+        assert isinstance(found, Found)
+        assert found.side_by_side == 16
+        assert (found.ratio[~found.warned] < 10).all()
+        sound = ~found.warned & (found.true > 0)
+        assert np.median(found.announced[sound] / found.true[sound]) < 20
