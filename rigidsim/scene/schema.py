@@ -132,7 +132,9 @@ class Output(ConfigTable):
         description="of the timeline at most; a longer run is thinned there, never in the dataset",
     )
     estimate: StrictBool = Field(
-        default=True, description="announce the errors of attitude and path; a few percent of the run"
+        default=True,
+        description="announce the errors of attitude and path; a few percent of the run, in batches of a sweep "
+        "about as much as its members",
     )
     lyapunov: StrictBool = Field(
         default=False,

@@ -117,8 +117,8 @@ class SweepTable(ConfigTable):
     )
     batch: StrictBool = Field(
         default=True,
-        description="members that share their equations run side by side; false: each by itself, with an "
-        "estimate of its errors, in many times the time",
+        description="members that share their equations run side by side; false: each by itself, in many "
+        "times the time",
     )
     axes: dict[StrictStr, AxisTable] = Field(
         min_length=1, description="by the dotted keys whose values are swept, indices from 0"

@@ -1,10 +1,17 @@
-"""How members fared that were taken side by side."""
+"""How members fared that were taken side by side, where samples go, and when the next one arrives."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
+
+IDLE = -1
+"""In place of a member, of a lane that has none."""
+_FIRST_STEPS, _LEAST_STEPS = 64, 8
+"""At once, while nothing is known of a lane's pace, and where one is about to arrive."""
+_SHORTLY = 48
+"""Steps that take about as long as what is done between two calls of the integrator."""
 
 
 @dataclass(frozen=True)
@@ -51,3 +58,34 @@ class Lanes:
             (self.steps, others.steps),
         ):
             mine[places] = theirs
+
+
+def put_in_place(bundle: np.ndarray, states: np.ndarray) -> None:
+    """Groups (groups, samples, states, width) as members side by side, (samples, states, members)."""
+    groups, samples, count, width = bundle.shape
+    whole = min(states.shape[2] // width, groups)
+    states[:, :, : whole * width].reshape(samples, count, whole, width)[:] = bundle[:whole].transpose(
+        1, 2, 0, 3
+    )
+    if whole < groups and (left := states.shape[2] - whole * width):
+        states[:, :, whole * width :] = bundle[whole, :, :, :left]
+
+
+def until_next(
+    moments: list[float],
+    inside: list[int],
+    targets: list[float],
+    begun: list[float],
+    taken: list[int],
+    most_steps: int,
+) -> int:
+    """Steps until about the first lane arrives at its pace so far, and those that arrive shortly after."""
+    expected = []
+    for lane, member in enumerate(inside):
+        if member == IDLE:
+            continue
+        gone, left = moments[lane] - begun[lane], targets[lane] - moments[lane]
+        steps = _FIRST_STEPS if taken[lane] == 0 or gone <= 0 else int(left / gone * taken[lane]) + 2
+        expected.append(min(max(steps, _LEAST_STEPS), most_steps - taken[lane]))
+    first = min(expected)
+    return max(max(steps for steps in expected if steps <= first + _SHORTLY), 1)

@@ -14,7 +14,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.solve.batch.lane_results import Found, Lanes
+from rigidsim.solve.batch.lane_results import IDLE, Found, Lanes, put_in_place, until_next
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.stepper import longest_step
@@ -22,11 +22,8 @@ from rigidsim.solve.stepper import longest_step
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, at the same places always."""
 
-_IDLE = -1
-_FIRST_STEPS, _LEAST_STEPS = 64, 8
-"""At once, while nothing is known of a lane's pace, and where one is about to arrive."""
-_SHORTLY = 48
-"""Steps that take about as long as what is done between two calls of the integrator."""
+_GROUPS = 8
+"""That are put in place together: the samples of one lie scattered over all of a block's memory."""
 _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
 
 _engines: Kept[Any] = Kept(16)
@@ -132,12 +129,15 @@ class BatchEngine:
                 result.states[0] = initial
             self._in_turn(result, initial, parameters, start, times[-1], most_steps)
             return result
+        bundle = np.empty((_GROUPS, len(times), len(initial), self.width))
         for first in range(0, count, self.width):
+            number = first // self.width % _GROUPS
             waiting = list(range(first, min(first + self.width, count)))
             while waiting:
                 chosen = np.array(waiting + [waiting[0]] * (self.width - len(waiting)))
                 lost = self._together(
                     result,
+                    bundle[number],
                     waiting,
                     initial[:, chosen],
                     parameters[:, chosen],
@@ -151,6 +151,7 @@ class BatchEngine:
                     only = np.full(self.width, member)
                     self._together(
                         result,
+                        bundle[number],
                         [member],
                         initial[:, only],
                         parameters[:, only],
@@ -159,6 +160,8 @@ class BatchEngine:
                         most_steps,
                     )
                 waiting = [member for member in waiting if member not in lost]
+            if number == _GROUPS - 1 or first + self.width >= count:
+                put_in_place(bundle, result.states[:, :, first - number * self.width :])
         return result
 
     def onward(
@@ -204,13 +207,13 @@ class BatchEngine:
         """Run members whose end alone is asked for: whoever arrives makes room for the next in its lane."""
         integrator, width = self._integrator, self.width
         waiting = deque(range(initial.shape[1]))
-        inside, taken = [_IDLE] * width, [0] * width
+        inside, taken = [IDLE] * width, [0] * width
         target, begun = np.zeros(width), [0.0] * width
         high, low = np.zeros(width), np.zeros(width)
 
         def enter(lanes: list[int]) -> None:
             """The next members, or nobody: a lane that has arrived already, with the state of some member."""
-            members = [waiting.popleft() if waiting else _IDLE for _ in lanes]
+            members = [waiting.popleft() if waiting else IDLE for _ in lanes]
             somebody = [max(member, 0) for member in members]
             integrator.state[:, lanes] = initial[:, somebody]
             if self._used:
@@ -218,21 +221,21 @@ class BatchEngine:
             for lane, member, there in zip(lanes, members, somebody, strict=True):
                 inside[lane], taken[lane] = member, 0
                 begun[lane] = high[lane] = start[there]
-                low[lane], target[lane] = 0.0, start[there] if member == _IDLE else end[there]
+                low[lane], target[lane] = 0.0, start[there] if member == IDLE else end[there]
             integrator.set_dtime(high, low)
 
         enter(list(range(width)))
         moments, targets = high.tolist(), target.tolist()
-        while any(member != _IDLE for member in inside):
+        while any(member != IDLE for member in inside):
             self._log.clear()
-            most = _until_next(moments, inside, targets, begun, taken, most_steps)
+            most = until_next(moments, inside, targets, begun, taken, most_steps)
             integrator.propagate_until(target, max_steps=most, max_delta_t=self._longest)
             outcomes = integrator.propagate_res
             high, low = (np.array(part) for part in integrator.dtime)
             moments = high.tolist()
             taken = [before + int(now[3]) for before, now in zip(taken, outcomes, strict=True)]
             for crossing in self._log:
-                if inside[crossing.lane] != _IDLE:
+                if inside[crossing.lane] != IDLE:
                     result.found.setdefault(inside[crossing.lane], []).append(crossing)
             if any(now[0] == _LOST for now in outcomes):
                 self._after_loss(result, inside, taken, outcomes, waiting)
@@ -241,7 +244,7 @@ class BatchEngine:
                 lanes = [
                     lane
                     for lane, member in enumerate(inside)
-                    if member != _IDLE and (moments[lane] == targets[lane] or taken[lane] >= most_steps)
+                    if member != IDLE and (moments[lane] == targets[lane] or taken[lane] >= most_steps)
                 ]
                 members = [inside[lane] for lane in lanes]
                 there = [moments[lane] == targets[lane] for lane in lanes]
@@ -259,7 +262,7 @@ class BatchEngine:
     ) -> None:
         """A state was lost, and all lanes have stopped: those beside it begin again."""
         for member, steps, outcome in zip(inside, taken, outcomes, strict=True):
-            if member == _IDLE:
+            if member == IDLE:
                 continue
             if outcome[0] == _LOST:
                 result.steps[member] = steps
@@ -271,6 +274,7 @@ class BatchEngine:
     def _together(
         self,
         result: Lanes,
+        states: np.ndarray,
         members: list[int],
         initial: np.ndarray,
         parameters: np.ndarray,
@@ -280,6 +284,9 @@ class BatchEngine:
     ) -> list[int]:
         """Run one group; those members whose state was lost, because of which the others have to be taken
         again.
+
+        Args:
+            states: (samples, states, width), which is filled; each member has the lane of its place.
         """
         integrator = self._integrator
         self._log.clear()
@@ -290,6 +297,8 @@ class BatchEngine:
         count = len(members)
         consecutive = members[-1] - members[0] == count - 1
         places: Any = slice(members[0], members[-1] + 1) if consecutive else members
+        begun = members[0] % self.width
+        lanes: Any = slice(begun, begun + count) if consecutive else [m % self.width for m in members]
         taken = np.zeros(count, dtype=np.int64)
         arrived, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
         first, begin, left = 0, start, most_steps
@@ -306,10 +315,11 @@ class BatchEngine:
                 arrived[:] = [now[0] == _ARRIVED for now in outcomes]
                 lost[:] = [now[0] == _LOST for now in outcomes]
             skipped = 0 if known else 1
-            result.states[first : first + len(part), :, places] = found[skipped:, :, :count]
+            states[first : first + len(part), :, lanes] = found[skipped:, :, :count]
             first, begin, left = first + _GRID, part[-1], most_steps - int(taken.max())
             if not arrived.all() or first >= len(times) or left <= 0:
                 break
+        states[first:, :, lanes] = np.nan
         result.steps[places], result.finite[places] = taken, ~lost
         result.arrived[places] = arrived & (first >= len(times))
         if self._log:
@@ -319,23 +329,3 @@ class BatchEngine:
             for member in members:
                 result.found.pop(member, None)
         return [member for member, gone in zip(members, lost.tolist(), strict=True) if gone]
-
-
-def _until_next(
-    moments: list[float],
-    inside: list[int],
-    targets: list[float],
-    begun: list[float],
-    taken: list[int],
-    most_steps: int,
-) -> int:
-    """Steps until about the first lane arrives at its pace so far, and those that arrive shortly after."""
-    expected = []
-    for lane, member in enumerate(inside):
-        if member == _IDLE:
-            continue
-        gone, left = moments[lane] - begun[lane], targets[lane] - moments[lane]
-        steps = _FIRST_STEPS if taken[lane] == 0 or gone <= 0 else int(left / gone * taken[lane]) + 2
-        expected.append(min(max(steps, _LEAST_STEPS), most_steps - taken[lane]))
-    first = min(expected)
-    return max(max(steps for steps in expected if steps <= first + _SHORTLY), 1)
