@@ -133,8 +133,8 @@ class Output(ConfigTable):
     )
     estimate: StrictBool = Field(
         default=True,
-        description="announce the errors of attitude and path; a few percent of the run, in batches of a sweep "
-        "about as much as its members",
+        description="announce the errors of attitude and path; a few percent of the run, in batches of "
+        "a sweep about as much as its members",
     )
     lyapunov: StrictBool = Field(
         default=False,
