@@ -176,19 +176,6 @@ class BatchEngine:
         self._integrator.propagate_until(end, max_steps=most_steps, max_delta_t=self._longest)
         return self._integrator.state, self._integrator.time
 
-    def step_error(
-        self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray, parts: int
-    ) -> np.ndarray:
-        """By how much a step of each lane differs from the same in so many parts, (states, width)."""
-        integrator = self._integrator
-        self._set(states, parameters, begin)
-        integrator.step()
-        whole, end = np.array(integrator.state), np.array(integrator.time)
-        self._set(states, parameters, begin)
-        integrator.propagate_until(end, max_steps=16 * parts, max_delta_t=np.abs(end - begin) / parts)
-        found: np.ndarray = whole - integrator.state
-        return found
-
     def _set(self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray) -> None:
         self._integrator.set_time(begin)
         self._integrator.state[:] = states

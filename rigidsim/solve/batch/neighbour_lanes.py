@@ -15,12 +15,6 @@ from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function
 
-_PARTS = 4
-"""Of a step, whose errors are a thousandth of its own or less: the power of 4 that is the series' order."""
-_LEAST_TOLERANCE, _ONE_ORDER = 1e-11, 7.4
-"""Whose errors in a step still stand out of rounding; others' are in proportion, which can be missed by what
-one order gains, exp(2)."""
-_ROUNDING = 16.0  # epsilons
 _PADDED = 64  # columns of a compiled function, so that their bits don't depend on their place
 _GROUPS = {
     "rates": ("wx", "wy", "wz"),
@@ -62,10 +56,6 @@ class NeighbourLanes:
             self.groups[row, places] = 1.0
         self.carried = attitude is not None
         self._attitude = attitude
-        asked, self._epsilon = traced.prepared.effective_tolerance, float(traced.prepared.precision.epsilon)
-        self._loose = asked > 2 * self._epsilon
-        self._tried = max(asked, _LEAST_TOLERANCE)
-        self._share = min(asked / self._tried * _ONE_ORDER, 1.0) / self._epsilon
 
     # --- what is compiled -----------------------------------------------------------------------------------
 
@@ -75,11 +65,6 @@ class NeighbourLanes:
         equations = list(zip(variables, rights, strict=True))
         count, compact = len(self._traced.in_equations), self._traced.system.wide
         return BatchEngine(BatchSystem(equations, [], count, tolerance, compact), self._width)
-
-    @cached_property
-    def _series(self) -> BatchEngine | None:
-        """Of the run's own tolerance, where that lets steps be wrong by more than rounding does."""
-        return self._engine(self._tried) if self._loose else None
 
     @cached_property
     def _slopes(self) -> Callable[..., np.ndarray]:
@@ -162,21 +147,14 @@ class NeighbourLanes:
                         group(np.array([lane]), steps)
         return found, times
 
-    def series_errors(
-        self, states: np.ndarray, parameters: np.ndarray, times: np.ndarray
-    ) -> np.ndarray | None:
-        """What the tolerance lets the step be wrong by that begins in each state, in epsilons, (states, n);
-        None where that isn't more than rounding.
+    def again(
+        self, initial: np.ndarray, parameters: np.ndarray, begin: np.ndarray, times: np.ndarray, most: int
+    ) -> np.ndarray:
+        """States (samples, states, n) of motions at their samples, nan from where one ended.
+
+        Args:
+            initial: (states, n); begin: (n,), times: (samples, n), internal units.
+            most: steps of each.
         """
-        if self._series is None:
-            return None
-        wrong, read = np.empty_like(states), parameters[self._traced.in_equations]
-        for first in range(0, states.shape[1], self._width):
-            some = np.arange(first, min(first + self._width, states.shape[1]))
-            lanes = np.resize(some, self._width)
-            wrong[:, some] = self._series.step_error(states[:, lanes], read[:, lanes], times[lanes], _PARTS)[
-                :, : len(some)
-            ]
-        wrong[np.abs(wrong) < _ROUNDING * self._epsilon * np.abs(states)] = 0.0
-        wrong[:, ~np.isfinite(wrong).all(axis=0)] = 0.0
-        return self._share * wrong
+        read = parameters[self._traced.in_equations]
+        return self._lanes.run(initial, read, begin, times, most).states

@@ -26,6 +26,8 @@ _LARGEST, _DRAWN_IN, _SATURATED, _NEARER = 2.0**-24, 2.0**-26, 2.0**-14, 2.0**-8
 stretch is gone through once more; and by how much nearer where it can't be shorter."""
 _CALM, _WILD = 8.0, 64.0
 """Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
+_EARLY = 0.25  # of the time
+_EPSILON = float(np.finfo(float).eps)
 _MOST_ROUNDS = 20_000
 _HOPELESS_STEPS = 32_768
 """More than were expected: the motion comes to no end."""
@@ -138,13 +140,11 @@ class _Following:
         """One stretch of some of them."""
         states, starts = len(self._state), self._starts
         before, clock, after = (random.standard_normal((states, 1, NEIGHBOURS)) for _ in range(3))
-        walk, steady = random.standard_normal((2, NEIGHBOURS))
         stride = self._stride[going]
         expected = np.clip(starts.steps[going] - self._taken[going], 1, stride)
         parameters = starts.parameters[:, going]
         kept = self._apart[:, going].copy()
-        series = self._lanes.series_errors(self._state[:, going], parameters, self._time[going])
-        self._push(going, expected / 2, before, series, walk)
+        self._push(going, expected / 2, before)
         begun = self._apart[:, going].copy()
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # neighbours' lasts for the stretch
@@ -181,7 +181,7 @@ class _Following:
             slopes[:, well],
         )
         some = going[well]
-        self._push(some, expected[well] / 2, after, None if series is None else series[:, well], steady)
+        self._push(some, expected[well] / 2, after)
         self._draw_in(some)
         self._note(some)
 
@@ -223,21 +223,10 @@ class _Following:
         self.spreads.whole[which[tired]] = False
         self.going[which] = (time < self._starts.end[which]) & ~tired
 
-    def _push(
-        self,
-        which: np.ndarray,
-        steps: np.ndarray,
-        normal: np.ndarray,
-        series: np.ndarray | None,
-        walk: np.ndarray,
-    ) -> None:
+    def _push(self, which: np.ndarray, steps: np.ndarray, normal: np.ndarray) -> None:
         """Errors of so many steps (members,)."""
-        pushed = self._pushes.own * np.sqrt(steps)[:, None] * self._sizes[:, which, None] * normal
-        if series is not None:
-            # one step stands for all of them: they add up, or walk where their errors change sign
-            times = steps[:, None] + np.sqrt(steps)[:, None] * walk
-            pushed = pushed + self._pushes.series * series[:, :, None] * times
-        self._add(which, pushed)
+        sizes = self._pushes.own * np.sqrt(steps)[:, None] * self._sizes[:, which, None]
+        self._add(which, sizes * normal)
 
     def _add(self, which: np.ndarray, pushed: np.ndarray) -> None:
         felt = np.where(self._lanes.felt[:, None, None], pushed, 0.0)
@@ -262,40 +251,53 @@ class _Following:
         return found
 
     def _note(self, which: np.ndarray) -> None:
-        lanes, places, spreads = self._lanes, self._lanes.places, self.spreads
-        state, apart, factor = self._state[:, which], self._apart[:, which], self._factor[which]
-        wrong = np.sqrt((apart**2).mean(axis=2)) / factor
-
-        def length(table: np.ndarray, group: str) -> np.ndarray:
-            return np.asarray(np.sqrt((table[places[group]] ** 2).sum(axis=0)))
-
-        def larger(row: np.ndarray, found: np.ndarray) -> None:
-            row[which] = np.maximum(row[which], found)
-
-        rates = places["rates"]
-        if rates:
-            units = self._starts.rate_units[:, which]
-            size = np.sqrt(((units * state[rates]) ** 2).sum(axis=0))
-            off = np.sqrt(((units * wrong[rates]) ** 2).sum(axis=0))
-            larger(spreads.rates, np.where(size > 0, off / np.maximum(size, 1e-300), 0.0))
-        parameters = self._starts.parameters[:, which]
-        if lanes.carried:
-            states = np.ascontiguousarray(state)
-            angles = [lanes.angles(states, apart[:, :, n], parameters) for n in range(NEIGHBOURS)]
-            larger(spreads.attitude, np.sqrt(np.mean(np.square(angles), axis=0)) / factor)
-        if places["position"]:
-            larger(spreads.position, length(wrong, "position"))
-            larger(spreads.velocity, length(wrong, "velocity"))
-            larger(spreads.extent, length(state, "position"))
-            larger(spreads.fastest, length(state, "velocity"))
+        lanes, spreads = self._lanes, self.spreads
+        apart = self._apart[:, which] / self._factor[which][:, None]
+        note(lanes, spreads, which, self._state[:, which], apart, self._starts.of(which))
         lead = (spreads.attitude if lanes.carried else spreads.rates)[which]
         whole = self._starts.end[which] - self._starts.begin[which]
         gone = (self._time[which] - self._starts.begin[which]) / np.maximum(whole, 1e-300)
-        spreads.early[which] = np.where(
-            (spreads.early[which] == 0) | (gone <= 0.25), lead, spreads.early[which]
-        )
+        soon = (spreads.early[which] == 0) | (gone <= _EARLY)
+        spreads.early[which] = np.where(soon, lead, spreads.early[which])
         over = lead >= self._lost
-        if places["position"]:
-            epsilon = np.finfo(float).eps
-            over &= spreads.position[which] * epsilon > spreads.extent[which]
+        if lanes.places["position"]:
+            over &= spreads.position[which] * _EPSILON > spreads.extent[which]
         self.going[which[over]] = False
+
+
+def note(
+    lanes: NeighbourLanes,
+    spreads: Spreads,
+    which: np.ndarray,
+    state: np.ndarray,
+    apart: np.ndarray,
+    starts: Starts,
+) -> None:
+    """Take down how far some members are from others, where that is more than before.
+
+    Args:
+        which: of those that spreads are of.
+        state: (states, n); apart: (states, n, others).
+        starts: of the same n.
+    """
+    places, wrong = lanes.places, np.sqrt((apart**2).mean(axis=2))
+
+    def length(table: np.ndarray, group: str) -> np.ndarray:
+        return np.asarray(np.sqrt((table[places[group]] ** 2).sum(axis=0)))
+
+    def larger(row: np.ndarray, found: np.ndarray) -> None:
+        row[which] = np.maximum(row[which], found)
+
+    rates = places["rates"]
+    if rates:
+        size, off = (np.sqrt(((starts.rate_units * x[rates]) ** 2).sum(axis=0)) for x in (state, wrong))
+        larger(spreads.rates, np.where(size > 0, off / np.maximum(size, 1e-300), 0.0))
+    if lanes.carried:
+        there = np.ascontiguousarray(state)
+        angles = [lanes.angles(there, apart[:, :, n], starts.parameters) for n in range(apart.shape[2])]
+        larger(spreads.attitude, np.sqrt(np.mean(np.square(angles), axis=0)))
+    if places["position"]:
+        larger(spreads.position, length(wrong, "position"))
+        larger(spreads.velocity, length(wrong, "velocity"))
+        larger(spreads.extent, length(state, "position"))
+        larger(spreads.fastest, length(state, "velocity"))

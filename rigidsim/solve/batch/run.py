@@ -51,6 +51,8 @@ class BatchBlock:
         members: which of the sweep's they are, (m,).
         places: of these in the numbers that they were run from, (m,).
         times: seconds, (samples,).
+        start: (m,), moments: of the samples, (samples, m), each member's internal unit of time.
+        states: of the motion, (samples, states, m), internal units.
         values: of the recorded variables, (samples, m, components), SI; NaN from where a member ended.
         drifts: by the names of the invariants, (samples, m).
         status: how each ended, (m,) objects; None where a lane gave up and the member is to be run by itself.
@@ -65,6 +67,9 @@ class BatchBlock:
     members: np.ndarray
     places: np.ndarray
     times: np.ndarray
+    start: np.ndarray
+    moments: np.ndarray
+    states: np.ndarray
     values: Values
     drifts: Values
     status: np.ndarray
@@ -128,6 +133,9 @@ class BatchRun:
             members,
             part,
             self._traced.prepared.clock.labels(0, len(times)),
+            start,
+            times,
+            lanes.states,
             values,
             drifts,
             self._status(lanes, most),
