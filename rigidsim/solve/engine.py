@@ -20,6 +20,7 @@ class Integrator(Protocol):
         time, dtime: where it stands, internal units; the second as two numbers whose sum it is.
         state: (states,), a view that can be assigned to; pars: likewise, up to the last that is read.
         order: of the Taylor series; tol: their tolerance.
+        tc: (states, order + 1), Taylor coefficients of the latest step that was asked to keep them.
         decomposition: terms that a step's derivatives are made of.
     """
 
@@ -29,6 +30,7 @@ class Integrator(Protocol):
     pars: np.ndarray
     order: int
     tol: Scalar
+    tc: np.ndarray
     decomposition: list[Any]
 
     def step(self, max_delta_t: Scalar, *, write_tc: bool = False) -> tuple[Any, Scalar]:

@@ -7,7 +7,7 @@ several surfaces are resolved where their parts of the field add up: f = base + 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import permutations
 
 import heyoka as hy
@@ -34,9 +34,22 @@ class Sliding:
     sides: list[Symbolic]
 
 
-def sliding(system: System, along: Sequence[int]) -> Sliding:
-    """The equations of a system along surfaces of these numbers."""
+def sliding(
+    system: System, along: Sequence[int], held: Mapping[int, tuple[int, int]] | None = None
+) -> Sliding:
+    """The equations of a system along surfaces of these numbers.
+
+    Args:
+        held: surfaces that are kept to as well: the one whose side each has, and 1 for the same or -1 for the
+            opposite.
+    """
     fields = {name: right for name, (_, right) in zip(system.states, system.equations, strict=True)}
+    if held:
+        tied = {hy.par[i]: float(sign) * hy.par[m] for i, (m, sign) in held.items()}
+        fields = {
+            name: hy.subs(right, tied) if _reads(right, list(held)) else right
+            for name, right in fields.items()
+        }
 
     def at(sides: dict[int, float]) -> dict[str, Symbolic]:
         values = {hy.par[j]: hy.expression(s) for j, s in sides.items()}

@@ -8,6 +8,7 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -22,6 +23,9 @@ from rigidsim.solve.engine import Integrator
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 
+_SPARSE = 1.5
+"""How much longer a step may be by the last two terms than by those before, in proportion to an exponential's
+terms: 1.5^20 is three digits."""
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
@@ -46,6 +50,33 @@ def longest_step(order: int, number: type) -> float:
     if not issubclass(number, np.floating):  # quadruple and beyond: of far more than a thousand exponents
         return 2.0**_LONGEST_BITS
     return 2.0 ** min(_LONGEST_BITS, (np.finfo(number).maxexp - _SPARE_BITS) // order)
+
+
+def bound_of_sparse_series(coefficients: np.ndarray) -> float:
+    """How long a step may be by all Taylor coefficients of a state, where that is far less than by the last
+    two, from which the engine tells its length; infinity elsewhere.
+
+    From rest under a torque that grows with time, a quaternion's series have every third term only: the last
+    two are zero, and the engine would take any step at all.
+
+    Args:
+        coefficients: (states, order + 1), of any step from there.
+    """
+    sizes = [max(abs(float(x)) for x in column) for column in coefficients.T]
+    order, base = len(sizes) - 1, max(sizes[0], 1.0)  # the engine's errors are absolute below 1
+
+    def radius(term: int) -> float:
+        return (base / sizes[term]) ** (1 / term) if sizes[term] > 0 else math.inf
+
+    def of_entire(term: int) -> float:  # terms of an exponential, which is what a rotation's are like
+        return math.exp(math.lgamma(term + 1) / term)
+
+    terms = range(order // 2 + 1, order - 1)
+    shortest = min((radius(m) for m in terms), default=math.inf)
+    expected = min((radius(m) * of_entire(order) / of_entire(m) for m in terms), default=math.inf)
+    if min(radius(order), radius(order - 1)) <= _SPARSE * expected:
+        return math.inf
+    return shortest * math.exp(-2 - 0.7 / (order - 1))  # as heyoka's own (Jorba & Zou 2005)
 
 
 @dataclass(frozen=True)
@@ -129,6 +160,7 @@ class Stepper:
         bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
         self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
         self._longest = self._bounds[0]
+        self._bound_first_step()
         self.steps = 0
         self.smallest = self.largest = 0.0
         self.failure = ""
@@ -136,6 +168,23 @@ class Stepper:
         self.unresolved = False
         self._tiny = 0
         self._epsilon = float(precision.epsilon)
+
+    def _bound_first_step(self) -> None:
+        """Of a motion whose series at its start have gaps where the engine looks, from rest for instance: no
+        step is longer than these allow.
+        """
+        engine, muted = self._integrator, self.log.muted
+        if self.single_steps or self.cuts_steps or self.system.plan.paired:  # which see to it themselves
+            return
+        time, state = engine.dtime, np.array(engine.state)
+        self.log.muted = True
+        engine.step(self._longest, write_tc=True)
+        self.log.muted = muted
+        bound = bound_of_sparse_series(engine.tc)
+        engine.dtime = time
+        engine.state[:] = state
+        if bound < float(self._longest):
+            self._bounds[0] = self._longest = self.precision.of_double(bound)
 
     def settle(self) -> None:
         """Take note that the state was set from outside."""

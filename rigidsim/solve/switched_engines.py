@@ -7,7 +7,8 @@ equations of its own, which are compiled when they are first needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -20,9 +21,10 @@ from rigidsim.solve.engine import Integrator
 from rigidsim.solve.event_units import of_order_one
 from rigidsim.solve.events import BESIDE, EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.resting import Meeting
 from rigidsim.solve.sliding import sliding
 from rigidsim.solve.stepper import Mark, Stepper
-from rigidsim.solve.switching import SLIDES, Look, Probe, continued
+from rigidsim.solve.switching import HELD, SLIDES, Choice, Look, Probe, continued
 
 _BISECTIONS = 4  # of a step for each bit of the precision
 
@@ -45,7 +47,7 @@ class SwitchedEngines(Stepper):
     ) -> None:
         self._roots: list[Root] = []
         self._probes: dict[int, Probe] = {}
-        self._slid: dict[tuple[int, tuple[int, ...]], Integrator] = {}
+        self._slid: dict[tuple[int, tuple[int, ...], tuple[int, ...]], Integrator] = {}
         self._chart = 0
         surfaces = system.plan.surfaces
         self._modes = [1] * len(surfaces.found)
@@ -68,6 +70,15 @@ class SwitchedEngines(Stepper):
     @property
     def _along(self) -> tuple[int, ...]:
         return tuple(j for j, mode in enumerate(self._modes) if mode == SLIDES)
+
+    @property
+    def _held(self) -> dict[int, tuple[int, int]]:
+        """Surfaces kept to at rest: the one whose side each has, and whether that or the opposite."""
+        return {
+            j: (abs(mode) - HELD, 1 if mode > 0 else -1)
+            for j, mode in enumerate(self._modes)
+            if abs(mode) >= HELD
+        }
 
     @property
     def _probe(self) -> Probe:
@@ -109,12 +120,15 @@ class SwitchedEngines(Stepper):
 
     def _enter(self) -> None:
         """Go on with the equations of this chart along these surfaces."""
-        key = self._chart, self._along
+        key = self._chart, self._along, tuple(self._modes[j] for j in self._held)
         if key not in self._slid:
             system = self.system if self._chart == 0 else self.system.partner
             assert system is not None
-            first = key == (0, ()) and hasattr(self, "_integrator")
-            compiled = self._integrator if first else interruptible(lambda: self._compiled(system, key[1]))
+            first = key == (0, (), ()) and hasattr(self, "_integrator")
+            along, held = self._along, self._held
+            compiled = (
+                self._integrator if first else interruptible(lambda: self._compiled(system, along, held))
+            )
             self._slid[key] = compiled
         entered = self._slid[key]
         if entered is not self._integrator:
@@ -122,17 +136,20 @@ class SwitchedEngines(Stepper):
             entered.state[:] = self._integrator.state
             self._integrator = entered
 
-    def _compiled(self, system: System, along: tuple[int, ...] = ()) -> Integrator:
+    def _compiled(
+        self, system: System, along: tuple[int, ...] = (), held: Mapping[int, tuple[int, int]] | None = None
+    ) -> Integrator:
+        held = held or {}
         options = dict(self.precision.options)
         equations, kind = system.equations, self.precision.scalar
         shifted = [u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
         events = [
             hy.nt_event(u, self._noting(j), fp_type=kind)
             for j, u in enumerate(of_order_one(system, shifted, system.surfaces))
-            if j not in along
+            if j not in along and j not in held
         ]
         if along:
-            found = sliding(system, along)
+            found = sliding(system, along, held)
             equations = found.equations
             for j, side in zip(along, found.sides, strict=True):
                 for end, way in ((1, hy.event_direction.positive), (-1, hy.event_direction.negative)):
@@ -151,7 +168,7 @@ class SwitchedEngines(Stepper):
             compact_mode=self.precision.compact or system.wide or len(along) > 1,
             **options,
         )
-        self._slid[(self._chart, along)] = integrator
+        self._slid[(self._chart, along, tuple(self._modes[j] for j in held))] = integrator
         return integrator
 
     def _noting(self, j: int, end: int = 0) -> Callable[[Integrator, Scalar, int], None]:
@@ -163,7 +180,8 @@ class SwitchedEngines(Stepper):
     # --- parameters -----------------------------------------------------------------------------------------
 
     def _pars(self, turns: list[float], sign: float, over: dict[int, int] | None = None) -> np.ndarray:
-        sides = [float((over or {}).get(j, mode) or 1) for j, mode in enumerate(self._modes)]
+        modes = [(over or {}).get(j, mode) or 1 for j, mode in enumerate(self._modes)]
+        sides = [math.copysign(1.0, mode) for mode in modes]
         numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
         return self._array(numbers)
 
@@ -215,7 +233,8 @@ class SwitchedEngines(Stepper):
         moved = []
         for j, mode in enumerate(self._modes):  # what a unit of time makes of the state tells its size
             noise = self._probe.noise(look, j, [self.state, look.field])
-            moved.append(mode * noise if abs(float(look.u[j])) <= noise else 0.0)
+            near = abs(float(look.u[j])) <= noise and abs(mode) < HELD
+            moved.append(mode * noise if near else 0.0)
         if self.has_events:
             moved += [self._beside(*found) for found in self._probe.crossings(self.state, self.time, pars)]
         offsets = self._array(moved)
@@ -228,11 +247,30 @@ class SwitchedEngines(Stepper):
             return 2 * noise
         return 2.0 ** (-self.precision.bits - BESIDE) if self._fresh and value == 0 else 0.0
 
+    def _at_rest(self, on: list[int], look: Look) -> Choice | None:
+        """How to go on where swings about the meeting of two surfaces have come down to rounding."""
+        small = [
+            i
+            for i, mode in enumerate(self._modes)
+            if i in on
+            or abs(mode) >= HELD
+            or abs(float(look.u[i])) <= self._probe.swing_noise(look, i, self.state)
+        ]
+        if len(small) < 2:
+            return None
+
+        def at(sides: Mapping[int, int], state: np.ndarray, time: Scalar) -> Look:
+            return self._probe.look(state, time, self._parameters(dict(sides)))
+
+        meeting = Meeting(at, self._probe, np.array(self.state), self.time, self._epsilon)
+        kept = {j: self._modes[j] for j in (*self._along, *self._held)}
+        return meeting.rest(sorted({*small, *kept}), kept)
+
     def _keep_to_surfaces(self) -> None:
         """Take off what rounding moved the state away from the surfaces that it slides along."""
         state = self._integrator.state
         look = self._look(state, self.time)
-        for j in self._along:
+        for j in (*self._along, *self._held):
             gradient = look.gradients[j]
             square = sum((g * g for g in gradient), gradient[0] * 0)
             if square != 0:

@@ -22,6 +22,9 @@ from rigidsim.solve.precision import Precision, Scalar
 
 SLIDES = 0
 """In the place of a side, 1 or -1."""
+HELD = 2
+"""In the place of a side: of a surface that the motion keeps to while it slides along surface number m, whose
+side it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.resting``."""
 _ROUNDINGS = 32.0  # of the terms of an argument, below which it is zero
 _RATE_ROUNDINGS = 1024.0  # of the terms of its rate, which are products of derivatives
 
@@ -112,6 +115,13 @@ class Probe:
     def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
         """Below which an argument is zero, as far as rounding lets it be known."""
         return _ROUNDINGS * self._epsilon * look.size(j, states)
+
+    def swing_noise(self, look: Look, j: int, state: np.ndarray) -> float:
+        """Likewise where it is the small difference of states of order one, as swings are that come to rest:
+        what is left of them then is rounding's.
+        """
+        gradient = math.hypot(*(float(x) for x in look.gradients[j]))
+        return _ROUNDINGS * self._epsilon * gradient * max(abs(float(x)) for x in state)
 
     def rate_noise(self, look: Look, j: int) -> float:
         """Likewise of its rate."""

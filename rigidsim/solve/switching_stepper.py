@@ -17,8 +17,9 @@ from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sliding import MOST_AT_ONCE
+from rigidsim.solve.stepper import bound_of_sparse_series
 from rigidsim.solve.switched_engines import Root, SwitchedEngines
-from rigidsim.solve.switching import SLIDES, Choice, Fields, Look
+from rigidsim.solve.switching import HELD, SLIDES, Choice, Fields, Look
 
 _ATTEMPTS = 32  # at one step
 _MOST_SWITCHES = 256
@@ -91,7 +92,8 @@ class SwitchingStepper(SwitchedEngines):
     def settle(self) -> None:
         """Take note that the state was set from outside: sides are those that it lies on."""
         self._roots.clear()
-        self._modes = [mode or 1 for mode in self._modes]  # it lies beside surfaces that it slid along
+        # it lies beside surfaces that it kept to
+        self._modes = [mode if abs(mode) == 1 else 1 for mode in self._modes]
         self._agree()
         self._enter()
 
@@ -109,6 +111,13 @@ class SwitchingStepper(SwitchedEngines):
             time, before = begun.dtime, np.array(begun.state)
             self._roots.clear()
             outcome, size = begun.step(longest, write_tc=True)
+            bound = bound_of_sparse_series(begun.tc) if self._fresh or not self.steps else np.inf
+            if bound < abs(float(size)):
+                log.back_to(events)
+                self._roots.clear()
+                begun.dtime = time
+                begun.state[:] = before
+                outcome, size = begun.step(self.precision.of_double(bound), write_tc=True)
             if outcome == hy.taylor_outcome.err_nf_state:
                 return False, False
             natural = abs(float(size))
@@ -192,7 +201,7 @@ class SwitchingStepper(SwitchedEngines):
                 return roots[n]
         values = self._values(after, end)
         for j, mode in enumerate(self._modes):
-            if mode * float(values[j]) >= 0:
+            if abs(mode) >= HELD or mode * float(values[j]) >= 0:
                 continue
             look = self._look(after, end)
             if -mode * float(look.u[j]) <= self._probe.noise(look, j, states):
@@ -214,7 +223,7 @@ class SwitchingStepper(SwitchedEngines):
             if abs(float(look.u[j])) <= self._probe.noise(look, j, [self.state])
         ]
         if on:
-            choice = self._chosen(on)
+            choice = self._at_rest(on, look) or self._chosen(on)
             if choice.modes is None:
                 self._fail(on[0], f"the motion starts there, and {choice.why}")
                 self._unsettled = self.failure
@@ -239,14 +248,17 @@ class SwitchingStepper(SwitchedEngines):
             return self._fail(j, f"its sides changed more than {_MOST_SWITCHES} times in almost no time")
         if self._modes[j] == SLIDES:
             self._modes[j] = side
+            for i, (by, sign) in self._held.items():
+                if by == j:
+                    self._modes[i] = sign * side
             self._enter()
             return True
         look = self._look(self.state, self.time)
-        on = [j, *self._along]
+        on = [j, *self._along, *self._held]
         for i in range(len(self._modes)):
             if i not in on and abs(float(look.u[i])) <= self._probe.noise(look, i, states):
                 on.append(i)
-        choice = self._chosen(on, hint=(j, side))
+        choice = self._at_rest(on, look) or self._chosen(on, hint=(j, side))
         if choice.modes is None:
             return self._fail(j, choice.why)
         self._take(choice)
@@ -261,7 +273,7 @@ class SwitchingStepper(SwitchedEngines):
             for j, mode in enumerate(self._modes):
                 u = float(look.u[j])
                 beyond = mode * u < 0 and abs(u) > self._probe.noise(look, j, [self.state])
-                if beyond and j not in known:
+                if beyond and j not in known and abs(mode) < HELD:
                     self._modes[j], changed = -mode, True
             if not changed:
                 break

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import heyoka as hy
 import numpy as np
 import pytest
 from support import config, run_text
 
-from rigidsim.solve.stepper import longest_step
+from rigidsim.solve.stepper import bound_of_sparse_series, longest_step
 
 THROWN = config(
     "principal_moments = [1, 1, 1]\nmass = 1",
@@ -55,3 +57,36 @@ def test_powers_of_the_longest_step_up_to_the_order_are_numbers(number: type, or
     longest = longest_step(order, number)
     assert np.isfinite(number(longest) ** order)
     assert 1.0 < longest <= longest_step(2, np.longdouble) == longest_step(400, hy.real128) == 2.0**30
+
+
+@pytest.mark.parametrize("power", [1, 4])
+def test_a_series_with_gaps_bounds_the_step(power: int) -> None:
+    """From rest under k t^n a quaternion has every (n + 2)th term: where those are neither of the last two,
+    the engine would take all in one step (4e-6 rad off by t = 4).
+    """
+    end, k = 4.0, 0.1
+    turned = k * end ** (power + 2) / ((power + 1) * (power + 2))
+    text = config(
+        "principal_moments = [1, 1, 1]",
+        "angular_velocity = [0, 0, 0]",
+        f'kind = "torque"\ncomponents = ["0", "0", "{k}*t^{power}"]',
+        f"end = {end}\nsamples = 3",
+    )
+    sparse, dense = run_text(text), run_text(text, "time.samples=2001")
+    quaternion = sparse.dataset["quaternion"].values
+    assert (quaternion == dense.dataset["quaternion"].values[::1000]).all()  # whichever way it goes
+    exact = np.array([math.cos(turned / 2), 0, 0, math.sin(turned / 2)])
+    # roundings of a few steps, and of an angle of some turns
+    steps = sparse.summary["cost"]["steps"]
+    assert np.abs(quaternion[-1] - exact).max() < 8 * 2.0**-52 * max(turned, 1.0) * math.sqrt(steps)
+
+
+def test_all_other_series_are_left_alone() -> None:
+    """Those that end, those of a turning body, and those of a pole."""
+    order = np.arange(21)
+    turning = np.array([[0.5**m / math.factorial(m) for m in order]])
+    assert bound_of_sparse_series(turning) == math.inf
+    assert bound_of_sparse_series(np.array([2.0**-order])) == math.inf
+    assert bound_of_sparse_series(np.where(order < 3, 1.0, 0.0)[None, :]) == math.inf
+    gaps = np.where(order % 3 == 0, 2.0**-order, 0.0)[None, :]
+    assert bound_of_sparse_series(gaps) == pytest.approx(2 * math.exp(-2 - 0.7 / 19))

@@ -145,7 +145,7 @@ def test_each_side_integrates_by_itself(torque: str, rate: float) -> None:
     [
         ("0.3*sign(wz)", REST, "isn't unique"),  # from rest to either side
         (
-            "-sign(wrap(psi - 1)) - 0.3*sign(wz)",
+            "-sign(wrap(psi - 1)) - 0.3*sign(wz)*(1 + 0.1*sign(wrap(psi - 1)))",
             "angular_velocity = [0, 0, 0.5]\n" + TILTED.split("\n")[1],
             "almost no time",
         ),
