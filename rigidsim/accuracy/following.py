@@ -115,7 +115,7 @@ def _follow(
             soon * steps < OWN_UNTIL / 2
             and go_on()
             and not neighbours.all_lost(course.lost)
-            and _suspicious(spread, start, carried, margins.exponential)
+            and _suspicious(spread, start, carried, margins.most_power)
         ):
             soon += OWN_FIRST / steps
             neighbours.follow(course.at(soon), go_on, course.lost)
