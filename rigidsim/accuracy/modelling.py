@@ -281,7 +281,8 @@ def _followed(
     """Steps, and what was asked for at all samples; None where the motion doesn't get there."""
     config = scene.config
     model = config.model.model_copy(update={"level": level, "short_period": short_period and level != FULL})
-    integrator = config.integrator.model_copy(update={"precision": "double", "tolerance": "auto"})
+    plain = {"precision": "double", "tolerance": "auto", "hold_invariants": False}
+    integrator = config.integrator.model_copy(update=plain)
     output = config.output.model_copy(update={"record": names, "lyapunov": False, "timeline": False})
     changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
     problem = compactly(prepare_scene(prepared.experiment, replace(scene, config=changed)))

@@ -86,7 +86,7 @@ def _print_ended(summary: Summary, on: Page) -> None:
     how = f"tolerance {summary.tolerance:.3g}"
     if summary.method == "closed_form":
         how = "in closed form"
-    if summary.hold_invariants:
+    if summary.held:
         how += ", invariants projected" + _from_step(summary.hold_from_step)
     on.line(
         "model",
@@ -108,7 +108,7 @@ def _print_ended(summary: Summary, on: Page) -> None:
         on.line("CPU", ", ".join(spent))
     _print_invariants(summary, on)
     on.line("drifts", "relative to: " + _scales(summary.invariants))
-    if summary.hold_invariants:
+    if summary.held:
         on.line("held", "put back: what the drift would have been; held drifts are no independent check")
     _print_accuracy(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
     _print_modelling(summary.modelling, on)
@@ -155,7 +155,7 @@ def _words(summary: Summary) -> TimeWords:
 
 def _print_invariants(summary: Summary, on: Page) -> None:
     """Where it doesn't fit, without the last drifts, which say least."""
-    held = ["put back"] if summary.hold_invariants else []
+    held = ["put back"] if summary.held else []
     columns = ["invariant", "initial", "largest drift", "final", "bound", *held]
     rows: list[list[Styled]] = []
     for name, row in summary.invariants.items():

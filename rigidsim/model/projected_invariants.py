@@ -74,6 +74,11 @@ _SQUARES: dict[str, tuple[Callable[[Mechanics], list[Symbolic]], int]] = {
 }
 
 
+def conserves(system: System) -> bool:
+    """Whether any of the invariants that are projected is one of the motion, not of its numbers alone."""
+    return any(not found.numerical and found.name not in _NEVER for found in system.invariants)
+
+
 def projected_invariants(system: System) -> tuple[list[ProjectedScalar], list[tuple[str, str]]]:
     """The scalars to project, and (invariant, why) for those that are not projected themselves.
 

@@ -38,7 +38,7 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
     if not prepared.holds_invariants and found.progress.steps >= _LONG and now > _WORTH * held:
         advice.append(Advice(code=AdviceCode.HOLD_INVARIANTS.value, now=now, then=held))
     exact = CLOSED_FORM * float(prepared.precision.epsilon)
-    stepped = bool(config.events) or config.output.lyapunov or prepared.holds_invariants
+    stepped = bool(config.events) or config.output.lyapunov or config.integrator.hold_invariants is True
     if not stepped and now > _FAR * exact:
         advice.append(Advice(code=AdviceCode.CLOSED_FORM.value, now=now, then=exact))
     return tuple(advice)

@@ -57,7 +57,7 @@ def root_attributes(
         else prepared.closed.title,
         method=scene.config.integrator.method,
         hold_invariants=int(prepared.holds_invariants),
-        hold_from_step=None if prepared.late is None else LATE,
+        hold_from_step=LATE if prepared.holds_late else None,
         taylor_order=int(stepper.integrator.order),
         compact_mode=int(prepared.precision.compact or system.wide),
         high_accuracy=0,
@@ -109,7 +109,7 @@ def of_complete(
         wall_seconds=effort.wall,
         cpu_seconds=effort.cpu,
         finished_at=provenance.now(),
-        put_back=json.dumps(put_back) if summary.hold_invariants else None,
+        put_back=json.dumps(put_back) if summary.held else None,
         attitude_error=summary.accuracy.estimated_attitude_error,
         angles_wrapped_from=None if math.isnan(angles_wrapped_from) else angles_wrapped_from,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from rigidsim.errors import VIEW, StoppedWritingError
@@ -35,6 +35,7 @@ class Completion:
     Attributes:
         summary: all but the files' digests at first; replaced as they become known.
         extras: variables with dimensions of their own.
+        unused: names of variables along time that the dataset needn't have.
     """
 
     prepared: InitialValueProblem
@@ -47,6 +48,7 @@ class Completion:
     phases: Phases
     effort: Effort
     observer: Observer
+    unused: Collection[str]
     summary: Summary
 
     def complete(self) -> Summary:
@@ -81,6 +83,7 @@ class Completion:
             self.folder.dataset,
             self._attributes().as_dict(),
             self.extras,
+            unused=self.unused,
             checkpoint=checkpoint,
             conclude=self._conclude,
         )

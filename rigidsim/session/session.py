@@ -17,7 +17,7 @@ from rigidsim.session.restore import restore
 from rigidsim.session.summary import chart_changes, closing_words, cost_so_far, summarise, time_reached
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.tuning import Tuning
-from rigidsim.session.variables import dataset_variables
+from rigidsim.session.variables import dataset_variables, unused_variables
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.status import Status
@@ -146,7 +146,9 @@ class Session:
             from rigidsim.session.lyapunov import lyapunov_variables
 
             extras += lyapunov_variables(spectrum)
+        unused = unused_variables(prepared, progress.steps)
         if isinstance(writer, MemoryWriter):
+            variables = [variable for variable in variables if variable.name not in unused]
             wrapped_from = recorder.statistics.angles_wrapped_from
             ended = of_complete(attributes, summary, self.effort, wrapped_from)
             return MemoryRun(summary, variables, writer.blocks, extras, ended.as_dict())
@@ -154,7 +156,7 @@ class Session:
         if progress.status.final:
             summary = Completion(
                 prepared, folder, writer, recorder, loop, attributes, extras, clock, self.effort,
-                self.observer, summary,
+                self.observer, unused, summary,
             ).complete()  # fmt: skip
         summary = summary.having(cost=cost_so_far(prepared, progress, clock, self.effort))
         folder.write_summary(summary)

@@ -12,6 +12,7 @@ import numpy as np
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words
+from rigidsim.session.variables import unused_variables
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
@@ -87,7 +88,7 @@ def summarise(
         cost=cost,
         method=scene.config.integrator.method,
         hold_invariants=prepared.holds_invariants,
-        hold_from_step=None if prepared.late is None else LATE,
+        hold_from_step=LATE if prepared.holds_late else None,
         invariants=_invariants(found, initial),
         accuracy=_accuracy(found),
         modelling=_modelling(found),
@@ -192,6 +193,7 @@ def chart_changes(prepared: InitialValueProblem, corrected: CorrectedStepper) ->
 
 def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[str, Invariant]:
     statistics, table = found.statistics, {}
+    held = not unused_variables(found.prepared, found.progress.steps)
     for invariant in found.prepared.system.invariants:
         name, values = invariant.name, initial[invariant.name]
         table[name] = Invariant(
@@ -202,7 +204,7 @@ def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[
             largest_drift=statistics.largest.get(name),
             final_drift=statistics.final.get(name),
             bound=found.drift_bound,
-            put_back=statistics.put_back.get(name),
+            put_back=statistics.put_back.get(name) if held else None,
             why=invariant.why,
             numerical=invariant.numerical,
         )

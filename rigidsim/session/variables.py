@@ -9,6 +9,7 @@ from typing import Any
 from rigidsim.model.outputs import Invariant
 from rigidsim.session.dates import Dates
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.projection import LATE
 from rigidsim.store.variables import Variable, time_variable
 
 LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
@@ -42,6 +43,17 @@ def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
     beside = " ".join(name for variable in dates.variables for name in variable.part_names())
     dated = [replace(v, attributes={**v.attributes, "coordinates": beside}) for v in found]
     return [time, *dates.variables, *dated]
+
+
+def unused_variables(prepared: InitialValueProblem, steps: int) -> set[str]:
+    """What was put back, where a run that is to project from a count of steps on has ended before.
+
+    Args:
+        steps: that it took.
+    """
+    if not prepared.holds_late or steps > LATE:
+        return set()
+    return {put_back_name(name) for name in prepared.projected_scalars}
 
 
 def dates_of(prepared: InitialValueProblem) -> Dates | None:

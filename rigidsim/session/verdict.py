@@ -59,7 +59,7 @@ def _soundness(summary: Summary, share: float | None) -> Soundness:
         return Soundness.LOST
     if share is None:
         return Soundness.UNCHECKED
-    if summary.hold_invariants:
+    if summary.held:
         return Soundness.HELD
     amplification = summary.accuracy.amplification
     return Soundness.AMPLIFIED if amplification is not None and amplification > 1 else Soundness.SOUND

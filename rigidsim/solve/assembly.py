@@ -62,9 +62,9 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     stepper = stepper_of(system, precision, prepared.tolerance, start, log)
     projection = None
     if prepared.holds_invariants:
-        projection = Projection(system, precision, start, late=prepared.late is not None)
-        stepper.held_system = prepared.late
-    interval = steps_between(precision)
+        projection = Projection(system, precision, start, late=prepared.holds_late)
+        stepper.held_system = prepared.held_system if prepared.holds_late else None
+    interval = steps_between(precision, late=prepared.holds_late)
     corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
     countable = not system.turning  # from samples alone nobody can tell what such a load does
     if prepared.closed is not None:

@@ -18,9 +18,10 @@ import numpy as np
 
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import STEPS_BETWEEN, AngleState, AngleWrapping
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.charts import Charts
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.projection import LATE, Projection
+from rigidsim.solve.projection import LATE, NOTED, Projection
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.trail import Waypoints
@@ -83,6 +84,7 @@ class CorrectedStepper:
         self.projection = projection
         self._plain_stride = min(stride, STEPS_BETWEEN) if wrapping.positions else stride
         self._held_stride = min(self._plain_stride, projection_interval)
+        self._projection_interval = max(projection_interval // self._held_stride, 1) * self._held_stride
         self.whole_times = not (stepper.has_events or stepper.single_steps or stepper.cuts_steps)
         self._stuck = False
         self.waypoints = Waypoints()
@@ -208,14 +210,16 @@ class CorrectedStepper:
             self._note()
 
     def _project(self, projection: Projection) -> None:
-        state, time = self.stepper.state, self.stepper.time
+        state, time, steps = self.stepper.state, self.stepper.time, self.stepper.steps
         if projection.holding:
-            projection.project(state, time)
-        elif self.stepper.steps < LATE:
-            projection.observe(state, time)
-        else:
+            if not self.stepper.held or steps % self._projection_interval == 0:
+                projection.project(state, time)
+        elif steps >= LATE:
+            interruptible(projection.load)
             projection.begin(state, time)
             self.stepper.hold(True)
+        elif steps % NOTED == 0:
+            projection.note(state, time, steps // NOTED - 1)
 
     def _note(self) -> None:
         stepper, chart = self.stepper, 0 if self.charts is None else self.charts.chart

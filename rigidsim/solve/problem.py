@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.model.load import Load
-from rigidsim.model.projected_invariants import projected_invariants
+from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
@@ -53,7 +53,7 @@ class InitialValueProblem:
     Attributes:
         tolerance: scalar of the precision, or None for its epsilon; "auto" is either of these.
         python_loads: loads given from Python, of which the config knows nothing.
-        late: the system to go on with where invariants are projected from a count of steps on.
+        holds_late: whether invariants are projected from a count of steps on.
         closed: the solution in closed form, where the samples are to come from it.
     """
 
@@ -65,12 +65,16 @@ class InitialValueProblem:
     tolerance: Scalar | None
     python_loads: tuple[Load, ...] = ()
     closed: ClosedForm | None = None
-    late: System | None = None
+    holds_late: bool = False
 
     @property
     def holds_invariants(self) -> bool:
         """Whether invariants are projected along the way."""
-        return self.scene.config.integrator.hold_invariants is True or self.late is not None
+        return self.scene.config.integrator.hold_invariants is True or self.holds_late
+
+    def held_system(self) -> System:
+        """What to go on with where they are from a count of steps on."""
+        return projected_system(self.system, self.precision)
 
     @cached_property
     def projected_scalars(self) -> tuple[str, ...]:
@@ -146,11 +150,11 @@ def prepare_scene(
         if loads:
             _refuse_non_finite_start(system, precision)
         closed = _closed_form(scene, system, driven=bool(loads))
-        late = None
+        late = False
         if scene.config.integrator.hold_invariants is True:
             system = projected_system(system, precision)
-        elif scene.config.integrator.hold_invariants and closed is None and _can_hold(system):
-            late = projected_system(system, precision)
+        elif scene.config.integrator.hold_invariants and closed is None:
+            late = _is_worth_holding(system)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
         prepared = InitialValueProblem(
             experiment, scene, precision, system, clock, step_control, tuple(loads), closed, late
@@ -173,19 +177,15 @@ def prepare_scene(
     return prepared
 
 
-def _can_hold(system: System) -> bool:
-    """Whether ``hold_invariants = "auto"`` means anything: not where nothing is conserved, nor where steps
-    end on switching surfaces, nor with equations that are made for loose tolerances.
+def _is_worth_holding(system: System) -> bool:
+    """Whether ``hold_invariants = "auto"`` means anything: not where nothing physical is conserved, nor where
+    steps end on switching surfaces, nor with equations that are made for loose tolerances.
     """
     if system.plan.average is not None:  # whose norm is no invariant that its rate would depend on
         return False
     if system.switches or system.plan.paired:
         return False
-    try:
-        projected_invariants(system)
-    except ConfigError:
-        return False
-    return True
+    return conserves(system)
 
 
 def auto_tolerance(epsilon: float) -> float:

@@ -38,16 +38,29 @@ LATE = 8192
 precision, in which errors of rounding are still small; what they did to the phase is known, and taken back. A
 fixed count: a run that is prolonged past it is the run in one go."""
 
+NOTED = 1024
+"""Natural steps from one state that is noted before ``LATE`` to the next. What they say of the invariants is
+worked out when projection begins, so that a shorter run compiles nothing for it."""
+
 STEPS_BETWEEN = 128
 """Natural steps from one correction to the next, fixed so that bits depend on no clock. Errors grow in
 proportion to it and cost falls: at 128 steps of double precision a correction (7 us) costs a twentieth of
 them, and errors at 1e6 radians are some 5e-13 rad (with 64: 3e-13, a tenth; with 16: 1e-13, a half)."""
 
+LATE_BETWEEN = 512
+"""The same for ``hold_invariants = "auto"``."""
+
 _STEPS_BETWEEN_IN_SINGLE = 256  # whose steps cost a quarter as much
 
 
-def steps_between(precision: Precision) -> int:
-    """Natural steps from one correction to the next."""
+def steps_between(precision: Precision, *, late: bool = False) -> int:
+    """Natural steps from one correction to the next.
+
+    Args:
+        late: whether projection begins at ``LATE``.
+    """
+    if late:
+        return LATE_BETWEEN
     return _STEPS_BETWEEN_IN_SINGLE if precision.scalar is np.float32 else STEPS_BETWEEN
 
 
@@ -103,63 +116,102 @@ class Projection:
             (3 m + 3,): of each projected scalar its residual's integral over time, what was put back, and its
             residual after the latest correction; the time of that and the longest interval so far (internal
             units), and the count of corrections left out since they were not small; where it is ``late``,
-            whether it has begun. It means the same in another chart.
+            whether it has begun, and the states noted until then. It means the same in another chart.
 
     Args:
-        late: whether it is to look on until it is told to ``begin``.
+        late: whether it is to note states until it is told to ``begin``.
     """
 
     def __init__(self, system: System, precision: Precision, start: Scalar, *, late: bool = False) -> None:
         self._low, self._high = precision, one_higher(precision)
-        wide = system.rounded(self._high.number)
-        projected, self.left_out = projected_invariants(wide)
+        self._system, self._start, self._chart = system, float(start), 0
+        projected, self.left_out = projected_invariants(system)
         self.names = [h.name for h in projected]
-        n, m = len(wide.states), len(projected)
-        values = compiled_function([h.expression for h in projected], wide.variables, **self._options)
-        self._wide, self._reference = wide, values(self._high.array(wide.initial))
+        n, m = len(system.states), len(projected)
+        parts = len(precision.parts(precision.array(system.initial)))
+        self._notes = np.zeros((LATE // NOTED if late else 0, n * parts + 2))
+        self.memory = np.zeros(3 * m + 3 + late + self._notes.size)
+        if late:
+            self._notes = self.memory[-self._notes.size :].reshape(self._notes.shape)
+        self._late, self._parts = late, parts
+        self._sums, self._then = self.memory[: 2 * m], self.memory[2 * m : 3 * m]
+        self._residuals_memory, self._times = self.memory[: 3 * m], self.memory[3 * m : 3 * m + 3 + late]
+        self._times[0] = self._start
         self._functions: dict[int, tuple[CompiledFunction, CompiledFunction]] = {}
-        self.use(0)
-        # views into the compiled functions' input and output, set up once: a correction is a call of 7 us
+        self._loaded = -1  # the chart whose functions are in use
+        if not late:
+            self._then[:] = self.residuals(precision.array(system.initial))
+
+    def _prepare(self) -> None:
+        """Compile what evaluates the invariants at the start, and set the rest up once: a correction is a
+        call of 7 us.
+        """
+        self._wide = wide = self._system.rounded(self._high.number)
+        projected, _ = projected_invariants(wide)
+        values = compiled_function([h.expression for h in projected], wide.variables, **self._options)
+        self._reference = values(self._high.array(wide.initial))
+        n, m = len(wide.states), len(projected)
+        # views into the compiled functions' input and output
         self._in, self._out = self._array(np.zeros(n + 2 + 3 * m)), self._array(np.zeros(n + 2 * m + 1))
         self._state, self._clock, self._remembered = self._in[:n], self._in[n : n + 2], self._in[n + 2 :]
         self._left = self._array(np.zeros(m))
         self._result = np.zeros(n + 2 * m + 1)
         self._change, self._new_sums = self._result[:n], self._result[n:-1]
-        self.memory = np.zeros(3 * m + 3 + late)
-        self._late = late
-        self._sums, self._then = self.memory[: 2 * m], self.memory[2 * m : 3 * m]
-        self._residuals_memory, self._times = self.memory[: 3 * m], self.memory[3 * m :]
-        self._then[:] = self._first = self.residuals(precision.array(system.initial))
-        self._times[0] = float(start)
 
     @property
     def holding(self) -> bool:
         """Whether it corrects, or looks on."""
         return not self._late or self._times[3] == 1.0
 
-    def observe(self, state: np.ndarray, time: Scalar) -> None:
-        """Note the residuals of a state before anything is corrected: their integral moves the phase."""
-        now, found = float(time), self.residuals(state)
-        integrals = self._sums[: len(self.names)]
-        integrals += 0.5 * (now - self._times[0]) * (found + self._then)
-        self._then[:] = found
-        self._times[0] = now
+    def note(self, state: np.ndarray, time: Scalar, number: int) -> None:
+        """Note a state before anything is corrected.
+
+        Args:
+            number: from 0 on, below ``LATE // NOTED``.
+        """
+        row = self._notes[number]
+        row[0], row[1] = float(time), self._chart
+        row[2:] = np.concatenate(self._low.parts(state))
 
     def begin(self, state: np.ndarray, time: Scalar) -> None:
-        """Correct a state for the first time, in place, and from now on."""
-        drifted = self._then - self._first
+        """Correct a state for the first time, in place, and from now on.
+
+        The integral of the residuals until now is that over the states noted: it moved the phase.
+        """
+        chart, integrals = self._chart, self._sums[: len(self.names)]
+        self.use(0)
+        self._then[:] = first = self.residuals(self._low.array(self._system.initial))
+        for now, there, *values in self._notes.tolist():
+            if not now > self._times[0]:  # none was taken
+                continue
+            self.use(int(there))
+            self.load()
+            found = self._residuals_of(self._summed(np.array(values).reshape(self._parts, -1)))
+            integrals += 0.5 * (now - self._times[0]) * (found + self._then)
+            self._then[:], self._times[0] = found, now
+        self.use(chart)
+        drifted = self._then - first
         self.project(state, time)
         self._sums[len(self.names) :] += drifted
-        self._times[1] = 0.0  # what follows comes at intervals far shorter than those of looking on
+        self._times[1] = 0.0  # what follows comes at intervals shorter than the one from the last note
         self._times[3] = 1.0
 
     def use(self, chart: int) -> None:
         """Correct in the states of the system (0) or of its partner (1) from now on."""
-        if chart not in self._functions:
-            system = self._wide if chart == 0 else self._wide.partner
+        self._chart = chart
+
+    def load(self) -> None:
+        """Compile what corrects in the states in use, unless that is done."""
+        if self._loaded == self._chart:
+            return
+        if not self._functions:
+            self._prepare()
+        if self._chart not in self._functions:
+            system = self._wide if self._chart == 0 else self._wide.partner
             assert system is not None
-            self._functions[chart] = self._compile(system)
-        self._residuals, self._correction = self._functions[chart]
+            self._functions[self._chart] = self._compile(system)
+        self._residuals, self._correction = self._functions[self._chart]
+        self._loaded = self._chart
 
     def project(self, state: np.ndarray, time: Scalar) -> None:
         """Correct a state in place, at a natural step boundary; a function of it, the time and ``memory``.
@@ -168,6 +220,7 @@ class Projection:
             state: (states,), internal units, working precision.
             time: of the boundary, internal units.
         """
+        self.load()
         now, times = float(time), self._times
         elapsed = now - times[0]
         # the longest so far: an aim worked out for a shorter one than the next would overshoot
@@ -196,8 +249,12 @@ class Projection:
 
     def residuals(self, state: np.ndarray) -> np.ndarray:
         """(value - initial) / scale of each projected scalar, float64, evaluated one precision higher."""
-        values = self._residuals(self._widened(state))
-        return np.asarray(values).astype(np.float64)
+        self.load()
+        return self._residuals_of(self._widened(state))
+
+    def _residuals_of(self, state: np.ndarray) -> np.ndarray:
+        """The same of a state in the higher precision."""
+        return np.asarray(self._residuals(state)).astype(np.float64)
 
     @property
     def corrections(self) -> np.ndarray:
@@ -222,7 +279,11 @@ class Projection:
 
     def _widened(self, state: np.ndarray) -> np.ndarray:
         """A state in the higher precision, exactly."""
-        parts = [self._array(part) for part in self._low.parts(state)]
+        return self._summed(self._low.parts(state))
+
+    def _summed(self, values: Sequence[np.ndarray]) -> np.ndarray:
+        """The sum of float64 parts, smallest first."""
+        parts = [self._array(part) for part in values]
         total = parts[-1]
         for part in parts[-2::-1]:
             total = total + part

@@ -127,8 +127,8 @@ class Stepper:
         failure: why the latest step couldn't be taken, where its state is finite; empty otherwise.
         destination: time of the last sample, internal units; None where steps may become as small as they
             like.
-        held_system: the same motion with coefficients in two parts, for a run that projects from a count of
-            steps on; ``held`` says whether it goes by them.
+        held_system: makes the same motion with coefficients in two parts, for a run that projects from a
+            count of steps on; ``held`` says whether it goes by them.
         unresolved: whether several steps were taken at once of which some are tiny, so that they have to be
             taken back and taken one by one, for ``collapsed`` to be told from the motion alone.
     """
@@ -136,7 +136,7 @@ class Stepper:
     single_steps = False
     careful = False
     begun: Mark
-    held_system: System | None
+    held_system: Callable[[], System] | None
     cuts_steps = False
 
     def __init__(
@@ -207,8 +207,9 @@ class Stepper:
         """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
         key = chart + 2 * self.held
         if key not in self._charts:
-            own = self.held_system if self.held else self.system
-            wanted = own if chart == 0 or own is None else own.partner
+            made = self.held_system if self.held else None
+            own = self.system if made is None else made()
+            wanted = own if chart == 0 else own.partner
             assert wanted is not None
             self._charts[key] = interruptible(lambda: self._compiled(wanted))
         time = self._integrator.dtime

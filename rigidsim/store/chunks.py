@@ -203,6 +203,11 @@ class ChunkedVariable:
         for chunk in self._cutter.cut(values):
             self._put(chunk)
 
+    def add_zeros(self, count: int) -> None:
+        """Take so many rows of zeros."""
+        for start in range(0, count, self._shape[0]):
+            self.add(np.zeros((min(self._shape[0], count - start), *self._shape[1:])))
+
     def add_packed(self, content: bytes) -> None:
         """Take a chunk as it stands in a file, where no rows wait for the rest of theirs."""
         if self._cutter.filled:

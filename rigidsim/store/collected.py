@@ -84,12 +84,15 @@ class CollectedRows:
                 created[name].write_direct_chunk((number * CHUNK_ROWS, *beside), chunk.result())
 
     def add_to(self, chunks: Mapping[str, ChunkedVariable]) -> None:
-        """Add them to a dataset, after those of all segments."""
+        """Add them to a dataset, after those of all segments; of variables that it has."""
         for block in self._blocks:
             for variable in self._variables:
                 for name, values in zip(variable.part_names(), block[variable.name], strict=True):
-                    chunks[name].add(values)
+                    if name in chunks:
+                        chunks[name].add(values)
         for name, cutter in self._cutters.items():
+            if name not in chunks:
+                continue
             for chunk in self._packed[name]:
                 chunks[name].add_packed(chunk.result())
             chunks[name].add(cutter.rest)

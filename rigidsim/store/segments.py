@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import field
 from pathlib import Path
@@ -173,6 +173,7 @@ class SegmentWriter:
         attributes: Mapping[str, Any],
         extras: Sequence[Extra] = (),
         *,
+        unused: Collection[str] = (),
         checkpoint: tuple[Path, Arrays, Arrays] | None = None,
         conclude: Callable[[], None] = lambda: None,
     ) -> int:
@@ -182,6 +183,7 @@ class SegmentWriter:
         a run that was killed in between is known to be unfinished, and is completed again. Returns its rows.
 
         Args:
+            unused: variables that are zero all along, and left out.
             checkpoint: where to leave a last checkpoint, and all events: a later end can go on from it.
             conclude: writes what else belongs to a complete run; called before the segments go.
 
@@ -194,7 +196,8 @@ class SegmentWriter:
         rows = self.saved_rows + self._collected.rows
         with self._writing(), atomic.replacing(target) as temporary:
             with sink(temporary) as target_file, netcdf.writing(target_file) as file:
-                created = netcdf.declare(file, self._variables, rows, attributes, compressed=True)
+                wanted = [variable for variable in self._variables if variable.name not in unused]
+                created = netcdf.declare(file, wanted, rows, attributes, compressed=True)
                 with chunked(created) as chunks:
                     for path in paths:
                         target_file.check()
@@ -296,8 +299,10 @@ def root_attributes(path: Path) -> dict[str, Any]:
 def _copy(path: Path, chunks: Mapping[str, ChunkedVariable]) -> None:
     """Take one segment piece by piece; chunks of a finished dataset that is prolonged as they are."""
     with netcdf.reading(path) as segment:
-        saved = {name: segment[name] for name in chunks}
+        saved = {name: segment[name] for name in chunks if name in segment}
         rows = len(saved["time"])
+        for name in chunks.keys() - saved.keys():  # left out of a finished dataset that is prolonged
+            chunks[name].add_zeros(rows)
         done = {name: chunks[name].add_chunks_of(data) for name, data in saved.items()}
         for start in range(min(done.values()), rows, _ROWS_AT_ONCE):
             for name, data in saved.items():

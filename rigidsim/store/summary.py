@@ -50,6 +50,11 @@ class Brief(Part):
     exit_code: Annotated[StrictInt, Claim(of_end=True)] = 0
 
     @property
+    def held(self) -> bool:
+        """Whether invariants were projected, be it from a count of steps on that the run went past."""
+        return self.hold_invariants and self.cost.steps > (self.hold_from_step or 0)
+
+    @property
     def dataset_digest(self) -> str | None:
         """SHA-256 of the complete dataset; None where there was none yet."""
         return None
@@ -99,6 +104,11 @@ class Summary(Brief):
     undefined_samples: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)
     dataset_sha256: Digest | None = None
     timeline_sha256: Digest | None = None
+
+    @property
+    def held(self) -> bool:
+        """Whether invariants were projected, be it from a count of steps on that the run went past."""
+        return self.hold_invariants and self.cost.steps > (self.hold_from_step or 0)
 
     @property
     def dataset_digest(self) -> str | None:

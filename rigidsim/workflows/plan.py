@@ -18,7 +18,7 @@ from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.storage import storage
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
-from rigidsim.session.variables import dataset_variables
+from rigidsim.session.variables import dataset_variables, unused_variables
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
@@ -83,7 +83,7 @@ def plan(
     seconds_per_sample = _seconds_per_sample(prepared, parts.corrected, parts.evaluator, room.row)
     integrate = steps * pilot.seconds_per_step
     record = samples * seconds_per_sample
-    system = prepared.system
+    system, unused = prepared.system, unused_variables(prepared, int(steps))
     rate = float(system.rate_bound)
     growth = motion_growth(prepared)
     warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene)]
@@ -106,7 +106,7 @@ def plan(
             "time_s": math.ldexp(1.0, system.scaling.time),
             "inertia_kg_m2": math.ldexp(1.0, system.scaling.inertia),
         },
-        "recorded": [v.name for v in dataset_variables(prepared)],
+        "recorded": [v.name for v in dataset_variables(prepared) if v.name not in unused],
         "invariants": [{"name": i.name, "why": i.why, "numerical": i.numerical} for i in system.invariants],
         "precision": prepared.precision.name,
         "tolerance": prepared.effective_tolerance,
@@ -114,7 +114,7 @@ def plan(
         "closed_form": None if closed is None else closed.title,
         "closed_form_why_not": why_not or None,
         "hold_invariants": prepared.holds_invariants,
-        "hold_from_step": None if prepared.late is None else LATE,
+        "hold_from_step": LATE if prepared.holds_late else None,
         "levels": [] if level is None else [_as_dict(x) for x in level.considered],
         "accuracy": None
         if choice is None

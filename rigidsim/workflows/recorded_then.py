@@ -1,4 +1,4 @@
-"""What a run recorded by default when it began, where that was less than it would be now."""
+"""What a run did by default when it began, where that was less than it would be now."""
 
 from __future__ import annotations
 
@@ -10,20 +10,23 @@ import h5py
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.store import netcdf
-from rigidsim.store.attributes import read_attributes
+from rigidsim.store.attributes import RootAttributes, read_attributes
 
 _WITHOUT_DIRECTIONS = 4
 """Schema versions below this one recorded no axes, angles of axes and polar motion by default, and don't
 say what they record."""
 
 
-def as_recorded(experiment: Experiment, saved: Path) -> Experiment:
-    """The experiment that records what its run does, where its config names nothing; the text stays as it is.
+def as_begun(experiment: Experiment, saved: Path) -> Experiment:
+    """The experiment that records what its run does, and projects what it does, where its config says
+    nothing of them; the text stays as it is.
 
     Args:
         saved: a file of the run, which says so, or of an earlier version, which holds it.
     """
-    output, found = experiment.config.output, read_attributes(saved)
+    found = read_attributes(saved)
+    experiment = _projecting(experiment, found)
+    output = experiment.config.output
     if output.record is not None:
         return experiment
     if found.recorded:
@@ -35,3 +38,12 @@ def as_recorded(experiment: Experiment, saved: Path) -> Experiment:
         return experiment
     config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})
     return replace(experiment, config=config)
+
+
+def _projecting(experiment: Experiment, found: RootAttributes) -> Experiment:
+    """``hold_invariants`` was false where nothing was said, before it was "auto"."""
+    integrator = experiment.config.integrator
+    if "hold_invariants" in integrator.model_fields_set or found.hold_invariants:
+        return experiment
+    plain = integrator.model_copy(update={"hold_invariants": False})
+    return replace(experiment, config=experiment.config.model_copy(update={"integrator": plain}))

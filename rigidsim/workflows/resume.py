@@ -33,7 +33,7 @@ from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.certify import certified
-from rigidsim.workflows.recorded_then import as_recorded
+from rigidsim.workflows.recorded_then import as_begun
 from rigidsim.workflows.verify import embedded, text_difference
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def resume(
             raise RunFolderError(f"{folder.path}: its dataset.h5 is missing; run it again with {FORCE}")
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
         if chain.paths:
-            experiment = as_recorded(_continued(experiment, chain.paths[-1]), chain.paths[0])
+            experiment = as_begun(_continued(experiment, chain.paths[-1]), chain.paths[0])
         prepared = prepare(experiment, loads=loads)
         if chain.paths:
             session.mixed = _compared(prepared, chain)

@@ -23,7 +23,7 @@ from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal, read_seal
 from rigidsim.store.segments import root_attributes
 from rigidsim.store.variables import is_bare_dimension
-from rigidsim.workflows.recorded_then import as_recorded
+from rigidsim.workflows.recorded_then import as_begun
 from rigidsim.workflows.run import run
 from rigidsim.workflows.verify_summary import summary_problems, timeline_problems
 
@@ -109,7 +109,7 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         raise RunFolderError(
             f"{dataset}: the run had loads from Python ({saved.python_loads}), which its config lacks"
         )
-    experiment = as_recorded(embedded(dataset), dataset)
+    experiment = as_begun(embedded(dataset), dataset)
     with _scratch() as scratch:
         quiet = experiment.config.output.model_copy(update={"timeline": False})
         unguarded = type(experiment.config.limits)()
