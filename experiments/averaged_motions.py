@@ -8,11 +8,14 @@ Held against:
 - the announced error covers the true one in every run;
 - it is at most ten times the true one in half of them.
 
-Run: python -m experiments.averaged_motions [--full] [--out DIR]
+The windows were chosen on seed 15; another seed, of which nothing was seen before, is the proof.
+
+Run: python -m experiments.averaged_motions [--full] [--seed 16] [--out DIR]
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -22,20 +25,24 @@ if not __package__:  # as a script
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.averaging.campaign import Member, member
-from experiments.common import BLUE, GREY, ORANGE, Check, main, new_figure, save, tidy
+from experiments.common import BLUE, GREY, ORANGE, Check, add_arguments, new_figure, save, table, tidy
 
 NAME = "averaged_motions"
 MEMBERS = 40
 FEW = 12
+SEED = 16
 
 
-def study(full: bool, out: Path) -> list[Check]:
+def study(full: bool, out: Path, seed: int = SEED) -> list[Check]:
     """All members, or a few; see the module's text."""
-    members = [member(number) for number in range(MEMBERS if full else FEW)]
-    for one in members:
+    members: list[Member] = []
+    for number in range(MEMBERS if full else FEW):
+        one = member(number, seed)
+        members.append(one)
         print(
             f"{one.number:3d} {one.level:14s} {'tumbling' if one.tumbles else 'principal':9s} "
-            + (f"refused: {one.refused}" if one.refused else f"{one.announced:.2e} {one.true:.2e}"),
+            + (f"refused: {one.refused}" if one.refused else f"{one.announced:.2e} {one.true:.2e}")
+            + (" whole" if one.whole else ""),
             file=sys.stderr,
             flush=True,
         )
@@ -71,4 +78,10 @@ def draw(ran: list[Member], count: int, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
+    add_arguments(parser)
+    parser.add_argument("--seed", type=int, default=SEED, help="of the bodies (default: %(default)s)")
+    asked = parser.parse_args()
+    checks = study(asked.full, asked.out, asked.seed)
+    print(table(checks, NAME))
+    sys.exit(int(not all(check.passed for check in checks)))

@@ -12,32 +12,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
-from fractions import Fraction
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.trial import compactly
+from rigidsim.accuracy.side_by_side import Window, rotation_rates, side_by_side
 from rigidsim.errors import ConfigError
-from rigidsim.model.averaged.average import Average, osculating
-from rigidsim.model.averaged.resonance import SlowStart
-from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import apply, cross, dot, norm
-from rigidsim.scene.exact import fraction_of
-from rigidsim.scene.model_table import FULL
+from rigidsim.model.averaged.average import Average
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene
-from rigidsim.solve.assembly import assemble, sampler
-from rigidsim.solve.evaluate import Evaluator
-from rigidsim.solve.problem import InitialValueProblem, prepare_scene
-from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import Progress, SampleReceiver
-from rigidsim.solve.status import Status
+from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.trail import Trail
 
-_SAMPLES = 2000
 _ORBITS = 8  # of the slowest source, from which a growth is told from what goes round with it
 _FEWEST_ORBITS = 2
 _ROTATIONS = 4000  # some 20,000 steps
@@ -49,31 +36,6 @@ _SPARE = 2.0
 """Times the extrapolated growth: it is told from three windows, and varies between them."""
 _SPARE_OF_WHOLE = 1.25  # for what lies between the samples
 _TURN = 2 * math.pi
-
-
-@dataclass(frozen=True)
-class Window:
-    """Where both models ran side by side.
-
-    Attributes:
-        start, end: seconds.
-        steps: of the full model.
-        momentum, figure: largest distance between the directions of the angular momentum and of the figure
-            axis, with what averaging removed added back, rad; None where the body tumbles.
-        recorded, recorded_figure: the same for the directions as the run records them.
-        growth: of the distance of the momenta, along and across its precession, rad/s.
-        doubt: by how much the growth of the window's parts differs, rad/s.
-    """
-
-    start: float
-    end: float
-    steps: int
-    momentum: float
-    figure: float | None
-    recorded: float
-    recorded_figure: float | None
-    growth: tuple[float, float]
-    doubt: float
 
 
 @dataclass(frozen=True)
@@ -132,7 +94,7 @@ def measure_modelling(
     for at, direction in places:
         until = end if whole else at + length
         try:
-            found = _window(prepared, average, at, until, direction, go_on)
+            found = side_by_side(prepared, average, at, until, direction, go_on)
         except ConfigError:
             found = None
         if found is None:
@@ -146,7 +108,7 @@ def measure_modelling(
 
 def _length(scene: Scene, average: Average) -> float:
     """Of a window, seconds."""
-    rates = [abs(float(average.motion.precession_rate)), abs(float(average.motion.wobble_rate))]
+    rates = rotation_rates(average)
     rotation = _TURN / max(rates)
     if average.resonance is not None:
         libration = _TURN / average.resonance.libration_rate
@@ -175,150 +137,6 @@ def _places(
             if nearest not in found:
                 found.append(nearest)
     return found
-
-
-def _window(
-    prepared: InitialValueProblem,
-    average: Average,
-    begin: float,
-    end: float,
-    states: Sequence[Any],
-    go_on: Callable[[], bool],
-) -> Window | None:
-    """Both models side by side; None where one doesn't get to the end."""
-    exponent = prepared.system.scaling.momentum
-    scene = _starting(prepared.scene, average, begin, end, states, exponent)
-    back = average.resonance is None  # whether what averaging removed can be added back
-    names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
-    full = _followed(prepared, scene, FULL, True, names, go_on)
-    reduced = _followed(prepared, scene, average.level, back, names, go_on) if full else None
-    plain = reduced
-    if reduced and back and not average.short_period:
-        plain = _followed(prepared, scene, average.level, False, names, go_on)
-    if full is None or reduced is None or plain is None:
-        return None
-    steps, true = full
-    times = np.linspace(0.0, end - begin, _SAMPLES)
-    apart = true["momentum_axis"] - reduced[1]["momentum_axis"]
-    basis = _basis(plain[1]["momentum_axis"])
-    parts = apart @ basis.T
-    third = _SAMPLES // 3
-    growth = _slope(times, parts)
-    first, last = _slope(times[: 2 * third], parts[: 2 * third]), _slope(times[third:], parts[third:])
-    return Window(
-        begin,
-        end,
-        steps,
-        _largest(apart),
-        _largest(true["figure_axis"] - reduced[1]["figure_axis"]) if average.figure else None,
-        _largest(true["momentum_axis"] - plain[1]["momentum_axis"]),
-        _largest(true["figure_axis"] - plain[1]["figure_axis"]) if average.figure else None,
-        (float(growth[0]), float(growth[1])),
-        float(np.linalg.norm(first - last)) / 2,
-    )
-
-
-def _starting(
-    scene: Scene, average: Average, begin: float, end: float, states: Sequence[Any], exponent: int
-) -> Scene:
-    """The full scene from a time on: the body as it was at its start, turned by as little as brings its
-    momentum to where it is now; as the slow motion has it where it keeps pace with its source.
-
-    Args:
-        states: of the averaged motion.
-        exponent: binary, of the internal unit of angular momentum.
-    """
-    context = scene.context
-    instant = fraction_of(context.mpf(begin)) if begin != float(scene.start) else scene.samples.begin
-    step = Fraction(end - begin) / (_SAMPLES - 1)
-    samples = SampleTimes(instant, step, None, _SAMPLES, context)
-    moved = replace(scene, start=samples.start, end=samples.last, samples=samples)
-    if begin == float(scene.start):
-        return moved
-    if average.resonance is not None:
-        slow = SlowStart(list(states[:4]), scene.context.ldexp(states[4], exponent))
-        quaternion, velocity = average.resonance.osculating(slow, scene, samples.start)
-        return replace(moved, quaternion=quaternion, euler_angles=None, angular_velocity=velocity)
-    matrix = attitude.rotation_matrix(scene.quaternion)
-    momentum = apply(matrix, apply(scene.body.inertia, scene.angular_velocity))
-    size = norm(context, momentum)
-    before = [x / size for x in momentum]
-    now = osculating(scene, average, states[:3], samples.start)
-    turn = [1 + dot(before, now), *cross(before, now)]
-    if dot(turn, turn) < context.mpf(2) ** -60:  # to the opposite: about any axis across
-        least = min(range(3), key=lambda i: abs(before[i]))
-        other = [context.one if i == least else context.zero for i in range(3)]
-        turn = [context.zero, *cross(before, other)]
-    quaternion = attitude.product(attitude.unit_quaternion(context, turn), list(scene.quaternion))
-    return replace(moved, quaternion=attitude.unit_quaternion(context, quaternion), euler_angles=None)
-
-
-class _Collected(SampleReceiver):
-    """Keeps what is recorded in memory, as doubles."""
-
-    def __init__(self, evaluator: Evaluator, names: Sequence[str]) -> None:
-        self._evaluator = evaluator
-        self._pieces: dict[str, list[np.ndarray]] = {name: [] for name in names}
-
-    def take(self, block: SampleBlock) -> None:
-        recorded = self._evaluator.evaluate(block)
-        for name, pieces in self._pieces.items():
-            pieces.append(np.asarray(recorded[name][0], dtype=np.float64))
-
-    def of(self, name: str) -> np.ndarray:
-        """(samples, 3)."""
-        return np.concatenate(self._pieces[name])
-
-
-def _followed(
-    prepared: InitialValueProblem,
-    scene: Scene,
-    level: str,
-    short_period: bool,
-    names: list[str],
-    go_on: Callable[[], bool],
-) -> tuple[int, dict[str, np.ndarray]] | None:
-    """Steps, and what was asked for at all samples; None where the motion doesn't get there."""
-    config = scene.config
-    model = config.model.model_copy(update={"level": level, "short_period": short_period and level != FULL})
-    plain = {"precision": "double", "tolerance": "auto", "hold_invariants": False}
-    integrator = config.integrator.model_copy(update=plain)
-    output = config.output.model_copy(update={"record": names, "lyapunov": False, "timeline": False})
-    changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
-    problem = compactly(prepare_scene(prepared.experiment, replace(scene, config=changed)))
-    parts = assemble(problem)
-    receiver = _Collected(parts.evaluator, names)
-
-    def check(_: Progress) -> Status | None:
-        return None if go_on() else Status.INTERRUPTED
-
-    progress = sampler(problem, parts, receiver, check).run()
-    if progress.status is not Status.FINISHED:
-        return None
-    return progress.steps, {name: receiver.of(name) for name in names}
-
-
-def _basis(path: np.ndarray) -> np.ndarray:
-    """Rows: unit vectors along a path of directions, and across it."""
-    middle = path[len(path) // 2]
-    along = path[-1] - path[0]
-    along = along - (along @ middle) * middle
-    if np.linalg.norm(along) < 1e-14:
-        along = np.cross(np.eye(3)[int(np.argmin(np.abs(middle)))], middle)
-    along = along / np.linalg.norm(along)
-    return np.array([along, np.cross(middle, along)])
-
-
-def _slope(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Of each column, weighted with a Hann window, so that oscillations have little say."""
-    x = times - times.mean()
-    weights = np.sin(np.pi * (times - times[0]) / (times[-1] - times[0])) ** 2
-    x = x - (weights @ x) / weights.sum()
-    return np.asarray((weights * x) @ values / ((weights * x) @ x))
-
-
-def _largest(vectors: np.ndarray) -> float:
-    return float(np.linalg.norm(vectors, axis=1).max())
 
 
 def _of_whole(average: Average, window: Window, spent: float) -> ModellingError:

@@ -51,9 +51,9 @@ class Integrator(ConfigTable):
         "functions at a cost that doesn't depend on the time",
     )
     hold_invariants: StrictBool | Literal["auto"] = Field(
-        default="auto",
+        default=False,
         description="put what is conserved back as the run goes on: errors of long runs grow far slower; "
-        "auto: from step 8192 on, so that shorter runs are the plain ones, but in members of sweeps",
+        "auto: from step 8192 on, so that shorter runs are the plain ones",
     )
 
     @field_validator("hold_invariants", mode="before")

@@ -48,7 +48,9 @@ proportion to it and cost falls: at 128 steps of double precision a correction (
 them, and errors at 1e6 radians are some 5e-13 rad (with 64: 3e-13, a tenth; with 16: 1e-13, a half)."""
 
 LATE_BETWEEN = 512
-"""The same for ``hold_invariants = "auto"``."""
+"""The same for ``hold_invariants = "auto"``, whose errors have their share from before it began: for bodies
+(3, 1, 2) and (1, 2, 3) at 1e6 units of time 1.4e-12 and 4.5e-12 rad (with 256: 3.2e-12 and 2.0e-12, with
+1024: 6.2e-12 and 1.1e-11; 3.8e-8 and 2.5e-8 without), for a quarter of the corrections."""
 
 _STEPS_BETWEEN_IN_SINGLE = 256  # whose steps cost a quarter as much
 

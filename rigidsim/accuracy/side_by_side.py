@@ -1,0 +1,222 @@
+"""A reduced model and the full one side by side over a window, from the same state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from rigidsim.accuracy.trial import compactly
+from rigidsim.model.averaged.average import Average, osculating
+from rigidsim.model.averaged.resonance import SlowStart
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import apply, cross, dot, norm
+from rigidsim.scene.exact import fraction_of
+from rigidsim.scene.model_table import FULL
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.sample_times import SampleTimes
+from rigidsim.scene.scene import Scene
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.problem import InitialValueProblem, prepare_scene
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.solve.status import Status
+
+_FEWEST_SAMPLES, _MOST_SAMPLES = 2000, 16_000
+_SAMPLES_PER_ROTATION = 2
+"""What goes on within a rotation rises to its largest in a few of them, near a periapsis: with 2000 samples
+of 7500 rotations a quarter of it was missed."""
+_TURN = 2 * math.pi
+
+
+@dataclass(frozen=True)
+class Window:
+    """Where both models ran side by side.
+
+    Attributes:
+        start, end: seconds.
+        steps: of the full model.
+        momentum, figure: largest distance between the directions of the angular momentum and of the figure
+            axis, with what averaging removed added back, rad; None where the body tumbles.
+        recorded, recorded_figure: the same for the directions as the run records them.
+        growth: of the distance of the momenta, along and across its precession, rad/s.
+        doubt: by how much the growth of the window's parts differs, rad/s.
+    """
+
+    start: float
+    end: float
+    steps: int
+    momentum: float
+    figure: float | None
+    recorded: float
+    recorded_figure: float | None
+    growth: tuple[float, float]
+    doubt: float
+
+
+def rotation_rates(average: Average) -> list[float]:
+    """Of the free rotation, rad/s."""
+    return [abs(float(average.motion.precession_rate)), abs(float(average.motion.wobble_rate))]
+
+
+def _sample_count(average: Average, seconds: float) -> int:
+    """At which both models are compared."""
+    rotations = seconds * max(rotation_rates(average)) / _TURN
+    return int(min(max(_FEWEST_SAMPLES, _SAMPLES_PER_ROTATION * rotations), _MOST_SAMPLES))
+
+
+def side_by_side(
+    prepared: InitialValueProblem,
+    average: Average,
+    begin: float,
+    end: float,
+    states: Sequence[Any],
+    go_on: Callable[[], bool],
+) -> Window | None:
+    """Both models side by side; None where one doesn't get to the end."""
+    exponent = prepared.system.scaling.momentum
+    count = _sample_count(average, end - begin)
+    scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
+    back = average.resonance is None  # whether what averaging removed can be added back
+    names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
+    full = _followed(prepared, scene, FULL, True, names, go_on)
+    reduced = _followed(prepared, scene, average.level, back, names, go_on) if full else None
+    plain = reduced
+    if reduced and back and not average.short_period:
+        plain = _followed(prepared, scene, average.level, False, names, go_on)
+    if full is None or reduced is None or plain is None:
+        return None
+    steps, true = full
+    times = np.linspace(0.0, end - begin, count)
+    apart = true["momentum_axis"] - reduced[1]["momentum_axis"]
+    basis = _basis(plain[1]["momentum_axis"])
+    parts = apart @ basis.T
+    third = count // 3
+    growth = _slope(times, parts)
+    first, last = _slope(times[: 2 * third], parts[: 2 * third]), _slope(times[third:], parts[third:])
+    return Window(
+        begin,
+        end,
+        steps,
+        _largest(apart),
+        _largest(true["figure_axis"] - reduced[1]["figure_axis"]) if average.figure else None,
+        _largest(true["momentum_axis"] - plain[1]["momentum_axis"]),
+        _largest(true["figure_axis"] - plain[1]["figure_axis"]) if average.figure else None,
+        (float(growth[0]), float(growth[1])),
+        float(np.linalg.norm(first - last)) / 2,
+    )
+
+
+def _starting(
+    scene: Scene,
+    average: Average,
+    begin: float,
+    end: float,
+    states: Sequence[Any],
+    exponent: int,
+    count: int,
+) -> Scene:
+    """The full scene from a time on: the body as it was at its start, turned by as little as brings its
+    momentum to where it is now; as the slow motion has it where it keeps pace with its source.
+
+    Args:
+        states: of the averaged motion.
+        exponent: binary, of the internal unit of angular momentum.
+        count: of samples.
+    """
+    context = scene.context
+    instant = fraction_of(context.mpf(begin)) if begin != float(scene.start) else scene.samples.begin
+    step = Fraction(end - begin) / (count - 1)
+    samples = SampleTimes(instant, step, None, count, context)
+    moved = replace(scene, start=samples.start, end=samples.last, samples=samples)
+    if begin == float(scene.start):
+        return moved
+    if average.resonance is not None:
+        slow = SlowStart(list(states[:4]), scene.context.ldexp(states[4], exponent))
+        quaternion, velocity = average.resonance.osculating(slow, scene, samples.start)
+        return replace(moved, quaternion=quaternion, euler_angles=None, angular_velocity=velocity)
+    matrix = attitude.rotation_matrix(scene.quaternion)
+    momentum = apply(matrix, apply(scene.body.inertia, scene.angular_velocity))
+    size = norm(context, momentum)
+    before = [x / size for x in momentum]
+    now = osculating(scene, average, states[:3], samples.start)
+    turn = [1 + dot(before, now), *cross(before, now)]
+    if dot(turn, turn) < context.mpf(2) ** -60:  # to the opposite: about any axis across
+        least = min(range(3), key=lambda i: abs(before[i]))
+        other = [context.one if i == least else context.zero for i in range(3)]
+        turn = [context.zero, *cross(before, other)]
+    quaternion = attitude.product(attitude.unit_quaternion(context, turn), list(scene.quaternion))
+    return replace(moved, quaternion=attitude.unit_quaternion(context, quaternion), euler_angles=None)
+
+
+class _Collected(SampleReceiver):
+    """Keeps what is recorded in memory, as doubles."""
+
+    def __init__(self, evaluator: Evaluator, names: Sequence[str]) -> None:
+        self._evaluator = evaluator
+        self._pieces: dict[str, list[np.ndarray]] = {name: [] for name in names}
+
+    def take(self, block: SampleBlock) -> None:
+        recorded = self._evaluator.evaluate(block)
+        for name, pieces in self._pieces.items():
+            pieces.append(np.asarray(recorded[name][0], dtype=np.float64))
+
+    def of(self, name: str) -> np.ndarray:
+        """(samples, 3)."""
+        return np.concatenate(self._pieces[name])
+
+
+def _followed(
+    prepared: InitialValueProblem,
+    scene: Scene,
+    level: str,
+    short_period: bool,
+    names: list[str],
+    go_on: Callable[[], bool],
+) -> tuple[int, dict[str, np.ndarray]] | None:
+    """Steps, and what was asked for at all samples; None where the motion doesn't get there."""
+    config = scene.config
+    model = config.model.model_copy(update={"level": level, "short_period": short_period and level != FULL})
+    plain = {"precision": "double", "tolerance": "auto", "hold_invariants": False}
+    integrator = config.integrator.model_copy(update=plain)
+    output = config.output.model_copy(update={"record": names, "lyapunov": False, "timeline": False})
+    changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
+    problem = compactly(prepare_scene(prepared.experiment, replace(scene, config=changed)))
+    parts = assemble(problem)
+    receiver = _Collected(parts.evaluator, names)
+
+    def check(_: Progress) -> Status | None:
+        return None if go_on() else Status.INTERRUPTED
+
+    progress = sampler(problem, parts, receiver, check).run()
+    if progress.status is not Status.FINISHED:
+        return None
+    return progress.steps, {name: receiver.of(name) for name in names}
+
+
+def _basis(path: np.ndarray) -> np.ndarray:
+    """Rows: unit vectors along a path of directions, and across it."""
+    middle = path[len(path) // 2]
+    along = path[-1] - path[0]
+    along = along - (along @ middle) * middle
+    if np.linalg.norm(along) < 1e-14:
+        along = np.cross(np.eye(3)[int(np.argmin(np.abs(middle)))], middle)
+    along = along / np.linalg.norm(along)
+    return np.array([along, np.cross(middle, along)])
+
+
+def _slope(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Of each column, weighted with a Hann window, so that oscillations have little say."""
+    x = times - times.mean()
+    weights = np.sin(np.pi * (times - times[0]) / (times[-1] - times[0])) ** 2
+    x = x - (weights @ x) / weights.sum()
+    return np.asarray((weights * x) @ values / ((weights * x) @ x))
+
+
+def _largest(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max())
