@@ -58,13 +58,16 @@ def numbers(run: rigidsim.Run) -> list[str]:
     drifts = [(row["largest_drift"] or 0.0, row["bound"]) for row in summary["invariants"].values()]
     largest, bound = max(drifts, default=(0.0, 1.0))
     error = summary["accuracy"]["estimated_attitude_error"]
+    uncertain = "no attitude" if error is None else f"{error:.1e}"
+    if (averaged := run.dataset.attrs.get("modelling_error")) is not None:
+        uncertain = f"axes {averaged:.1e} (model)"
     return [
         f"`{summary['name']}`",
         str(len(summary["states"])),
         summary["precision"],
         str(summary["cost"]["steps"]),
         str(summary["samples"]),
-        "no attitude" if error is None else f"{error:.1e}",
+        uncertain,
         f"{largest:.1e}",
         f"{largest / bound:.1e}",
     ]
@@ -110,8 +113,9 @@ def page(rows: list[list[str]]) -> str:
         "this page):",
         "```sh\nrigidsim run configs/heavy_top_nutating.toml\nrigidsim plot runs/heavy_top_nutating\n```",
         "## Their numbers",
-        "Announced error of the attitude at the end, and the largest drift of any invariant over what "
-        "rounding explains (50 tolerance sqrt(steps)). A large error with a tiny drift is a motion that "
+        "Announced error of the attitude at the end (of an averaged model that of its axes, beside which its "
+        "integration's is nothing), and the largest drift of any invariant over what rounding explains "
+        "(50 tolerance sqrt(steps)). A large error with a tiny drift is a motion that "
         "amplifies errors: it flips, or falls.",
         "<!-- slow output: python -m docs.gallery --table -->\n" + table(rows),
     ]

@@ -12,7 +12,7 @@ from rigidsim.scene.model_table import AUTO, FULL, ORBIT_AVERAGED, SPIN_AVERAGED
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.problem import prepare
 
-_CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)
+CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def choose_level(
         return None
     asked = _asked(experiment)
     considered: list[Considered] = []
-    for level in _CHEAPEST_FIRST:
+    for level in CHEAPEST_FIRST:
         if level in without:
             considered.append(Considered(level, None, "its measured error was larger than asked for"))
             continue

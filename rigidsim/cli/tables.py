@@ -6,22 +6,20 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
+from rigidsim.cli.model_tables import interpolated, print_levels, print_modelling
 from rigidsim.cli.page import Page, Styled, page
 from rigidsim.cli.understood import understood
 from rigidsim.cli.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.summary_parts import ENGINE, Accuracy, Invariant, Modelling
+from rigidsim.store.summary_parts import ENGINE, Accuracy, Invariant
 from rigidsim.store.understood import Body, Span, Start
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from rigidsim.workflows.check import Checked
-
-
-_YEAR = 365.25 * 86400  # s
 
 
 def size(count: float) -> str:
@@ -111,7 +109,9 @@ def _print_ended(summary: Summary, on: Page) -> None:
     if summary.held:
         on.line("held", "put back: what the drift would have been; held drifts are no independent check")
     _print_accuracy(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
-    _print_modelling(summary.modelling, on)
+    print_modelling(summary.modelling, on)
+    for number, (name, found) in enumerate(summary.tables.items()):
+        on.line("" if number else "tables", interpolated(name, found))
     for number, name in enumerate(summary.events):
         on.line("" if number else "events", _event(summary, name))
     if summary.undefined_samples:
@@ -171,26 +171,6 @@ def _print_invariants(summary: Summary, on: Page) -> None:
 
 def _without(row: list[Any], place: int) -> list[Any]:
     return [cell for n, cell in enumerate(row) if n != place]
-
-
-def _print_modelling(found: Modelling | None, on: Page) -> None:
-    """How far a reduced model is from the full one."""
-    if found is None:
-        return
-    if found.momentum_axis is None:
-        on.line("averaged", f"modelling error {found.how}")
-        return
-    text = f"momentum's direction within {found.momentum_axis:.1e} rad of the full model's"
-    if found.figure_axis is not None:
-        text += f", figure axis within {found.figure_axis:.1e} rad"
-    on.line("averaged", text)
-    if not found.whole and found.growth is not None and found.oscillation is not None:
-        span = found.windows[0].end - found.windows[0].start
-        text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
-        text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * _YEAR:.1e} rad/yr"
-        on.line("", text)
-    if not found.short_period:
-        on.line("", "[model] short_period = true adds the nutation back that averaging removed")
 
 
 def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
@@ -257,9 +237,7 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         on.line("method", f"{plan['closed_form']}: no steps are taken")
     elif plan["closed_form"] is not None:
         on.line("closed", f'{plan["closed_form"]}: method = "closed_form" would take no steps')
-    for row in plan["levels"]:
-        error = "" if row["error_rad"] is None else f"modelling error about {row['error_rad']:.1e} rad; "
-        on.line("level", f"{row['level']}: {error}{row['why_not'] or 'taken'}")
+    print_levels(plan["levels"], on)
     if plan["accuracy"] is not None:
         on.line("chosen", f"{plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
     on.line(

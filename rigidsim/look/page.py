@@ -59,6 +59,8 @@ def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
     if "attitude_error" in attributes:
         what = "axis integrated to" if is_averaged(attributes) else "attitude uncertain by"
         facts.append((what, f"{float(attributes['attitude_error']):.2g} rad"))
+    if "modelling_error" in attributes:
+        facts.append(("from the full model", f"{float(attributes['modelling_error']):.2g} rad"))
     facts = [(name, value) for name, value in facts if value not in (None, "")]
     lines = [heading, "", *_table(tuple(name for name, _ in facts), [tuple(str(v) for _, v in facts)])]
     invariants = _invariants(thinned)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from rigidsim.session.timings import Effort
@@ -14,6 +15,7 @@ from rigidsim.solve.stepper import Stepper
 from rigidsim.store import provenance
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import TableErrors
 from rigidsim.store.variables import SCHEMA_VERSION
 
 
@@ -92,6 +94,11 @@ def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
     return [one for one in shown if one is not None]
 
 
+def _as_json(tables: Mapping[str, TableErrors]) -> str | None:
+    """None where there are none."""
+    return json.dumps({name: found.as_dict() for name, found in tables.items()}) if tables else None
+
+
 def of_complete(
     attributes: RootAttributes, summary: Summary, effort: Effort, angles_wrapped_from: float = math.nan
 ) -> RootAttributes:
@@ -111,5 +118,7 @@ def of_complete(
         finished_at=provenance.now(),
         put_back=json.dumps(put_back) if summary.held else None,
         attitude_error=summary.accuracy.estimated_attitude_error,
+        modelling_error=None if summary.modelling is None else summary.modelling.worst,
+        table_errors=_as_json(summary.tables),
         angles_wrapped_from=None if math.isnan(angles_wrapped_from) else angles_wrapped_from,
     )

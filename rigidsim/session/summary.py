@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words
@@ -34,6 +35,7 @@ from rigidsim.store.summary_parts import (
     Lyapunov,
     Modelling,
     ModellingWindow,
+    TableErrors,
 )
 
 if TYPE_CHECKING:
@@ -92,6 +94,7 @@ def summarise(
         invariants=_invariants(found, initial),
         accuracy=_accuracy(found),
         modelling=_modelling(found),
+        tables=_tables(found),
         lyapunov=_lyapunov(found, spectrum),
         body=body_of(scene),
         start=start_of(scene),
@@ -239,6 +242,17 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         certified=None,
         how=_NOT_CERTIFIED,
     )
+
+
+def _tables(found: Diagnostics) -> dict[str, TableErrors]:
+    orbits = [load.table for load in found.prepared.scene.loads if isinstance(load, GravityGradient)]
+    return {
+        orbit.name: TableErrors(
+            direction=orbit.error.direction, distance=orbit.error.distance, expected=orbit.error.expected
+        )
+        for orbit in orbits
+        if orbit is not None
+    }
 
 
 def _modelling(found: Diagnostics) -> Modelling | None:

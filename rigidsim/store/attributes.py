@@ -33,7 +33,9 @@ class RootAttributes(BaseModel):
         run_id: tells this run from all others.
         states: names, in order.
         tolerance: effective.
-        unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back: JSON.
+        unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back, table_errors:
+            JSON.
+        modelling_error: of an averaged model, largest of its directions until the end, rad.
         principal_moments, inertia_tensor: kg m^2.
         center_of_mass: of the body from its reference point, body axes, m: JSON.
         mass: of the body, kg, where it is known.
@@ -119,6 +121,8 @@ class RootAttributes(BaseModel):
     finished_at: str | None = None
     put_back: str | None = None
     attitude_error: float | None = None
+    modelling_error: float | None = None
+    table_errors: str | None = None
     angles_wrapped_from: float | None = None
 
     def having(self, **known: Any) -> Self:

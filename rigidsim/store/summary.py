@@ -33,6 +33,7 @@ from rigidsim.store.summary_parts import (
     Invariant,
     Lyapunov,
     Modelling,
+    TableErrors,
     WarningCode,
 )
 from rigidsim.store.understood import Body, Span, Start
@@ -68,6 +69,7 @@ class Summary(Brief):
         time_reached: seconds: of the last sample, or of the event that ended the run.
         engine_time: seconds: where the integration stood, which goes past samples in steps of its own.
         events, event_times: how often each happened, and when those that did.
+        tables: of orbits by tables, by name, how well interpolation does.
         advice: what would do better nearly for free, the best last.
         undefined_samples: by recorded variable that is NaN at some, how many.
         provenance: attributes of the dataset that are repeated here.
@@ -91,6 +93,7 @@ class Summary(Brief):
     invariants: dict[Text, Invariant]
     accuracy: Accuracy
     modelling: Modelling | None = None
+    tables: dict[Text, TableErrors] = Field(default_factory=dict)
     lyapunov: Lyapunov | None = None
     body: Annotated[Body, Claim()]
     start: Annotated[Start | None, Claim()] = None

@@ -142,6 +142,20 @@ class Accuracy(Part):
     forecast: FiniteNumber | None = None
 
 
+class TableErrors(Part):
+    """How well interpolation does between the rows of an orbit's table.
+
+    Attributes:
+        direction: by which it misses the source's direction with every other row left out, largest, rad.
+        distance: the same of the distance, relative.
+        expected: by which both become smaller with all rows in, where they follow smooth functions.
+    """
+
+    direction: FiniteNumber
+    distance: FiniteNumber
+    expected: FiniteNumber
+
+
 class ModellingWindow(Part):
     """Where the full model ran beside a reduced one; see ``rigidsim.accuracy.modelling``.
 
@@ -189,6 +203,12 @@ class Modelling(Part):
     how: Text = ""
     cpu_seconds: FiniteNumber | None = None
     windows: tuple[ModellingWindow, ...] = ()
+
+    @property
+    def worst(self) -> float | None:
+        """Of both directions; None where it wasn't measured."""
+        known = [x for x in (self.momentum_axis, self.figure_axis) if x is not None]
+        return max(known, default=None)
 
 
 class Lyapunov(Part):

@@ -12,7 +12,7 @@ import numpy as np
 
 from rigidsim.accuracy.choice import chosen
 from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
-from rigidsim.accuracy.level import Considered, choose_level
+from rigidsim.accuracy.level import choose_level
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names
@@ -26,6 +26,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
+from rigidsim.workflows.plan_levels import compared_levels
 from rigidsim.workflows.read import Given, as_experiment
 
 _PILOT_SECONDS = 0.5
@@ -59,6 +60,7 @@ def plan(
     """
     experiment = as_experiment(experiment, changes)
     level = choose_level(experiment, loads=loads)
+    levels = compared_levels(experiment, level, loads)
     experiment, choice = chosen(level.experiment if level else experiment, loads=loads)
     prepared = prepare(experiment, loads=loads)
     refuse_taken_names(prepared)
@@ -115,7 +117,7 @@ def plan(
         "closed_form_why_not": why_not or None,
         "hold_invariants": prepared.holds_invariants,
         "hold_from_step": LATE if prepared.holds_late else None,
-        "levels": [] if level is None else [_as_dict(x) for x in level.considered],
+        "levels": levels,
         "accuracy": None
         if choice is None
         else {"chosen": choice.setting.title, "why": choice.why, "forecast": choice.forecast},
@@ -148,11 +150,6 @@ def plan(
         "start": start_of(prepared.scene).as_dict(),
         "time": span_of(prepared.scene).as_dict(),
     }
-
-
-def _as_dict(considered: Considered) -> dict[str, Any]:
-    """A level that was looked at, for JSON."""
-    return {"level": considered.level, "error_rad": considered.error, "why_not": considered.why_not}
 
 
 def _seconds_per_sample(

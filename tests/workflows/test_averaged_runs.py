@@ -166,3 +166,72 @@ def test_auto_without_an_accuracy_is_refused() -> None:
         ConfigError, match=r"\[model\] level: given \"auto\", but .*accuracy_axis says no error"
     ):
         run_text(text("auto"))
+
+
+EARTH = """name = "earth"
+[body]
+preset = "earth"
+[initial]
+angular_velocity = [0, 0, "7.292115e-5 rad/s"]
+euler_angles = ["180 deg", "84381.406 arcsec", 0]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = "1.32712440018e20"
+orbit = {semi_major_axis = "1.495978707e11", eccentricity = 0.016709}
+[time]
+end = "100000 yr"
+samples = 101
+[model]
+level = "auto"
+short_period = true
+[integrator]
+accuracy_axis = 1e-5
+[output]
+record = ["figure_axis", "momentum_axis"]
+timeline = false
+"""
+
+
+@pytest.mark.slow
+def test_the_accuracy_of_axes_is_kept_over_1e5_years_of_the_earth() -> None:
+    """Against the motion averaged over the rotation alone, which is a hundred times nearer to the full one."""
+    run = run_text(EARTH, estimate=True)
+    assert run.summary["formulation"] == "orbit_averaged"
+    announced = run.summary["modelling"]["momentum_axis"]
+    assert announced <= 1e-5
+    assert run.dataset.attrs["modelling_error"] == run.summary["modelling"]["figure_axis"] <= 1e-5
+    nearer = run_text(EARTH, 'model.level="spin_averaged"', estimate=True)
+    assert nearer.summary["modelling"]["momentum_axis"] < 0.05 * announced
+    assert apart(run, nearer, "momentum_axis") <= announced
+    assert apart(run, nearer, "figure_axis") <= run.summary["modelling"]["figure_axis"]
+
+
+@pytest.mark.slow
+def test_twelve_digits_over_a_year_of_the_earth_take_every_rotation() -> None:
+    run = run_text(EARTH, 'time.end="1 yr"', "integrator.accuracy_axis=1e-12")
+    assert run.summary["formulation"] == "quaternion"
+    assert run.summary.get("modelling") is None
+    assert run.summary["accuracy"]["certified"] <= 1e-12
+
+
+def test_plan_says_what_each_level_costs_and_leaves_out() -> None:
+    given = text("auto", time="end = 20\nsamples = 21")
+    planned = rigidsim.plan(rigidsim.parse(given), changes={"integrator.accuracy_axis": 1e-2})
+    rows = {row["level"]: row for row in planned["levels"]}
+    assert list(rows) == ["orbit_averaged", "spin_averaged", "full"]
+    assert [level for level, row in rows.items() if not row["why_not"]] == ["orbit_averaged"]
+    errors = [row["error_rad"] for row in rows.values()]
+    assert errors[0] > errors[1] > errors[2] == 0
+    steps = [row["steps"] for row in rows.values()]
+    assert steps[0] < steps[1] < steps[2]
+    assert planned["predicted"]["steps"] == pytest.approx(steps[0], rel=0.5)
+    plain = rigidsim.plan(rigidsim.parse(config(BODY, START, LOAD, "end = 1\nsamples = 2")))
+    assert plain["levels"] == []
+
+
+def test_datasets_keep_the_modelling_error() -> None:
+    run = run_text(text("orbit_averaged", short_period=True, time="end = 2\nsamples = 3"), estimate=True)
+    found = run.summary["modelling"]
+    worst = max(found["momentum_axis"], found["figure_axis"])
+    assert run.dataset.attrs["modelling_error"] == worst
+    assert "modelling_error" not in run_text(text("orbit_averaged")).dataset.attrs

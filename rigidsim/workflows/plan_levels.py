@@ -1,0 +1,74 @@
+"""What each level of model would cost and leave out: ``plan``'s part on ``[model]``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from rigidsim.accuracy.level import CHEAPEST_FIRST, LevelChoice
+from rigidsim.accuracy.modelling import measure_modelling
+from rigidsim.accuracy.motion import run_pilot
+from rigidsim.errors import ConfigError
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.model_table import FULL
+from rigidsim.solve.assembly import assemble
+from rigidsim.solve.problem import InitialValueProblem, prepare
+
+_PILOT_SECONDS = 0.2
+_LARGEST_CHUNK = 1024  # of steps
+
+
+def compared_levels(
+    experiment: Experiment, choice: LevelChoice | None, loads: Sequence[Load] = ()
+) -> list[dict[str, Any]]:
+    """All levels, the cheapest first, where the config says anything of models.
+
+    Args:
+        experiment: as it was given.
+        choice: what ``level = "auto"`` came to, whose measurements aren't repeated.
+
+    Returns:
+        For JSON: the level; ``error_rad``, the modelling error of axes forecast from the beginning,
+        None where there is none; ``steps`` and ``cpu_seconds`` of the integration, from a short pilot; and
+        why it isn't taken, empty for the one that is.
+    """
+    if "model" not in experiment.config.model_fields_set:
+        return []
+    asked = choice.level if choice else experiment.config.model.level
+    looked_at = {row.level: row for row in choice.considered} if choice else {}
+    found = []
+    for level in (*CHEAPEST_FIRST, FULL):
+        row: dict[str, Any] = {"level": level, "error_rad": None, "steps": None, "cpu_seconds": None}
+        known = looked_at.get(level)
+        try:
+            prepared = prepare(experiment.having([f'model.level="{level}"']), loads=loads)
+        except ConfigError as error:
+            found.append({**row, "why_not": "; ".join(problem.what for problem in error.problems)})
+            continue
+        row |= _cost(prepared)
+        if level == FULL:
+            row["error_rad"] = 0.0
+        elif known is not None:
+            row["error_rad"] = known.error
+        elif (measured := measure_modelling(prepared)) is not None:
+            row["error_rad"] = measured.worst
+        why = known.why_not if known is not None else "" if level == asked else "another level is cheaper"
+        found.append({**row, "why_not": why if choice or level == asked else "not asked for"})
+    return found
+
+
+def _cost(prepared: InitialValueProblem) -> dict[str, float]:
+    """Steps and seconds of the whole integration."""
+    corrected = assemble(prepared).corrected
+    pilot = run_pilot(
+        corrected.stepper,
+        prepared.clock,
+        corrected.skip,
+        seconds=_PILOT_SECONDS,
+        chunk=1,
+        largest_chunk=_LARGEST_CHUNK,
+    )
+    steps = math.ceil(pilot.whole)
+    return {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}
