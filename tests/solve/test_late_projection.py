@@ -98,7 +98,8 @@ def test_errors_stay_those_of_the_beginning() -> None:
 def test_where_nothing_can_be_held_it_means_nothing() -> None:
     for load in (
         'kind = "torque"\ncomponents = ["0.01*sin(t)", 0, 0]',
-        'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1, eccentricity = 0.2, period = 7}',
+        'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+        "orbit = {semi_major_axis = 1, eccentricity = 0.2, period = 7}",
         'kind = "torque"\ncomponents = ["abs(wx)/9", 0, 0]',
     ):
         found = rigidsim.parse(

@@ -194,7 +194,7 @@ timeline = false
 
 @pytest.mark.slow
 def test_the_accuracy_of_axes_is_kept_over_1e5_years_of_the_earth() -> None:
-    """Against the motion averaged over the rotation alone, which is a hundred times nearer to the full one."""
+    """Against the motion averaged over the rotation alone, a hundred times nearer to the full one."""
     run = run_text(EARTH, estimate=True)
     assert run.summary["formulation"] == "orbit_averaged"
     announced = run.summary["modelling"]["momentum_axis"]
