@@ -26,11 +26,11 @@ import mpmath
 import numpy as np
 
 from rigidsim.model.projected_invariants import projected_invariants
-from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.model.two_part import in_two_parts
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.least_correction import least_correction
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
 LATE = 8192
@@ -188,7 +188,7 @@ class Projection:
                 continue
             self.use(int(there))
             self.load()
-            found = self._residuals_of(self._summed(np.array(values).reshape(self._parts, -1)))
+            found = self._residuals_of(self._summed(list(np.array(values).reshape(self._parts, -1))))
             integrals += 0.5 * (now - self._times[0]) * (found + self._then)
             self._then[:], self._times[0] = found, now
         self.use(chart)
@@ -344,43 +344,3 @@ class Projection:
         """
         two = context.mpf(2)
         return max(two ** (2 * (2 + self._low.bits - self._high.bits)), two ** (9 - self._high.bits))
-
-
-def least_correction(
-    gradients: list[list[Symbolic]], wanted: list[Symbolic], damping: Scalar
-) -> list[Symbolic]:
-    """J^T (J J^T + damping)^-1 r: the least change of the state that takes r off the residuals.
-
-    Args:
-        gradients: J, one row for each residual, of order one.
-        wanted: r.
-    """
-    m = len(wanted)
-    pairs = [[zip(gradients[a], gradients[b], strict=True) for b in range(m)] for a in range(m)]
-    gram = [[hy.sum([x * y for x, y in pair]) for pair in row] for row in pairs]
-    for a in range(m):
-        gram[a][a] = gram[a][a] + damping
-    weights = solve_positive(gram, wanted)
-    states = range(len(gradients[0]))
-    return [hy.sum([gradients[j][i] * weights[j] for j in range(m)]) for i in states]
-
-
-def solve_positive(matrix: list[list[Symbolic]], right: list[Symbolic]) -> list[Symbolic]:
-    """Solution of a symmetric positive system of expressions, by its L D L^T decomposition."""
-    size = len(right)
-    lower: list[list[Any]] = [[None] * size for _ in range(size)]
-    pivots: list[Any] = []
-    for j in range(size):
-        known = [-(lower[j][k] * (lower[j][k] * pivots[k])) for k in range(j)]
-        pivots.append(hy.sum([matrix[j][j], *known]))
-        for i in range(j + 1, size):
-            known = [-(lower[i][k] * (lower[j][k] * pivots[k])) for k in range(j)]
-            lower[i][j] = hy.sum([matrix[i][j], *known]) / pivots[j]
-    solution: list[Any] = []
-    for i in range(size):
-        solution.append(hy.sum([right[i]] + [-(lower[i][k] * solution[k]) for k in range(i)]))
-    solution = [y / d for y, d in zip(solution, pivots, strict=True)]
-    for i in reversed(range(size)):
-        known = [-(lower[k][i] * solution[k]) for k in range(i + 1, size)]
-        solution[i] = hy.sum([solution[i], *known])
-    return solution

@@ -51,11 +51,6 @@ class Brief(Part):
     exit_code: Annotated[StrictInt, Claim(of_end=True)] = 0
 
     @property
-    def held(self) -> bool:
-        """Whether invariants were projected, be it from a count of steps on that the run went past."""
-        return self.hold_invariants and self.cost.steps > (self.hold_from_step or 0)
-
-    @property
     def dataset_digest(self) -> str | None:
         """SHA-256 of the complete dataset; None where there was none yet."""
         return None
