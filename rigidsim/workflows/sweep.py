@@ -14,8 +14,9 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.overrides import apply_overrides
 from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.toml_text import parse_toml
-from rigidsim.store.sweep_dataset import TileReader, gather, write_dataset
+from rigidsim.store.sweep_dataset import write_dataset
 from rigidsim.store.sweep_folder import SweepFolder
+from rigidsim.store.sweep_gathered import TileReader, gather
 from rigidsim.store.sweep_generation import Generation
 from rigidsim.store.sweep_run import SavedSweep, open_sweep
 from rigidsim.store.sweep_sources import sources_of

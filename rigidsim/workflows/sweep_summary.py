@@ -9,7 +9,7 @@ import numpy as np
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweep import Sweep
 from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
-from rigidsim.store.sweep_dataset import Gathered, TileReader
+from rigidsim.store.sweep_gathered import Gathered, TileReader
 from rigidsim.store.sweep_sources import ALWAYS, Sources
 
 _NOT_ESTIMATED = (
