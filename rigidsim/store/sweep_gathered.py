@@ -1,4 +1,4 @@
-"""The tiles of a sweep read once, each checked: which variables they hold, of which sizes, and at which times."""
+"""The tiles of a sweep, read once and checked: which variables they hold, of which sizes, at which times."""
 
 from __future__ import annotations
 
