@@ -261,7 +261,9 @@ def still_stride(vectors: NDArray[np.float64]) -> int:
     count = len(vectors)
     if count <= SCENE_ROWS:
         return 1
-    size = float(np.nanmax(np.abs(vectors))) if np.isfinite(vectors).any() else 0.0
+    size = float(np.abs(vectors).max())
+    if not np.isfinite(size):
+        size = float(np.nanmax(np.abs(vectors))) if np.isfinite(vectors).any() else 0.0
     for stride in (64, 16, 4):
         # a stretch of rows at a time: the motion within it is what is left out
         part = vectors[: count // stride * stride].reshape(-1, stride, 3)
@@ -280,8 +282,9 @@ def trail_stride(trail: Trail) -> int:
         return 1
     if not trail.line:  # a cloud of points needs no more of them
         return -(-count // SCENE_ROWS)
-    middle = trail.points - np.nanmean(trail.points, axis=0)
-    radius = float(np.nanmax(np.abs(middle))) if np.isfinite(middle).any() else 0.0
+    some = trail.points[:: max(count // _CHORDS, 1)]
+    some = some[np.isfinite(some).all(axis=1)]
+    radius = float(np.abs(some - some.mean(axis=0)).max()) if len(some) else 0.0
     for stride in (16, 8, 4, 2):
         looked = np.arange(0, count - stride, max(count // _CHORDS, 1))
         chords = np.abs(trail.points[looked + stride] - trail.points[looked]).max(axis=1)

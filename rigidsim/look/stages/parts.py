@@ -24,6 +24,7 @@ SPACE, BODY, CENTRE = "", "body", "centre"
 
 ARROW_REACH = 1.6  # length of the longest arrow, in units of the body's reach
 AXIS_REACH = 1.15  # of the body axes
+_CHORDS = 8000  # of a path that are looked at, to know how dense it is
 CURVE_POINTS = 4000  # of a whole polhode or track
 
 MOMENTUM: Color = (255, 196, 40)
@@ -257,14 +258,15 @@ def trail(
 
 def joined(points: Array) -> bool:
     """Whether samples are dense enough that joining them doesn't cut across the curve."""
-    first = np.arange(0, len(points) - 1, max(len(points) // 20_000, 1))
+    first = np.arange(0, len(points) - 1, max(len(points) // _CHORDS, 1))
     between = points[first + 1] - points[first]
     chords = np.sqrt(np.einsum("ij,ij->i", between, between))
     chords = chords[np.isfinite(chords)]
     if not len(chords):
         return True
     points = points[first]
-    radius = longest(points - np.nanmean(points, axis=0))
+    points = points[np.isfinite(points).all(axis=1)]
+    radius = longest(points - points.mean(axis=0))
     return float(np.percentile(chords, 95)) <= 0.35 * max(radius, 1e-6)
 
 
