@@ -40,7 +40,7 @@ class Window:
 
     Attributes:
         start, end: seconds.
-        steps: of the full model.
+        steps, reduced_steps: of the full model and of the other.
         momentum, figure: largest distance between the directions of the angular momentum and of the figure
             axis, with what averaging removed added back, rad; None where the body tumbles.
         recorded, recorded_figure: the same for the directions as the run records them.
@@ -57,6 +57,7 @@ class Window:
     recorded_figure: float | None
     growth: tuple[float, float]
     doubt: float
+    reduced_steps: int
 
 
 def rotation_rates(average: Average) -> list[float]:
@@ -109,6 +110,7 @@ def side_by_side(
         _largest(true["figure_axis"] - plain[1]["figure_axis"]) if average.figure else None,
         (float(growth[0]), float(growth[1])),
         float(np.linalg.norm(first - last)) / 2,
+        reduced[0],
     )
 
 

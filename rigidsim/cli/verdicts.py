@@ -26,6 +26,8 @@ _ADVICE = {
     "percent more CPU",
     AdviceCode.CLOSED_FORM: 'this scene has a closed form: method = "closed_form" is right to {then} rad at '
     "any time, in place of {now}",
+    AdviceCode.AVERAGED: '[model] level = "{level}" with short_period = true keeps the axes within {then} '
+    "rad of this at 1/{times} of the steps",
 }
 
 
@@ -46,7 +48,11 @@ def advice_line(advice: Advice) -> str | None:
     """One piece of advice; None for one of a later version."""
     known = {code.value: text for code, text in _ADVICE.items()}
     text = known.get(advice.code)
-    return None if text is None else text.format(now=f"{advice.now:.1e}", then=f"{advice.then:.0e}")
+    if text is None:
+        return None
+    times = f"{1 / advice.share:.2g}" if advice.share else "1"
+    then = f"{advice.then:.1e}" if advice.level else f"{advice.then:.0e}"
+    return text.format(now=f"{advice.now:.1e}", then=then, level=advice.level, times=times)
 
 
 def next_lines(status: str, exit_code: int, place: str) -> list[str]:

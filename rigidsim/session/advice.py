@@ -25,7 +25,17 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
     Only what was measured is promised: projected invariants make up for the errors of motions that are
     integrable (those with a closed form), whose frequencies depend on what is projected alone.
     """
-    prepared, estimate = found.prepared, found.estimate
+    prepared, estimate, cheaper = found.prepared, found.estimate, found.cheaper
+    if estimate is not None and cheaper is not None:
+        now = estimate.leading
+        averaged = Advice(
+            code=AdviceCode.AVERAGED.value,
+            now=now,
+            then=cheaper.error,
+            level=cheaper.level,
+            share=cheaper.share,
+        )
+        return (averaged,)
     if estimate is None or not estimate.closed_form or estimate.attitude is None:
         return ()
     formulation, config = prepared.system.requirements.formulation, prepared.scene.config

@@ -22,6 +22,7 @@ from rigidsim.store.summary_parts import Caution, WarningCode
 if TYPE_CHECKING:
     from rigidsim.accuracy.estimate import Estimate
     from rigidsim.accuracy.modelling import ModellingError
+    from rigidsim.session.cheaper_model import CheaperModel
 
 NEAR_SINGULAR = 1e-3
 """Factor from which Euler angles lose digits to their singularity."""
@@ -35,6 +36,7 @@ class Diagnostics:
     Attributes:
         estimate: of the errors at the end; None where none was asked for, or the run hasn't ended.
         modelling: what a reduced model leaves out; None for the full one, and where it wasn't measured.
+        cheaper: an averaged model that would have done; None where there is none, or nobody looked.
     """
 
     prepared: InitialValueProblem
@@ -42,6 +44,7 @@ class Diagnostics:
     statistics: SampleStatistics
     estimate: Estimate | None = None
     modelling: ModellingError | None = None
+    cheaper: CheaperModel | None = None
 
     @property
     def drift_bound(self) -> float:
@@ -84,6 +87,12 @@ class Diagnostics:
         from rigidsim.accuracy.modelling import measure_modelling
 
         return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
+
+    def compared(self, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
+        """With the averaged model that would have done, arguments as of ``estimated``."""
+        from rigidsim.session.cheaper_model import cheaper_model
+
+        return replace(self, cheaper=cheaper_model(self.prepared, self.progress.steps, go_on))
 
     def cautions(self) -> list[Caution]:
         """Reasons not to trust the result; empty for a sound run."""

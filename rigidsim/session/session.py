@@ -117,6 +117,7 @@ class Session:
                         corrected.waypoints,
                         lambda: not interruption.requested,
                     )
+                    found = found.compared(lambda: not interruption.requested)
                 clock.next("estimate")
                 if prepared.system.plan.average is not None and progress.status is Status.FINISHED:
                     self.observer.phase("modelling")

@@ -39,6 +39,7 @@ class AdviceCode(Enum):
 
     HOLD_INVARIANTS = "hold_invariants"
     CLOSED_FORM = "closed_form"
+    AVERAGED = "averaged"
 
 
 @dataclass(frozen=True)
@@ -242,12 +243,17 @@ class Advice(Part):
 
     Attributes:
         code: an ``AdviceCode``.
-        now, then: attitude error at the end as it is, and about as it would be, rad.
+        now, then: attitude error at the end as it is, and about as it would be, rad; of an averaged model the
+            error of the recorded axes.
+        level: of the model advised; empty for none.
+        share: of the steps that it takes, at most; None where that stays.
     """
 
     code: Text
     now: FiniteNumber
     then: FiniteNumber
+    level: Text = ""
+    share: FiniteNumber | None = None
 
 
 class ChartChanges(Part):

@@ -235,3 +235,27 @@ def test_datasets_keep_the_modelling_error() -> None:
     worst = max(found["momentum_axis"], found["figure_axis"])
     assert run.dataset.attrs["modelling_error"] == worst
     assert "modelling_error" not in run_text(text("orbit_averaged")).dataset.attrs
+
+
+def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(
+    full: rigidsim.Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is promised is kept: the model advised is as near, at that part of the steps."""
+    from rigidsim.cli.verdicts import advice_line
+    from rigidsim.session import cheaper_model
+
+    assert full.summary["cost"]["steps"] < cheaper_model.LONG
+    assert run_text(text("full"), estimate=True).summary["advice"] == []
+    monkeypatch.setattr(cheaper_model, "LONG", 1000)
+    monkeypatch.setattr(cheaper_model, "NEAR", 1e-4)
+    told = run_text(text("full"), estimate=True)
+    (advice,) = told.summary["advice"]
+    assert (advice["code"], advice["level"]) == ("averaged", "orbit_averaged")
+    line = advice_line(told.outcome.advice[0])
+    assert line is not None
+    assert line.startswith('[model] level = "orbit_averaged" with short_period = true keeps the axes within ')
+    better = run_text(text(advice["level"], short_period=True))
+    assert apart(full, better, "momentum_axis") <= advice["then"] <= 1e-4
+    assert better.summary["cost"]["steps"] <= 1.1 * advice["share"] * full.summary["cost"]["steps"]
+    monkeypatch.setattr(cheaper_model, "NEAR", 1e-9)
+    assert run_text(text("full"), estimate=True).summary["advice"] == []
