@@ -67,5 +67,7 @@ def test_commands_quote_places_with_spaces() -> None:
 
 def test_every_code_has_its_words_and_others_none() -> None:
     for code in AdviceCode:
-        assert "1.0e-08" in (advice_line(Advice(code=code.value, now=1e-8, then=1e-12)) or "")
+        line = advice_line(Advice(code=code.value, now=1e-8, then=1e-12)) or ""
+        assert "1e-12" in line
+        assert ("1.0e-08" in line) == (code is not AdviceCode.AVERAGED)  # an error of axes, not of attitudes
     assert advice_line(Advice(code="of a later version", now=1e-8, then=1e-12)) is None
