@@ -24,6 +24,7 @@ import numpy as np
 
 from rigidsim.model.euler_charts import is_proper
 from rigidsim.model.outputs import Recorded
+from rigidsim.model.reference_plane import plane_drift
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
@@ -98,6 +99,10 @@ def angle_rate(system: System, angles: Sequence[Recorded]) -> float:
     rad/s: Euler angles from space, others maybe from a frame that turns with an orbit.
     """
     moving = any(r.name != "euler_angles" for r in angles)
+    if system.plan.average is not None:  # the plane may move, but nothing is told of the place on an orbit
+        drift = plane_drift(system.scene, system.plan.loads)
+        if drift is not None:
+            return float(system.rate_bound + drift)
     return float(system.rate_bound) + (float(source_rate(system.scene)) if moving else 0.0)
 
 

@@ -10,6 +10,7 @@ from support import config, run_text
 
 import rigidsim
 from rigidsim.solve.problem import prepare
+from rigidsim.solve.turn_count import angle_rate, angles_to_join
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 NODE, PERIAPSIS = 0.004, 0.006  # rad/s beside a mean motion of 1
@@ -85,6 +86,8 @@ def test_the_average_over_an_orbit_carries_its_elements_alone() -> None:
         ).system
         names = ["table_part1", "table_k1", "table_h1", "table_q1", "table_p1"]
         assert system.states == ["sx", "sy", "sz", *names, *more]
+        # nor do turns of angles between samples have to be counted along the orbit, whose mean motion is 1
+        assert angle_rate(system, angles_to_join(system)) < 0.02
     mean = run_text(text("orbit_averaged", by_table=True, short_period=False))
     nodding = run_text(text("orbit_averaged", by_table=True))
     assert 0.05 * RATE < apart(mean, nodding) < RATE * (1 - ECCENTRICITY) ** -3

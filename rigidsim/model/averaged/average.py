@@ -112,7 +112,9 @@ class Average:
         """Of the momentum's turning, rad/s (mpf)."""
         found = sum(abs(self.rate(source)) * source.nearest for source in self.sources)
         if self.resonance is not None:
+            assert self.slow is not None
             found += 4 * self.resonance.strength * self.resonance.source.nearest / self.motion.momentum
+            found += 2 * self.resonance.libration_rate + abs(self.slow.excess) / self.motion.moments[2]
         return found
 
     def shear(self, context: Any, time: Any) -> Any:
