@@ -50,6 +50,8 @@ STUDIES = {
     "accuracy_certificates": ("accuracy_certificates", "whether certified errors are true"),
 }
 """Studies by name: their figure in experiments/figures, and what they ask."""
+SWEPT_STUDIES = ("apophis_flyby", "flip_sphere", "round_off")
+"""Sweeps whose picture is their study's."""
 
 
 def numbers(run: rigidsim.Run) -> list[str]:
@@ -132,7 +134,8 @@ def page(rows: list[list[str]]) -> str:
         parts.append(
             f"*{description}.* [{config.name}](../configs/sweeps/{config.name}), by `rigidsim sweep`."
         )
-        parts.append(f"![What rigidsim plot draws of it](figures/{config.stem}.png)")
+        drawn_by = "its study" if config.stem in SWEPT_STUDIES else "rigidsim plot"
+        parts.append(f"![What {drawn_by} draws of it](figures/{config.stem}.png)")
     parts.append("## Studies")
     parts.append(
         "Questions with an answer, each one command, `python -m experiments.NAME`; "

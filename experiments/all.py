@@ -34,6 +34,9 @@ STUDIES = (
     "spectral_lines",
     "hyperion",
     "satellite_stability",
+    "flip_sphere",
+    "round_off_ensemble",
+    "apophis_flyby",
     "averaged_motions",
 )
 

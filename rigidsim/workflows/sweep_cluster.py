@@ -19,6 +19,7 @@ from rigidsim.workflows.sweep_ways import task
 _AHEAD = 2  # tiles for each thread
 _MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
 _LOOK_SECONDS = 5
+_TELL_SECONDS = 0.2
 _ALONE_SECONDS = 120  # without any worker, after which nobody waits any more
 
 
@@ -38,7 +39,7 @@ class Cluster:
 
         Raises:
             RigidsimError: Dask isn't installed, or no scheduler answers.
-            StoppedError: workers die again and again at the same tile.
+            StoppedError: workers die again and again at the same tile, or the scheduler went.
         """
         distributed = _distributed()
         try:
@@ -49,7 +50,15 @@ class Cluster:
                 "start one with: dask scheduler"
             ) from None
         with client:
-            yield from self._stream(distributed, client, generation, list(reversed(tiles)))
+            try:
+                yield from self._stream(distributed, client, generation, list(reversed(tiles)))
+            except (OSError, RuntimeError) as error:  # what Dask raises of a connection that is gone
+                if client.status == "running":
+                    raise
+                raise StoppedError(
+                    f"--scheduler {self._address}: the scheduler is gone; start it again, with its workers, "
+                    "and give the command again; the tiles that are complete are kept"
+                ) from error
 
     def _stream(
         self, distributed: Any, client: Any, generation: Generation, waiting: list[int]
@@ -100,7 +109,10 @@ def _first_done(distributed: Any, client: Any, futures: list[Any]) -> Any:
     except TimeoutError:
         return None
     except distributed.CancelledError:  # one of them was lost with the worker that had it
-        return next(future for future in futures if future.status == "cancelled")
+        lost = next((future for future in futures if future.status == "cancelled"), None)
+        if lost is None:  # it isn't told yet which
+            time.sleep(_TELL_SECONDS)
+        return lost
     return next(iter(found.done), None)
 
 

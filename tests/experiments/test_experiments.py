@@ -21,12 +21,15 @@ from experiments.common import Check  # noqa: E402
 
 GUIDE = ROOT / "experiments" / "README.md"
 SLOW = {  # about how many seconds they take
+    "apophis_flyby": 15,
     "averaged_motions": 100,
     "flip_period": 15,
+    "flip_sphere": 10,
     "heavy_top_regimes": 15,
     "hyperion": 40,
     "luni_solar_precession": 15,
     "precession_and_nutation": 40,
+    "round_off_ensemble": 25,
     "satellite_stability": 15,
     "spectral_lines": 15,
 }

@@ -1,4 +1,4 @@
-"""Which picture of a sweep is drawn where none is asked for."""
+"""Which picture a sweep gets: lines, dots, a map, or the sphere; which where none is asked for."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import xarray
 
 pytest.importorskip("matplotlib")
 
+from rigidsim.look.figures.sphere_maps import directions
 from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
 
 
@@ -44,3 +45,58 @@ def test_an_axis_of_many_values_makes_a_map() -> None:
     page = sweep_figure(swept(12))
     assert not page.axes[0].get_lines()
     assert len(page.axes[0].collections) == 1
+
+
+def members_of(**axes: np.ndarray) -> xarray.Dataset:
+    """A sweep's dataset over these axes, with a number and the time of an event of each member."""
+    shape = tuple(len(values) for values in axes.values())
+    numbers = np.arange(1.0, 1 + np.prod(shape)).reshape(shape)
+    plain = {name: (name, values) for name, values in axes.items() if values.ndim == 1}
+    vectors = {f"{name}_value": ((name, f"{name}_component"), v) for name, v in axes.items() if v.ndim == 2}
+    return xarray.Dataset(
+        {
+            "status": (tuple(axes), np.zeros(shape, dtype=int)),
+            "energy_final": (tuple(axes), numbers),
+            "flip_first": (tuple(axes), numbers),
+        },
+        coords=plain | vectors,
+        attrs={"title": "a sweep", "comment": ""},
+    )
+
+
+def grid(count: int) -> np.ndarray:
+    """Random unit vectors."""
+    vectors = np.random.default_rng(1).standard_normal((count, 3))
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
+
+
+def test_directions_are_drawn_on_the_sphere_each_with_its_value() -> None:
+    vectors = 3 * grid(40)
+    dataset = members_of(spin=vectors)
+    assert directions(dataset, "spin") == pytest.approx(vectors / 3, abs=1e-15)
+    axes = sweep_figure(dataset).axes[0]
+    [dots] = axes.collections
+    assert axes.name == "mollweide"
+    assert dots.get_array().tolist() == list(range(1, 41))
+    longitude, latitude = np.asarray(dots.get_offsets()).T
+    back = np.stack(
+        [np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)]
+    )
+    assert pytest.approx(vectors / 3, abs=1e-12) == back.T
+
+
+@pytest.mark.parametrize("vectors", [grid(40) * np.linspace(1, 2, 40)[:, None], grid(5), np.ones((40, 4))])
+def test_vectors_of_other_lengths_are_no_directions_and_their_members_are_dots(vectors: np.ndarray) -> None:
+    dataset = members_of(moments=vectors)
+    assert directions(dataset, "moments") is None
+    [line] = sweep_figure(dataset).axes[0].lines
+    assert line.get_linewidth() == 0
+    assert line.get_marker() == "o"
+
+
+def test_members_in_the_order_of_a_swept_number_are_joined_and_drawn_ones_are_not() -> None:
+    dataset = members_of(member=np.arange(9.0)).drop_vars("member")
+    for values, width in ((np.linspace(0, 1, 9), True), (np.array([3.0, 1, 4, 1.5, 9, 2, 6, 5, 3.5]), False)):
+        axis = xarray.DataArray(values, dims="member", attrs={"swept_key": "time.end"})
+        [line] = sweep_figure(dataset.assign_coords(end=axis)).axes[0].lines
+        assert (line.get_linewidth() > 0) == width

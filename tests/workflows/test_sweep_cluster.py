@@ -33,6 +33,10 @@ axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 6], name = "w3"}
 
 @pytest.mark.slow  # five processes that import everything
 def test_a_cluster_makes_the_same_dataset_though_a_worker_dies(tmp_path: Path) -> None:
+    # a busy machine may take longer than 15 s to start a worker again, for which Dask would give it up
+    import dask
+
+    dask.config.set({"distributed.deploy.lost-worker-timeout": "10 minutes"})
     cluster = distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
     )
@@ -54,6 +58,37 @@ def test_a_cluster_makes_the_same_dataset_though_a_worker_dies(tmp_path: Path) -
     alone = sweep(parse(CONFIG), out=tmp_path / "b")
     for name in ("angular_velocity_final", "energy_drift_largest", "steps", "status"):
         np.testing.assert_array_equal(found.dataset[name].values, alone.dataset[name].values)
+
+
+class _Gone:
+    """A client whose scheduler went: what Dask raises then differs from version to version."""
+
+    status = "running"
+
+    def __init__(self, error: Exception, status: str) -> None:
+        self._error, self._status = error, status
+
+    def __enter__(self) -> _Gone:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is left to close."""
+
+    def nthreads(self) -> dict[str, int]:
+        self.status = self._status
+        raise self._error
+
+
+@pytest.mark.parametrize("error", [OSError("Timed out"), RuntimeError("Client is closed")])
+def test_a_scheduler_that_goes_is_told_and_another_fault_is_not_taken_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: _Gone(error, "closed"))
+    with pytest.raises(RigidsimError, match="the scheduler is gone; start it again"):
+        sweep(parse(CONFIG), out=tmp_path / "a", scheduler="tcp://127.0.0.1:9")
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: _Gone(error, "running"))
+    with pytest.raises(Exception, match=str(error)):
+        sweep(parse(CONFIG), out=tmp_path / "b", scheduler="tcp://127.0.0.1:9")
 
 
 def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Figures of a sweep: lines along one axis, a map over two, points of a section.
+"""Figures of a sweep: lines along an axis, a map over two or over a sphere, points of a section.
 
 What is drawn is a variable of the dataset: one number of each member. A vector has a line for each component,
 or the map of one of them; of two axes one with few values has a line for each. Where the members have more
@@ -14,8 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look.figures.sphere_maps import directions, on_sphere
 from rigidsim.look.figures.style import GREY, MOST_VECTOR_POINTS, PALE, PALETTE, STYLE, blank, key, titled
-from rigidsim.look.plots import pretty_unit
+from rigidsim.look.figures.sweep_axes import (
+    along,
+    axes_of,
+    edges_of,
+    geometric,
+    label_of,
+    named,
+    spans_decades,
+    title_of,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -27,17 +37,16 @@ INDICATORS = ("megno", "fli", "lyapunov")
 _ALWAYS = ("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error", "position_error")
 _BESIDE = ("failed_member", "failed_reason")
 _LAST = ("_drift_largest", "_drift_final", "_time", "_times", "_count")
+_SECTION = "_occurrence"  # dimension of the points of a section
+_MOST_LINES = 16
 _FIRST = "_first"
 _FEW = 6  # values of a second axis up to which each has a line, and there is no map
-_SECTION = "_occurrence"  # dimension of the points of a section
-_DECADES = 1.5  # from which on values of one sign have a logarithmic scale
-_MOST_LINES = 16
 _MOST_POINTS = 400_000
 
 
 def drawable(dataset: xarray.Dataset) -> list[str]:
     """Names that a sweep's figure can show, the one that it shows by default first."""
-    axes = _axes(dataset)
+    axes = axes_of(dataset)
     found = [
         str(name)
         for name, variable in dataset.data_vars.items()
@@ -83,12 +92,14 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
         axes, cut, said = _cut(dataset, variable)
         if component is not None:
             cut, said = _component(cut, axes, component, said)
-        along = max(axes, key=lambda dim: cut.sizes[dim])
-        others = [dim for dim in axes if dim != along]
-        if len(axes) == 1 or min(cut.sizes[dim] for dim in axes) <= _FEW < cut.sizes[along]:
+        if len(axes) == 1 and directions(dataset, axes[0]) is not None:
+            return _sphere(dataset, cut, axes[0], said)
+        longest = max(axes, key=lambda dim: cut.sizes[dim])
+        others = [dim for dim in axes if dim != longest]
+        if len(axes) == 1 or min(cut.sizes[dim] for dim in axes) <= _FEW < cut.sizes[longest]:
             if others and set(map(str, cut.dims)) != set(axes):
                 cut, said = _component(cut, axes, 0, said)
-            return _lines(dataset, cut, along, said)
+            return _lines(dataset, cut, longest, said)
         return _map(dataset, cut, axes, said)
 
 
@@ -104,15 +115,9 @@ def _asked(names: list[str], what: str | None) -> tuple[str, int | None]:
     return name, int(index.removesuffix("]")) if bracket else None
 
 
-def _axes(dataset: xarray.Dataset) -> list[str]:
-    """Dimensions of the members."""
-    names = [str(dim) for dim in dataset["status"].dims]
-    return names
-
-
 def _cut(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[list[str], xarray.DataArray, str]:
     """At most two axes of more than one value: the longest; the others are cut where they begin."""
-    axes = _axes(dataset)
+    axes = axes_of(dataset)
     longest = sorted(axes, key=lambda dim: -dataset.sizes[dim])[:2]
     kept = [dim for dim in axes if dim in longest and dataset.sizes[dim] > 1] or axes[:1]
     said = []
@@ -132,18 +137,9 @@ def _component(cut: xarray.DataArray, axes: list[str], index: int, said: str) ->
     places = np.unravel_index(index, [cut.sizes[dim] for dim in extra]) if extra else ()
     words = [said] if said else []
     for dim, place in zip(extra, places, strict=True):
-        words.append(f"{dim.replace('_', ' ')} {_label(cut, dim, int(place))}")
+        words.append(f"{dim.replace('_', ' ')} {label_of(cut, dim, int(place))}")
         cut = cut.isel({dim: int(place)})
     return cut, ", ".join(words)
-
-
-def _label(variable: xarray.DataArray, dim: str, place: int) -> str:
-    if dim not in variable.coords:
-        return str(place)
-    value = variable.coords[dim].values[place]
-    if np.asarray(value).dtype.kind == "f":  # of an axis of the sweep
-        return f"{dim.replace('_', ' ')} {value:.4g}"
-    return str(value)
 
 
 # --- one axis: lines ----------------------------------------------------------------------------------------
@@ -152,32 +148,44 @@ def _label(variable: xarray.DataArray, dim: str, place: int) -> str:
 def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str) -> Figure:
     figure = blank(dataset, 9.0, 4.4)
     axes = figure.add_subplot()
-    place, label = _along(dataset, axis)
+    place, label = along(dataset, axis)
     values = np.asarray(cut.transpose(axis, ...).values, dtype=np.float64).reshape(len(place), -1)
     extra = [str(dim) for dim in cut.dims if dim != axis]
     labels = [
         " ".join(parts)
-        for parts in product(*([_label(cut, d, i) for i in range(cut.sizes[d])] for d in extra))
+        for parts in product(*([label_of(cut, d, i) for i in range(cut.sizes[d])] for d in extra))
     ]
     order = np.argsort(place, kind="stable")
+    joined = _ordered(dataset, axis)
     few = len(place) <= 100
     for column in range(min(values.shape[1], _MOST_LINES)):
         axes.plot(
             place[order], values[order, column], color=PALETTE[column % len(PALETTE)],
-            marker="o" if few else None, ms=3.2, label=labels[column] if len(labels) > 1 else None,
-            rasterized=len(place) > MOST_VECTOR_POINTS,
+            marker="o" if few or not joined else None, ms=3.2 if few else 2.0, lw=None if joined else 0,
+            label=labels[column] if len(labels) > 1 else None, rasterized=len(place) > MOST_VECTOR_POINTS,
         )  # fmt: skip
-    title = _title(cut, said)
+    title = title_of(cut, said)
     if values.shape[1] > _MOST_LINES:
         title += f" (the first {_MOST_LINES} of {values.shape[1]})"
     key(axes, title)
     axes.set_xlabel(label)
-    axes.set_ylabel(_named(cut))
-    if _log(place) and _geometric(np.unique(place)):
+    axes.set_ylabel(named(cut))
+    if spans_decades(place) and geometric(np.unique(place)):
         axes.set_xscale("log")
-    if _log(values):
+    if spans_decades(values):
         axes.set_yscale("log")
+    axes.yaxis.set_offset_position("right")  # the key is on the left
     return figure
+
+
+def _ordered(dataset: xarray.Dataset, dim: str) -> bool:
+    """Whether neighbours along an axis have to do with each other: not so where members are drawn."""
+    if dim in dataset.coords:
+        return dataset[dim].dtype.kind in "fi"
+    place, _ = along(dataset, dim)
+    steps = np.diff(place)
+    known = any(c.dims == (dim,) and "swept_key" in c.attrs for c in dataset.coords.values())
+    return known and bool((steps > 0).all() or (steps < 0).all())
 
 
 # --- two axes: a map ----------------------------------------------------------------------------------------
@@ -189,11 +197,11 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
         cut, said = _component(cut, dims, 0, said)
     figure = blank(dataset, 8.4, 6.0)
     axes = figure.add_subplot()
-    (x, x_label), (y, y_label) = (_along(dataset, dim) for dim in dims)
+    (x, x_label), (y, y_label) = (along(dataset, dim) for dim in dims)
     values = np.asarray(cut.transpose(*dims).values, dtype=np.float64)
     values, x, y = values[np.argsort(x)][:, np.argsort(y)], np.sort(x), np.sort(y)
-    logs = [_log(place) and _geometric(place) for place in (x, y)]
-    edges = [_edges(place, log) for place, log in zip((x, y), logs, strict=True)]
+    logs = [spans_decades(place) and geometric(place) for place in (x, y)]
+    edges = [edges_of(place, log) for place, log in zip((x, y), logs, strict=True)]
     scale = _colours(values)
     axes.set_facecolor(PALE)
     mesh = axes.pcolormesh(*edges, values.T, cmap="viridis", rasterized=True, **scale)
@@ -203,12 +211,12 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
             setting("log")
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    title = _title(cut, said)
+    title = title_of(cut, said)
     if not np.isfinite(values).all():
         title += " (grey: no value)"
     titled(axes, title)
     bar = figure.colorbar(mesh, ax=axes, pad=0.02, aspect=30, extend=_extended(values, scale))
-    bar.set_label(_named(cut))
+    bar.set_label(named(cut))
     bar.outline.set_visible(False)
     return figure
 
@@ -223,7 +231,7 @@ def _colours(values: Array) -> dict[str, Any]:
     finite = values[np.isfinite(values)]
     if not len(finite):
         return {"vmin": 0.0, "vmax": 1.0}
-    if _log(values):
+    if spans_decades(values):
         low, high = np.percentile(finite[finite > 0], [0.5, 99.5])
         return {"norm": LogNorm(low, high)}
     low, high = np.percentile(finite, [0.5, 99.5])
@@ -240,12 +248,29 @@ def _extended(values: Array, scale: dict[str, Any]) -> str:
     return {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
 
 
+def _sphere(dataset: xarray.Dataset, cut: xarray.DataArray, dim: str, said: str) -> Figure:
+    extra = [str(other) for other in cut.dims if other != dim]
+    if extra:
+        cut, said = _component(cut, [dim], 0, said)
+    figure = blank(dataset, 8.4, 4.8)
+    values = np.asarray(cut.values, dtype=np.float64)
+    scale = _colours(values)
+    told = directions(dataset, dim)
+    assert told is not None
+    axes, shown = on_sphere(figure, told, values, scale)
+    titled(axes, title_of(cut, said))
+    bar = figure.colorbar(shown, ax=axes, pad=0.02, aspect=30, shrink=0.7, extend=_extended(values, scale))
+    bar.set_label(named(cut))
+    bar.outline.set_visible(False)
+    return figure
+
+
 # --- sections: points ---------------------------------------------------------------------------------------
 
 
 def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
     """Points of all members: two components against each other, or one against the axis of the members."""
-    members = [dim for dim in variable.dims if dim in _axes(dataset)]
+    members = [dim for dim in variable.dims if dim in axes_of(dataset)]
     occurrence = next(str(dim) for dim in variable.dims if str(dim).endswith(_SECTION))
     rest = [str(dim) for dim in variable.dims if dim not in members and dim != occurrence]
     table = np.asarray(variable.transpose(*members, occurrence, *rest).values, dtype=np.float64)
@@ -258,72 +283,18 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
     rows = table.reshape(-1, table.shape[2])[::stride]
     style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
     if rows.shape[1] > 1:
-        first, second = (_label(variable, rest[0], i) for i in (0, 1)) if len(rest) == 1 else ("0", "1")
+        first, second = (label_of(variable, rest[0], i) for i in (0, 1)) if len(rest) == 1 else ("0", "1")
         axes.scatter(rows[:, 0], rows[:, 1], c=which, cmap="viridis", **style)
-        axes.set_xlabel(f"{_named(variable)}, {first}")
-        axes.set_ylabel(f"{_named(variable)}, {second}")
-        titled(axes, f"{_title(variable, '')}; coloured by member")
+        axes.set_xlabel(f"{named(variable)}, {first}")
+        axes.set_ylabel(f"{named(variable)}, {second}")
+        titled(axes, f"{title_of(variable, '')}; coloured by member")
         return figure
-    place, label = _along(dataset, str(members[0])) if len(members) == 1 else (np.arange(count), "member")
+    place, label = along(dataset, str(members[0])) if len(members) == 1 else (np.arange(count), "member")
     axes.scatter(np.asarray(place, dtype=np.float64)[which], rows[:, 0], color=GREY, **style)
     axes.set_xlabel(label)
-    axes.set_ylabel(_named(variable))
-    titled(axes, _title(variable, ""))
+    axes.set_ylabel(named(variable))
+    titled(axes, title_of(variable, ""))
     return figure
-
-
-# --- axes and names -----------------------------------------------------------------------------------------
-
-
-def _along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
-    """Where the values of an axis stand, and the words beside it; texts and vectors are counted."""
-    if dim in dataset.coords and dataset[dim].ndim == 1 and dataset[dim].dtype.kind in "fi":
-        coordinate = dataset[dim]
-        return np.asarray(coordinate.values, dtype=np.float64), _named(coordinate, dim)
-    for name, coordinate in dataset.coords.items():  # a zip's axes lie along its members
-        if coordinate.dims == (dim,) and coordinate.dtype.kind == "f" and "swept_key" in coordinate.attrs:
-            return np.asarray(coordinate.values, dtype=np.float64), _named(coordinate, str(name))
-    return np.arange(dataset.sizes[dim], dtype=np.float64), f"{dim}, counted from 0"
-
-
-def _named(variable: xarray.DataArray, name: str | None = None) -> str:
-    """A variable's name and unit; of an axis its key beside."""
-    words = (name or str(variable.name)).replace("_", " ")
-    swept = str(variable.attrs.get("swept_key", ""))
-    if swept and swept != name:
-        words += f" ({swept})"
-    unit = pretty_unit(str(variable.attrs.get("units", "")))
-    return f"{words} [{unit}]" if unit else words
-
-
-def _title(variable: xarray.DataArray, said: str) -> str:
-    title = str(variable.attrs.get("long_name") or variable.name).replace("_", " ")
-    title = title[:1].upper() + title[1:]
-    return f"{title}; {said}" if said else title
-
-
-def _log(values: Array) -> bool:
-    finite = values[np.isfinite(values)]
-    if not len(finite) or finite.min() <= 0:
-        return False
-    low, high = np.percentile(finite, [2, 98])
-    return bool(math.log10(finite.max() / finite.min()) > 1 and math.log10(high / low) > _DECADES)
-
-
-def _geometric(place: Array) -> bool:
-    ratios = np.diff(np.log(place))
-    return len(ratios) < 2 or float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
-
-
-def _edges(place: Array, log: bool) -> Array:
-    """Borders of cells about values, (n + 1,)."""
-    at = np.log(place) if log else place
-    if len(at) == 1:
-        at = np.array([at[0] - 0.5, at[0] + 0.5])
-    else:
-        middles = (at[1:] + at[:-1]) / 2
-        at = np.concatenate([[2 * at[0] - middles[0]], middles, [2 * at[-1] - middles[-1]]])
-    return np.exp(at) if log else at
 
 
 def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, file_format: str) -> None:

@@ -1,0 +1,88 @@
+"""Axes of a sweep's figure: where its members stand along them, and the words and scales beside."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidsim.look.plots import pretty_unit
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+
+_DECADES = 1.5  # from which on values of one sign have a logarithmic scale
+
+
+def axes_of(dataset: xarray.Dataset) -> list[str]:
+    """Dimensions of the members."""
+    names = [str(dim) for dim in dataset["status"].dims]
+    return names
+
+
+def label_of(variable: xarray.DataArray, dim: str, place: int) -> str:
+    """Of one place along a dimension: x of a vector, or a value of an axis."""
+    if dim not in variable.coords:
+        return str(place)
+    value = variable.coords[dim].values[place]
+    if np.asarray(value).dtype.kind == "f":  # of an axis of the sweep
+        return f"{dim.replace('_', ' ')} {value:.4g}"
+    return str(value)
+
+
+def along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
+    """Where the values of an axis stand, and the words beside it; texts and vectors are counted."""
+    if dim in dataset.coords and dataset[dim].ndim == 1 and dataset[dim].dtype.kind in "fi":
+        coordinate = dataset[dim]
+        return np.asarray(coordinate.values, dtype=np.float64), named(coordinate, dim)
+    for name, coordinate in dataset.coords.items():  # a zip's axes lie along its members
+        if coordinate.dims == (dim,) and coordinate.dtype.kind == "f" and "swept_key" in coordinate.attrs:
+            return np.asarray(coordinate.values, dtype=np.float64), named(coordinate, str(name))
+    return np.arange(dataset.sizes[dim], dtype=np.float64), f"{dim}, counted from 0"
+
+
+def named(variable: xarray.DataArray, name: str | None = None) -> str:
+    """A variable's name and unit; of an axis its key beside."""
+    words = (name or str(variable.name)).replace("_", " ")
+    swept = str(variable.attrs.get("swept_key", ""))
+    if swept and swept != name:
+        words += f" ({swept})"
+    unit = pretty_unit(str(variable.attrs.get("units", "")))
+    return f"{words} [{unit}]" if unit else words
+
+
+def title_of(variable: xarray.DataArray, said: str) -> str:
+    """What a variable is, and where it is cut."""
+    title = str(variable.attrs.get("long_name") or variable.name).replace("_", " ")
+    title = title[:1].upper() + title[1:]
+    return f"{title}; {said}" if said else title
+
+
+def spans_decades(values: Array) -> bool:
+    """Whether values are better seen on a logarithmic scale."""
+    finite = values[np.isfinite(values)]
+    if not len(finite) or finite.min() <= 0:
+        return False
+    low, high = np.percentile(finite, [2, 98])
+    return bool(math.log10(finite.max() / finite.min()) > 1 and math.log10(high / low) > _DECADES)
+
+
+def geometric(place: Array) -> bool:
+    """Whether values lie at equal ratios."""
+    ratios = np.diff(np.log(place))
+    return len(ratios) < 2 or float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
+
+
+def edges_of(place: Array, log: bool) -> Array:
+    """Borders of cells about values, (n + 1,)."""
+    at = np.log(place) if log else place
+    if len(at) == 1:
+        at = np.array([at[0] - 0.5, at[0] + 0.5])
+    else:
+        middles = (at[1:] + at[:-1]) / 2
+        at = np.concatenate([[2 * at[0] - middles[0]], middles, [2 * at[-1] - middles[-1]]])
+    return np.exp(at) if log else at
