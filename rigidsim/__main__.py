@@ -1,5 +1,13 @@
-"""``python -m rigidsim``."""
+"""``python -m rigidsim``, and the program ``rigidsim``."""
 
 from rigidsim.cli.app import main
+from rigidsim.cli.leaving import left_at_once
 
-main()
+
+def start() -> None:
+    """The program in a process of its own."""
+    left_at_once(main)
+
+
+if __name__ == "__main__":
+    start()

@@ -142,7 +142,8 @@ def page(out: Console | None = None) -> Page:
     if out is not None:
         return _Screen(out)
     colours = any(os.environ.get(name) for name in ("FORCE_COLOR", "TTY_COMPATIBLE"))
-    return _Screen.of_stdout() if sys.stdout.isatty() or colours else Page()
+    screen = sys.stdout is not None and sys.stdout.isatty()  # it may be closed
+    return _Screen.of_stdout() if screen or colours else Page()
 
 
 def _widths(columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> list[int]:
