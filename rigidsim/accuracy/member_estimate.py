@@ -24,8 +24,9 @@ from rigidsim.solve.batch.neighbours import Spreads, Starts, follow, note
 from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.neighbours import Pushes
 
-LOOSE = 1e-6
-"""Tolerance of the lanes: order 8 in place of 11 at 1e-8, that of single runs, and half of the CPU."""
+LOOSE = 1e-8
+"""Tolerance of the lanes, as of single runs. At 1e-6, whose steps cost half, errors beside a separatrix were
+announced ten times larger: motions so followed were on other sides of it."""
 _DRIFTED = 1e-2
 """Of the tolerance times growth, from which a motion so loosely followed is another one."""
 _BY_CHANCE = 8.0

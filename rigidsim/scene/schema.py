@@ -134,7 +134,7 @@ class Output(ConfigTable):
     estimate: StrictBool = Field(
         default=True,
         description="announce the errors of attitude and path; a few percent of the run, in batches of "
-        "a sweep about as much as its members",
+        "a sweep one to two times its members",
     )
     lyapunov: StrictBool = Field(
         default=False,

@@ -22,7 +22,7 @@ _LARGEST_TILE_BYTES = 64e6
 _BUILD_SECONDS = 0.2  # equations compiled anew for each member that runs by itself
 _BATCH_SECONDS = 2e-5  # what is done for a member of a batch beside its integration
 _TRIED = 64
-_ESTIMATED = 2.0  # a member of a batch with its estimated errors, over one without
+_ESTIMATED = 2.5  # a member of a batch with its estimated errors, over one without
 
 
 def tile_length(sweep: Sweep) -> int:
