@@ -26,7 +26,7 @@ from rigidsim.solve.neighbours import Pushes
 
 LOOSE = 1e-8
 """Tolerance of the lanes, as of single runs. At 1e-6, whose steps cost half, errors beside a separatrix were
-announced ten times larger: motions so followed were on other sides of it."""
+announced ten times larger."""
 _DRIFTED = 1e-2
 """Of the tolerance times growth, from which a motion so loosely followed is another one."""
 _BY_CHANCE = 8.0
