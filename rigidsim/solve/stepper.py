@@ -8,7 +8,6 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -22,61 +21,14 @@ from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.engine import Integrator
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
 
-_SPARSE = 1.5
-"""How much longer a step may be by the last two terms than by those before, in proportion to an exponential's
-terms: 1.5^20 is three digits."""
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
-# A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
-# of the order of one internal unit, far below this, so that the bound changes no other motion.
-_LONGEST_BITS = 30
-_SPARE_BITS = 24  # of a type's exponents, for the states of order one themselves and what sums make of them
 _MOST_TO_WHOLE_TIME = 1000  # steps
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
 _HOPELESS_STEPS = 1e15  # to the last sample; at the fastest pace they would take years
 _TINY_STEPS = 32  # one after the other, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
-
-
-def longest_step(order: int, number: type) -> float:
-    """Bound of all steps, internal units.
-
-    Events are found on a step's polynomials, scaled by the powers of its size up to the order: where those
-    overflow, as 2^30 to the 10th does in single precision, heyoka finds none and says nothing of it.
-
-    Args:
-        number: type of the states.
-    """
-    if not issubclass(number, np.floating):  # quadruple and beyond: of far more than a thousand exponents
-        return 2.0**_LONGEST_BITS
-    return 2.0 ** min(_LONGEST_BITS, (np.finfo(number).maxexp - _SPARE_BITS) // order)
-
-
-def bound_of_sparse_series(coefficients: np.ndarray) -> float:
-    """How long a step may be by all Taylor coefficients of a state, where that is far less than by the last
-    two, from which the engine tells its length; infinity elsewhere.
-
-    From rest under a torque that grows with time, a quaternion's series have every third term only: the last
-    two are zero, and the engine would take any step at all.
-
-    Args:
-        coefficients: (states, order + 1), of any step from there.
-    """
-    sizes = [max(abs(float(x)) for x in column) for column in coefficients.T]
-    order, base = len(sizes) - 1, max(sizes[0], 1.0)  # the engine's errors are absolute below 1
-
-    def radius(term: int) -> float:
-        return (base / sizes[term]) ** (1 / term) if sizes[term] > 0 else math.inf
-
-    def of_entire(term: int) -> float:  # terms of an exponential, which is what a rotation's are like
-        return math.exp(math.lgamma(term + 1) / term)
-
-    terms = range(order // 2 + 1, order - 1)
-    shortest = min((radius(m) for m in terms), default=math.inf)
-    expected = min((radius(m) * of_entire(order) / of_entire(m) for m in terms), default=math.inf)
-    if min(radius(order), radius(order - 1)) <= _SPARSE * expected:
-        return math.inf
-    return shortest * math.exp(-2 - 0.7 / (order - 1))  # as heyoka's own (Jorba & Zou 2005)
 
 
 @dataclass(frozen=True)

@@ -308,3 +308,24 @@ class SwitchedEngines(Stepper):
             else:
                 end = middle
         return end
+
+    def _moved(self, j: int) -> int:
+        """The side of a surface that a step leads to, which is taken back; 0 for none."""
+        engine = self._integrator
+        time, before = engine.dtime, np.array(engine.state)
+        self._set(engine)
+        muted, self.log.muted = self.log.muted, True
+        engine.step(self._longest, write_tc=True)
+        end, after = engine.time, np.array(engine.state)
+        found = 0
+        for part in (1 / 16, 1 / 2, 1.0):
+            then = time[0] + self.precision.of_double(part) * (end - time[0])
+            look = self._look(engine.update_d_output(then), then)
+            if abs(float(look.u[j])) > self._probe.noise(look, j, [before, after]):
+                found = 1 if look.u[j] > 0 else -1
+                break
+        self.log.muted = muted
+        self._roots.clear()
+        engine.dtime = time
+        engine.state[:] = before
+        return found

@@ -17,7 +17,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sliding import MOST_AT_ONCE
-from rigidsim.solve.stepper import bound_of_sparse_series
+from rigidsim.solve.step_bounds import bound_of_sparse_series
 from rigidsim.solve.switched_engines import Root, SwitchedEngines
 from rigidsim.solve.switching import HELD, SLIDES, Choice, Fields, Look
 
@@ -329,27 +329,6 @@ class SwitchingStepper(SwitchedEngines):
                 return Choice(None, "both sides lead back to it with growing speed")
             modes[j] = kept[0] or idle[j]
         return Choice(modes)
-
-    def _moved(self, j: int) -> int:
-        """The side of a surface that a step leads to, which is taken back; 0 for none."""
-        engine = self._integrator
-        time, before = engine.dtime, np.array(engine.state)
-        self._set(engine)
-        muted, self.log.muted = self.log.muted, True
-        engine.step(self._longest, write_tc=True)
-        end, after = engine.time, np.array(engine.state)
-        found = 0
-        for part in (1 / 16, 1 / 2, 1.0):
-            then = time[0] + self.precision.of_double(part) * (end - time[0])
-            look = self._look(engine.update_d_output(then), then)
-            if abs(float(look.u[j])) > self._probe.noise(look, j, [before, after]):
-                found = 1 if look.u[j] > 0 else -1
-                break
-        self.log.muted = muted
-        self._roots.clear()
-        engine.dtime = time
-        engine.state[:] = before
-        return found
 
     def _fail(self, j: int, why: str) -> bool:
         surface = self.system.plan.surfaces.found[j]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import config, run_text
 
-from rigidsim.solve.stepper import bound_of_sparse_series, longest_step
+from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
 
 THROWN = config(
     "principal_moments = [1, 1, 1]\nmass = 1",

@@ -17,7 +17,7 @@ import numpy as np
 from rigidsim.solve.batch.lane_results import IDLE, Found, Lanes, put_in_place, until_next
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
-from rigidsim.solve.stepper import longest_step
+from rigidsim.solve.step_bounds import longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, at the same places always."""
