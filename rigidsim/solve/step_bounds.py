@@ -1,4 +1,4 @@
-"""How long a natural step may be where the engine, which looks at the last two terms of a series, cannot tell.
+"""How long a natural step may be where the engine, going by the last two terms of a series, cannot tell.
 
 A series may end (free fall without rotation), or have gaps just where the engine looks.
 """
