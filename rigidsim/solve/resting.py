@@ -6,7 +6,7 @@ rest there, in infinitely many switches, where each is shorter than the one befo
 those on the way out brake and those on the way back drive, and the product of the ways back over the ways out
 is below 1. Zero lies in the convex hull of the four fields then, and being in it the motion stays (Filippov
 1988, section 4). Fields of which several combinations keep to both surfaces give different motions in general
-(Dieci & Lopez 2011); here all give the same one, or nothing is decided: what the two sides add to the field
+(Dieci & Lopez 2009); here all give the same one, or nothing is decided: what the two sides add to the field
 has to be parallel.
 """
 
