@@ -63,6 +63,7 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
             markerfacecolor=color if held[n] or marker == "*" else "white", markeredgewidth=1.3,
             alpha=0.45 if short[n] else 1.0, linestyle="none", zorder=3,
         )  # fmt: skip
+    _draw_models(axes, dataset)
     axes.set_xscale("log")
     axes.set_yscale("log")
     if len(front):
@@ -71,6 +72,18 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
     axes.set_ylabel("largest attitude error, rad")
     axes.margins(0.08)
     _legend(axes, dataset, short.any())
+
+
+def _draw_models(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Averaged models beside the settings, named: errors of axes at the end of the whole motion."""
+    for n in range(dataset.sizes.get("model", 0)):
+        one = dataset.isel(model=n)
+        place = float(one["model_cpu_ratio"]), float(one["model_error"])
+        axes.plot(*place, "P", markersize=10, color=_OTHER, linestyle="none", zorder=3)
+        axes.annotate(
+            str(one["model"].item()).replace("_", " "), place, xytext=(9, 0), textcoords="offset points",
+            va="center", fontsize=8.5, color=_OTHER,
+        )  # fmt: skip
 
 
 def _number(axes: Axes, cost: np.ndarray, error: np.ndarray) -> None:
@@ -120,10 +133,13 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
     if closed:
         handles.append(handle("closed form", marker="*", color="#444444"))
     handles.append(handle("filled: invariants held", marker="o", color="#444444"))
+    if "model" in dataset.sizes:
+        handles.append(handle("averaged model: axes, to the end", marker="P", color=_OTHER))
     if short:
         handles.append(handle("pale: over less of the motion", marker="o", color="#444444", alpha=0.45))
     handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
-    axes.legend(handles=handles, loc="upper right", ncols=2, fontsize=8, frameon=True, framealpha=0.9)
+    place = "lower left" if "model" in dataset.sizes else "upper right"  # models are cheap, and not exact
+    axes.legend(handles=handles, loc=place, ncols=2, fontsize=8, frameon=True, framealpha=0.9)
 
 
 def _key(axes: Axes, dataset: xarray.Dataset) -> None:

@@ -20,7 +20,9 @@ from rigidsim.accuracy.bench.dataset import dataset_of
 from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.model_table import FULL
 from rigidsim.scene.records import dataclass
+from rigidsim.workflows.plan_levels import compared_levels
 
 if TYPE_CHECKING:
     import xarray
@@ -60,6 +62,14 @@ class Tradeoff:
             rows.append(row)
         return {
             "name": data.attrs["title"],
+            "models": [
+                {
+                    "level": str(one["model"].item()),
+                    "error_rad": float(one["model_error"]),
+                    "cpu_ratio": float(one["model_cpu_ratio"]),
+                }
+                for one in (data.isel(model=n) for n in range(data.sizes.get("model", 0)))
+            ],
             **{key: _plain(value) for key, value in data.attrs.items() if key in _TOLD},
             "advice": [asdict(a) for a in self.advice],
             "settings": rows,
@@ -120,11 +130,40 @@ def tradeoff(
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunFolderError(f"{folder}: can't be made: {error.strerror or error}") from None
-    dataset = dataset_of(measure(experiment, budget=budget, repeats=repeats, full=full, told=told))
+    resolved = experiment
+    if experiment.config.model.level != FULL:
+        resolved = experiment.having([f'model.level="{FULL}"', "model.short_period=false"])
+    dataset = dataset_of(measure(resolved, budget=budget, repeats=repeats, full=full, told=told))
+    dataset = with_models(dataset, experiment)
     result = Tradeoff(dataset, folder)
     if folder is not None:
         save(dataset, folder)
     return result
+
+
+def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Dataset:
+    """With what averaged models leave out and cost, where the config says anything of models.
+
+    Added along ``model``: ``model_error``, rad, of axes at the end of the whole motion; ``model_cpu_ratio``,
+    over the cost of the full model in the default setting, both from short pilots.
+    """
+    rows = compared_levels(experiment, None)
+    full = next((row["cpu_seconds"] for row in rows if row["level"] == FULL), None)
+    known = [row for row in rows if row["error_rad"] and row["cpu_seconds"] and full]
+    if not known:
+        return dataset
+    told = {
+        "model_error": ("rad", "error of the momentum's and the figure axis' direction at the end",
+                        [row["error_rad"] for row in known]),
+        "model_cpu_ratio": ("1", "CPU time relative to the full model in the default setting",
+                            [row["cpu_seconds"] / full for row in known]),
+    }  # fmt: skip
+    found = {
+        name: ("model", np.array(values), {"units": units, "long_name": long_name})
+        for name, (units, long_name, values) in told.items()
+    }
+    names = np.array([row["level"] for row in known], dtype=object)
+    return dataset.assign(found).assign_coords(model=("model", names, {"long_name": "averaged model"}))
 
 
 def save(dataset: xarray.Dataset, folder: Path) -> None:

@@ -229,6 +229,22 @@ def test_plan_says_what_each_level_costs_and_leaves_out() -> None:
     assert plain["levels"] == []
 
 
+def test_tradeoff_has_models_beside_settings() -> None:
+    """Cheaper and less exact the more is averaged; nothing where the config says nothing of models."""
+    import xarray
+
+    from rigidsim.workflows.tradeoff import Tradeoff, with_models
+
+    empty = xarray.Dataset(coords={"setting": []}, attrs={"title": "nothing measured"})
+    found = with_models(empty, rigidsim.parse(text("spin_averaged", short_period=True)))
+    assert list(found["model"].values) == ["orbit_averaged", "spin_averaged"]
+    error, cost = found["model_error"].values, found["model_cpu_ratio"].values
+    assert error[0] > error[1] > 0
+    assert 0 < cost[0] < cost[1] < 0.5
+    assert with_models(empty, rigidsim.parse(config(BODY, START, LOAD, "end = 1\nsamples = 2"))) is empty
+    assert Tradeoff(found).dataset.sizes["model"] == 2
+
+
 def test_datasets_keep_the_modelling_error() -> None:
     run = run_text(text("orbit_averaged", short_period=True, time="end = 2\nsamples = 3"), estimate=True)
     found = run.summary["modelling"]
