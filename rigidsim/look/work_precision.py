@@ -138,7 +138,9 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
     if short:
         handles.append(handle("pale: over less of the motion", marker="o", color="#444444", alpha=0.45))
     handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
-    place = "lower left" if "model" in dataset.sizes else "upper right"  # models are cheap, and not exact
+    place: Any = (
+        "lower left" if "model" in dataset.sizes else "upper right"
+    )  # models are cheap, and not exact
     axes.legend(handles=handles, loc=place, ncols=2, fontsize=8, frameon=True, framealpha=0.9)
 
 
