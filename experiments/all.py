@@ -38,6 +38,7 @@ STUDIES = (
     "round_off_ensemble",
     "apophis_flyby",
     "averaged_motions",
+    "whole_cycle",
 )
 
 
