@@ -7,31 +7,21 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
-from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, nutation, plane_vectors, second_order
+from rigidsim.model.averaged.average import DIRECTION, TOLD
+from rigidsim.model.averaged.orbit_terms import Ellipse, nutation, second_order
 from rigidsim.model.averaged.sources import Source
-from rigidsim.model.averaged.table_terms import TableTerms
-from rigidsim.model.ephemeris import source_position
-from rigidsim.model.kinematics import seconds
+from rigidsim.model.averaged.sources_seen import SourcesSeen
 from rigidsim.model.load import Load, Term
-from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbit_states import OrbitStates
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, dot
-from rigidsim.scene.epochs import J2000
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 
 @dataclass(frozen=True)
-class AveragedMechanics(Mechanics):
+class AveragedMechanics(SourcesSeen):
     """Mechanics of an averaged motion; ``rates`` are those at which the momentum turns, in space axes."""
-
-    average: Average | None = None
 
     @property
     def turning_rate(self) -> Any:
@@ -51,11 +41,6 @@ class AveragedMechanics(Mechanics):
     def conserves_energy(self) -> bool:
         """It is no question here: the energy of the free rotation is a constant."""
         return False
-
-    @property
-    def of(self) -> Average:
-        """What is averaged."""
-        return self.carried(self.average)
 
     # --- equations ------------------------------------------------------------------------------------------
 
@@ -117,22 +102,6 @@ class AveragedMechanics(Mechanics):
         towards = zip(gradient, normal, p, t, strict=True)
         return [g + more * ((x * x - y * y) * n + 2.0 * (z * (x * a - y * b))) for g, n, a, b in towards]
 
-    @cached_property
-    def _by_table(self) -> dict[TabulatedOrbit, TableTerms]:
-        """For each table its part in an average over orbits."""
-        return {
-            table: TableTerms.of(table, place, self.scaling.time, self.scene.start, self.number)
-            for table, place in self.tables.items()
-        }
-
-    def table_block(self, table: TabulatedOrbit) -> StateBlock:
-        """The states of an orbit by a table."""
-        return self.table(table).block
-
-    def table(self, orbit: TabulatedOrbit) -> OrbitStates:
-        """As of ``Kinematics``; averaged over, without a direction unless the mean longitude is carried."""
-        return self._by_table[orbit].seen if self.of.over_orbits else super().table(orbit)
-
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
         """The sum of k (a/r)^3 (s . r) r over the sources, per internal unit of time: s' is that times s."""
         parts = [self._pull_of(source, s) for source in self.of.sources]
@@ -166,85 +135,6 @@ class AveragedMechanics(Mechanics):
         along, up = factor * x, factor * y
         level = tilt_c * up
         return [node_c * along - node_s * level, node_s * along + node_c * level, tilt_s * up]
-
-    def _in_plane(self, orbit: KeplerOrbit) -> tuple[Symbolic, Symbolic, Symbolic | None]:
-        """Position over a, from the node, and a/r where it varies."""
-        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
-        if orbit.circular:
-            return hy.cos(mean), hy.sin(mean), None
-        context, e = self.scene.context, orbit.eccentricity
-        anomaly = hy.kepE(hy.expression(self.number(e)), mean)
-        c, sine = hy.cos(anomaly), hy.sin(anomaly)
-        x, y = c - self.number(e), self.number(context.sqrt(1 - e * e)) * sine
-        w_c, w_s = self._turned(orbit.periapsis, orbit.periapsis_rate)
-        return w_c * x - w_s * y, w_s * x + w_c * y, 1.0 / (1.0 - self.number(e) * c)
-
-    def _seen(self, source: Source) -> tuple[list[Symbolic], Symbolic | None]:
-        """Unit vector to a source, space axes, and a/r where it varies."""
-        context, load = self.scene.context, source.load
-        if load.position is not None:
-            length = context.sqrt(dot(load.position, load.position))
-            return [as_factor(self.number(x / length)) for x in load.position], None
-        if load.ephemeris is not None:
-            time = seconds(self)
-            if load.epoch is not None and load.epoch != J2000:
-                time = time + self.number(ExactNumber(load.epoch.since_j2000()).at(context))
-            place = source_position(load.ephemeris, time)
-            return place.direction, place.inverse_distance
-        if source.table is not None:
-            by_table = self.table(source.table)
-            return by_table.direction, by_table.inverse_distance
-        assert source.orbit is not None
-        seen = self.orbit(source.orbit)
-        return seen.direction, None if source.orbit.circular else seen.inverse_distance
-
-    def orbit(self, orbit: KeplerOrbit) -> OrbitStates:
-        """As functions of time: a phase that loses digits as time goes on moves the direction by that times
-        the nutation, and a torque without states of its own lets steps be longer by a factor of two.
-        """
-        at = self._place(orbit)
-        if orbit.circular:
-            inverse, x, y = hy.expression(1.0), at.cosine, at.sine
-        else:
-            context, e = self.scene.context, orbit.eccentricity
-            inverse = 1.0 / (1.0 - self.number(e) * at.cosine)
-            x = (at.cosine - self.number(e)) * inverse
-            y = self.number(context.sqrt(1 - e * e)) * at.sine * inverse
-        direction = [x * p + y * t for p, t in zip(at.pericentre, at.across, strict=True)]
-        return OrbitStates(StateBlock([], [], []), direction, self._normal(orbit), inverse)
-
-    def _moving(self, angle: Any, rate: Any) -> Symbolic:
-        """An angle that advances uniformly."""
-        start = hy.expression(self.number(angle))
-        if rate == 0:
-            return start
-        unit = self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
-        return start + self.number(rate * unit) * hy.time
-
-    def _turned(self, angle: Any, rate: Any) -> tuple[Symbolic, Symbolic]:
-        """Its cosine and sine."""
-        if rate == 0:
-            context = self.scene.context
-            return as_factor(self.number(context.cos(angle))), as_factor(self.number(context.sin(angle)))
-        moving = self._moving(angle, rate)
-        return hy.cos(moving), hy.sin(moving)
-
-    def _normal(self, orbit: KeplerOrbit) -> list[Symbolic]:
-        c, s = self._turned(orbit.inclination, 0)
-        node_c, node_s = self._turned(orbit.ascending_node, orbit.node_rate)
-        return [node_s * s, -(node_c * s), c]
-
-    def _place(self, orbit: KeplerOrbit) -> OrbitPlace:
-        """Where a source is on its orbit."""
-        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
-        e = hy.expression(self.number(orbit.eccentricity))
-        anomaly = mean if orbit.circular else hy.kepE(e, mean)
-        vectors = plane_vectors(
-            self._turned(orbit.inclination, 0),
-            self._turned(orbit.ascending_node, orbit.node_rate),
-            self._turned(orbit.periapsis, orbit.periapsis_rate),
-        )
-        return OrbitPlace(hy.cos(anomaly), hy.sin(anomaly), *vectors)
 
     def _offset(self, s: list[Symbolic], turning: list[Symbolic]) -> list[Symbolic]:
         """Of the circled axis from the momentum; ``turning`` per internal unit of time."""
