@@ -1,6 +1,6 @@
-"""Writes mars_secular.csv: the orbit of Mars over the next 7 million years, for mars_obliquity.toml.
+"""Writes mars_secular.csv: the orbit of Mars over the next 10 million years, for mars_obliquity.toml.
 
-    python configs/tables/mars_secular.py          # some ten minutes; takes numba (rigidsim[peers])
+    python configs/tables/mars_secular.py          # some fifteen minutes; takes numba (rigidsim[peers])
 
 The eight planets as points under each other's gravity, with the relativistic advance of the perihelia as of a
 potential (Nobili & Roxburgh 1986), from their places at J2000 (VSOP2013, Simon et al. 2013, as heyoka has the
@@ -27,7 +27,7 @@ INVERSE_MASSES = [6023600, 408523.71, 328900.56, 3098708, 1047.3486, 3497.898, 2
 MARS = 3
 STEP = 8.0  # days
 YEAR = 365.25
-SPAN, EVERY, WINDOW = 6_996_000, 4000, 1000  # years
+SPAN, EVERY, WINDOW = 10_000_000, 4000, 1000  # years
 SEEN = 37  # steps between two looks within a window
 
 
