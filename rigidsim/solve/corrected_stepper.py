@@ -95,6 +95,7 @@ class CorrectedStepper:
             if self.charts.near(stepper.state):  # no change on the way: it begins there
                 self._change_chart(self.charts)
                 self.charts.changes = 0
+                stepper.bound_first_step()
 
     @property
     def stride(self) -> int:

@@ -112,7 +112,8 @@ class Stepper:
         bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
         self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
         self._longest = self._bounds[0]
-        self._bound_first_step()
+        if not self.cuts_steps:  # whose equations aren't set yet
+            self.bound_first_step()
         self.steps = 0
         self.smallest = self.largest = 0.0
         self.failure = ""
@@ -121,12 +122,13 @@ class Stepper:
         self._tiny = 0
         self._epsilon = float(precision.epsilon)
 
-    def _bound_first_step(self) -> None:
+    def bound_first_step(self) -> None:
         """Of a motion whose series at its start have gaps where the engine looks, from rest for instance: no
-        step is longer than these allow.
+        step in the chart in use is longer than these allow. It is to be where it starts.
         """
         engine, muted = self._integrator, self.log.muted
-        if self.single_steps or self.cuts_steps or self.system.plan.paired:  # which see to it themselves
+        # steps taken one by one are seen to there; paired products have no gaps of more than one term
+        if self.single_steps or self.system.plan.paired:
             return
         time, state = engine.dtime, np.array(engine.state)
         self.log.muted = True
@@ -136,7 +138,7 @@ class Stepper:
         engine.dtime = time
         engine.state[:] = state
         if bound < float(self._longest):
-            self._bounds[0] = self._longest = self.precision.of_double(bound)
+            self._bounds[self._chart] = self._longest = self.precision.of_double(bound)
 
     def settle(self) -> None:
         """Take note that the state was set from outside."""

@@ -38,8 +38,13 @@ class TableStepper(Stepper):
         self._pieces = system.pieces
         self._beyond = self._far
         self._entered: tuple[int, int] | None = None
-        self._enter()
+        self.bound_first_step()
         self.begun = self.mark()
+
+    def bound_first_step(self) -> None:
+        """As of ``Stepper``."""
+        self._enter()
+        super().bound_first_step()
 
     def _enter(self) -> None:
         """Go on with the equations of the piece that begins here, or in which this boundary lies."""

@@ -17,7 +17,7 @@ import numpy as np
 from rigidsim.solve.batch.lane_results import IDLE, Found, Lanes, put_in_place, until_next
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
-from rigidsim.solve.step_bounds import longest_step
+from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, at the same places always."""
@@ -124,10 +124,11 @@ class BatchEngine:
         """
         count = initial.shape[1]
         result = Lanes.empty(len(times), len(initial), count)
+        longest = self.longest(initial, parameters, start)
         if len(times) <= 2 and bool((times[:-1] == start).all()) and bool((times[-1] > start).all()):
             if len(times) == 2:
                 result.states[0] = initial
-            self._in_turn(result, initial, parameters, start, times[-1], most_steps)
+            self._in_turn(result, initial, parameters, start, times[-1], longest, most_steps)
             return result
         bundle = np.empty((_GROUPS, len(times), len(initial), self.width))
         for first in range(0, count, self.width):
@@ -143,6 +144,7 @@ class BatchEngine:
                     parameters[:, chosen],
                     start[chosen],
                     times[:, chosen],
+                    longest[chosen],
                     most_steps,
                 )
                 if not lost or len(waiting) == 1:
@@ -157,6 +159,7 @@ class BatchEngine:
                         parameters[:, only],
                         start[only],
                         times[:, only],
+                        longest[only],
                         most_steps,
                     )
                 waiting = [member for member in waiting if member not in lost]
@@ -164,16 +167,40 @@ class BatchEngine:
                 put_in_place(bundle, result.states[:, :, first - number * self.width :])
         return result
 
+    def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Bounds of members' steps (members,), as all terms of the series at their start allow.
+
+        Args:
+            initial: (states, members); parameters likewise; start: (members,), internal units.
+        """
+        count = initial.shape[1]
+        sizes = np.empty((self._integrator.order + 1, count))
+        for first in range(0, count, self.width):
+            lanes = np.minimum(np.arange(first, first + self.width), count - 1)
+            self._set(initial[:, lanes], parameters[:, lanes], start[lanes])
+            self._integrator.step(np.zeros(self.width), write_tc=True)  # a series, going nowhere
+            found = np.abs(self._integrator.tc).max(axis=0)
+            sizes[:, first : first + self.width] = found[:, : count - first]
+        self._log.clear()
+        return np.minimum(bounds_of_sparse_series(sizes), self._longest)
+
     def onward(
-        self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray, end: np.ndarray, most_steps: int
+        self,
+        states: np.ndarray,
+        parameters: np.ndarray,
+        begin: np.ndarray,
+        end: np.ndarray,
+        longest: np.ndarray,
+        most_steps: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """States (states, width) and times (width,) of lanes that are full, so many steps later at most.
 
         Args:
             states, parameters: (.., width); begin, end: (width,), internal units.
+            longest: bounds of steps, (width,).
         """
         self._set(states, parameters, begin)
-        self._integrator.propagate_until(end, max_steps=most_steps, max_delta_t=self._longest)
+        self._integrator.propagate_until(end, max_steps=most_steps, max_delta_t=longest)
         return self._integrator.state, self._integrator.time
 
     def _set(self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray) -> None:
@@ -189,13 +216,14 @@ class BatchEngine:
         parameters: np.ndarray,
         start: np.ndarray,
         end: np.ndarray,
+        longest: np.ndarray,
         most_steps: int,
     ) -> None:
         """Run members whose end alone is asked for: whoever arrives makes room for the next in its lane."""
         integrator, width = self._integrator, self.width
         waiting = deque(range(initial.shape[1]))
         inside, taken = [IDLE] * width, [0] * width
-        target, begun = np.zeros(width), [0.0] * width
+        target, bounds, begun = np.zeros(width), np.empty(width), [0.0] * width
         high, low = np.zeros(width), np.zeros(width)
 
         def enter(lanes: list[int]) -> None:
@@ -203,6 +231,7 @@ class BatchEngine:
             members = [waiting.popleft() if waiting else IDLE for _ in lanes]
             somebody = [max(member, 0) for member in members]
             integrator.state[:, lanes] = initial[:, somebody]
+            bounds[lanes] = longest[somebody]
             if self._used:
                 integrator.pars[:, lanes] = parameters[: self._used, somebody]
             for lane, member, there in zip(lanes, members, somebody, strict=True):
@@ -216,7 +245,7 @@ class BatchEngine:
         while any(member != IDLE for member in inside):
             self._log.clear()
             most = until_next(moments, inside, targets, begun, taken, most_steps)
-            integrator.propagate_until(target, max_steps=most, max_delta_t=self._longest)
+            integrator.propagate_until(target, max_steps=most, max_delta_t=bounds)
             outcomes = integrator.propagate_res
             high, low = (np.array(part) for part in integrator.dtime)
             moments = high.tolist()
@@ -267,6 +296,7 @@ class BatchEngine:
         parameters: np.ndarray,
         start: np.ndarray,
         times: np.ndarray,
+        longest: np.ndarray,
         most_steps: int,
     ) -> list[int]:
         """Run one group; those members whose state was lost, because of which the others have to be taken
@@ -274,6 +304,7 @@ class BatchEngine:
 
         Args:
             states: (samples, states, width), which is filled; each member has the lane of its place.
+            longest: bounds of steps, (width,).
         """
         integrator = self._integrator
         self._log.clear()
@@ -296,7 +327,7 @@ class BatchEngine:
                 found = np.array(integrator.state)[None]
             else:
                 grid = part if known else np.vstack([begin, part])
-                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=self._longest)
+                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=longest)
                 outcomes = integrator.propagate_res[:count]
                 taken += [now[3] for now in outcomes]
                 arrived[:] = [now[0] == _ARRIVED for now in outcomes]

@@ -119,12 +119,23 @@ class NeighbourLanes:
 
     # --- what they do ---------------------------------------------------------------------------------------
 
+    def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Bounds of steps of motions (n,), from their starts."""
+        return self._lanes.longest(initial, parameters[self._traced.in_equations], start)
+
     def onward(
-        self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray, end: np.ndarray, most: np.ndarray
+        self,
+        states: np.ndarray,
+        parameters: np.ndarray,
+        begin: np.ndarray,
+        end: np.ndarray,
+        longest: np.ndarray,
+        most: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """States (states, n) and times (n,) of lanes, so many steps later or at their ends.
 
         Args:
+            longest: bounds of steps, (n,).
             most: steps of each, (n,).
         """
         found, times = np.empty_like(states), np.empty_like(begin)
@@ -133,7 +144,7 @@ class NeighbourLanes:
         def group(some: np.ndarray, steps: int) -> None:
             lanes = some if len(some) == self._width else np.resize(some, self._width)
             there, then = self._lanes.onward(
-                states[:, lanes], read[:, lanes], begin[lanes], end[lanes], steps
+                states[:, lanes], read[:, lanes], begin[lanes], end[lanes], longest[lanes], steps
             )
             found[:, some], times[some] = there[:, : len(some)], then[: len(some)]
 

@@ -119,6 +119,7 @@ class _Following:
         self._state = starts.initial.copy()
         self._apart = np.zeros((states, members, NEIGHBOURS))
         self._time = starts.begin.copy()
+        self._longest_steps = lanes.longest(starts.initial, starts.parameters, starts.begin)
         self._factor = np.full(members, _FIRST)  # distance for one epsilon
         self._sizes = np.abs(starts.initial)  # over the latest stretch, of what moves
         self._largest = self._sizes.copy()
@@ -156,6 +157,7 @@ class _Following:
             np.repeat(parameters, NEIGHBOURS + 1, axis=1),
             (self._time[going, None] + shifts).reshape(-1),
             (starts.end[going, None] + shifts).reshape(-1),
+            np.repeat(self._longest_steps[going], NEIGHBOURS + 1),
             np.repeat(stride, NEIGHBOURS + 1).astype(np.int64),
         )
         there = there.reshape(states, len(going), -1)

@@ -107,6 +107,34 @@ def test_bits_depend_neither_on_neighbours_nor_on_place() -> None:
     assert np.abs(narrow[0][0]["quaternion"] - again[0][0]["quaternion"]).max() < 1e-11
 
 
+@pytest.mark.parametrize("samples", [2, 3])
+def test_gaps_in_a_series_bound_the_steps_of_that_lane(samples: int) -> None:
+    """From rest under k t, against the turn k t^3 / 6; every third lane turns already and isn't bounded."""
+    text = config(
+        "principal_moments = [1, 1, 1]",
+        "angular_velocity = [0, 0, 0]",
+        'kind = "torque"\ncomponents = ["0", "0", "k*t"]',
+        f"end = 4\nsamples = {samples}",
+        output='record = ["quaternion"]',
+        more="[parameters]\nk = 0.1",
+    )
+    factors, rates = [0.1, 0.3, 0.2, 0.5, 0.4, 0.25], [0, 0, 0.3] * 2
+    sweep = swept(
+        text, {"parameters.k": f"values = {factors}", "initial.angular_velocity[2]": f"values = {rates}"}
+    )
+    together = by_member(blocks_of(sweep))
+    order = [4, 2, 1]
+    again = by_member(blocks_of(sweep, order))
+    for place, member in enumerate(order):
+        assert again[place][0]["quaternion"].tobytes() == together[member][0]["quaternion"].tobytes()
+    for member, (k, rate) in enumerate(zip(factors, rates, strict=True)):
+        values, steps, _ = together[member]
+        half = rate * 4 / 2 + k * 4**3 / 12
+        exact = np.array([np.cos(half), 0, 0, np.sin(half)])
+        bound = 8 * EPSILON["double"] * max(2 * half, 1) * np.sqrt(steps)
+        assert np.abs(values["quaternion"][-1] - exact).max() < bound
+
+
 @pytest.mark.parametrize("samples", cases([2, 5], [2]))
 def test_a_lost_member_takes_no_other_with_it(samples: int) -> None:
     text = TORQUE.replace("k*sin(t)^2/2", "k*wx^2").replace("-k*wz", "0").replace("wx - k/3", "wx - 3/4")
