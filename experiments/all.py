@@ -39,6 +39,7 @@ STUDIES = (
     "apophis_flyby",
     "averaged_motions",
     "whole_cycle",
+    "cassini_states",
 )
 
 

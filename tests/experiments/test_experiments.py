@@ -23,6 +23,7 @@ GUIDE = ROOT / "experiments" / "README.md"
 SLOW = {  # about how many seconds they take
     "apophis_flyby": 15,
     "averaged_motions": 100,
+    "cassini_states": 40,
     "flip_period": 15,
     "flip_sphere": 10,
     "heavy_top_regimes": 15,
