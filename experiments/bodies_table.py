@@ -33,8 +33,8 @@ if not __package__:  # as a script
 import rigidsim
 from experiments.common import BLUE, CONFIGS, EPSILON, GREY, ORANGE, Check, main, new_figure, save, simulate
 from experiments.measure import matrices
-from rigidsim.scene.body import RigidBody
-from rigidsim.scene.shapes import SHAPES
+from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.bodies.shapes import SHAPES
 from rigidsim.solve.problem import prepare
 
 NAME = "bodies_table"

@@ -39,7 +39,7 @@ if not __package__:  # as a script
 from experiments.common import BLUE, GREY, ORANGE, Check, Result, main, new_figure, save, simulate, tidy
 from rigidsim.model.averaged.hansen import hansen
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.presets import PRESETS
+from rigidsim.scene.bodies.presets import PRESETS
 
 NAME = "cassini_states"
 DAY, YEAR = 86400.0, 31557600.0

@@ -110,7 +110,7 @@ def file_case(number: int, seed: int, folder: Path, bases: list[Path]) -> str:
     """Damage one file of a copied run folder and read everything in it."""
     from rich.console import Console
 
-    from rigidsim.cli import tables as report
+    from rigidsim.cli.screens import summary as report
     from rigidsim.scene.config import load
     from rigidsim.store.run import open_run
 

@@ -42,7 +42,7 @@ if not __package__:  # as a script
 import rigidsim
 from experiments.common import BLUE, GREEN, GREY, ORANGE, RED, Check, main, new_figure, save, simulate, tidy
 from experiments.measure import matrices
-from rigidsim.scene.presets import PRESETS
+from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.solve.problem import prepare
 
 NAME = "hyperion"

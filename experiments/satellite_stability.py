@@ -29,7 +29,7 @@ import numpy as np
 
 from experiments.common import BLUE, ORANGE, Check, main, new_figure, save, tidy
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweep import sweep
+from rigidsim.workflows.sweeps.sweep import sweep
 
 NAME = "satellite_stability"
 ORBITS = 20

@@ -38,8 +38,8 @@ if not __package__:  # as a script
 import numpy as np
 
 from experiments.common import Check, table
-from rigidsim.store.sweep_run import open_sweep
-from rigidsim.workflows.sweep_verify import verify_sweep
+from rigidsim.store.sweeps.run import open_sweep
+from rigidsim.workflows.sweeps.verify import verify_sweep
 
 CONFIG = Path(__file__).parents[1] / "configs" / "sweeps" / "hyperion_map.toml"
 BARE = Path(__file__).parent / "bare" / "spin_orbit_map.py"

@@ -29,9 +29,9 @@ import heyoka as hy
 
 from experiments.common import Check, table
 from experiments.spin_orbit_map import measured
-from rigidsim.accuracy.member_estimate import MemberEstimates
+from rigidsim.accuracy.estimates.member_estimate import MemberEstimates
 from rigidsim.scene.config import parse
-from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.batch.family import Families, Family, Numbers
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.run import BatchRun

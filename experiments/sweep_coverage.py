@@ -34,11 +34,11 @@ import numpy as np
 from experiments.common import Check, table
 from experiments.coverage.judging import gone_through
 from rigidsim.scene.config import Experiment, parse
-from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import warning_bits
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
-from rigidsim.workflows.sweep_members import run_members
+from rigidsim.workflows.sweeps.members import run_members
 
 _GONE = warning_bits(["attitude_uncertain"])
 _MOST_RATIO, _WORST_RATIO, _MOST_CAUTION = 3.0, 10.0, 20.0

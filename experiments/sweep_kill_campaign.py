@@ -37,10 +37,10 @@ import xarray
 
 from experiments.durability.judging import Tally
 from rigidsim.errors import RigidsimError
-from rigidsim.store.sweep_folder import SweepFolder
-from rigidsim.store.sweep_run import open_sweep
+from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweep import resume_sweep, sweep
+from rigidsim.workflows.sweeps.sweep import resume_sweep, sweep
 
 CONFIG = """\
 name = "kills"

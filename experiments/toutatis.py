@@ -42,7 +42,7 @@ from experiments.common import (
     tidy,
 )
 from experiments.measure import matrices, mean_rate, spectral_rate
-from rigidsim.scene.presets import PRESETS
+from rigidsim.scene.bodies.presets import PRESETS
 
 NAME = "toutatis"
 MOMENTS = ("3.09", "3.22", "1")

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
     from rigidsim.store.memory import MemoryRun
     from rigidsim.store.run import Run, SavedRun, open_run
-    from rigidsim.store.sweep_run import SavedSweep, open_sweep
+    from rigidsim.store.sweeps.run import SavedSweep, open_sweep
     from rigidsim.workflows.analyse import analyse
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
     from rigidsim.workflows.resume import resume
     from rigidsim.workflows.run import run
-    from rigidsim.workflows.sweep import sweep
+    from rigidsim.workflows.sweeps.sweep import sweep
     from rigidsim.workflows.verify import verify
 
 __version__ = "0.1.0"
@@ -37,9 +37,9 @@ _PLACES = {
     "open_run": "rigidsim.store.run",
     "run": "rigidsim.workflows.run",
     "resume": "rigidsim.workflows.resume",
-    "SavedSweep": "rigidsim.store.sweep_run",
-    "open_sweep": "rigidsim.store.sweep_run",
-    "sweep": "rigidsim.workflows.sweep",
+    "SavedSweep": "rigidsim.store.sweeps.run",
+    "open_sweep": "rigidsim.store.sweeps.run",
+    "sweep": "rigidsim.workflows.sweeps.sweep",
     "verify": "rigidsim.workflows.verify",
     "plan": "rigidsim.workflows.plan",
     "analyse": "rigidsim.workflows.analyse",

@@ -47,9 +47,9 @@ def _keys(prefix: str, table: type[BaseModel]) -> Iterator[tuple[str, Any]]:
 
 
 def _values(key: str, annotation: Any) -> list[str]:
+    from rigidsim.scene.bodies.presets import PRESETS
+    from rigidsim.scene.bodies.shapes import SHAPES
     from rigidsim.scene.fields import EULER_SEQUENCES
-    from rigidsim.scene.presets import PRESETS
-    from rigidsim.scene.shapes import SHAPES
 
     if key == "body.preset":
         return list(PRESETS)

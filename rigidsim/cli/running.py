@@ -35,7 +35,7 @@ def run_all(
     """
     from rigidsim.scene.config import has_earlier_settings
     from rigidsim.scene.suspicions import suspicious_angles, suspicious_end
-    from rigidsim.session import progress
+    from rigidsim.session.progress import progress
     from rigidsim.workflows.read import load
     from rigidsim.workflows.run import run as run_experiment
 
@@ -51,7 +51,7 @@ def run_all(
     if not experiments:
         raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
     if member is not None:
-        from rigidsim.workflows.sweep_members import single_member
+        from rigidsim.workflows.sweeps.members import single_member
 
         experiments = [single_member(experiment, member) for experiment in experiments]
     for experiment in experiments:
@@ -76,7 +76,7 @@ def run_all(
 
 def print_run(result: Run, as_json: bool) -> int:
     """Print a run's summary; returns its exit code."""
-    from rigidsim.cli import tables
+    from rigidsim.cli.screens import summary as tables
 
     if as_json:
         print(json.dumps(result.summary))
@@ -90,8 +90,8 @@ def print_run(result: Run, as_json: bool) -> int:
 
 def _scanned(experiments: list[Experiment], scan: list[str], out: Path, *, force: bool, as_json: bool) -> int:
     """Each config swept over what ``--sweep`` says; the exit code."""
-    from rigidsim.cli.sweep_screens import observer, print_sweep
-    from rigidsim.workflows.sweep import scanned, sweep
+    from rigidsim.cli.screens.sweeps import observer, print_sweep
+    from rigidsim.workflows.sweeps.sweep import scanned, sweep
 
     worst = 0
     for experiment in experiments:

@@ -19,7 +19,7 @@ from rigidsim.formats.angles import converted
 from rigidsim.formats.tables import BLOCK_NUMBERS, Column, Table, columns_of
 from rigidsim.look.angle_units import AngleUnit
 from rigidsim.scene.records import dataclass
-from rigidsim.store.sweep_dataset import boxes
+from rigidsim.store.sweeps.dataset import boxes
 
 MEMBER = "member"
 REASON = "failed_reason"

@@ -14,7 +14,7 @@ from rigidsim.formats.registry import Format, Source
 from rigidsim.formats.tables import Table
 from rigidsim.look.angle_units import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
-from rigidsim.store.sweep_dataset import chunk_shape
+from rigidsim.store.sweeps.dataset import chunk_shape
 from rigidsim.store.variables import parts_in
 
 BLOCK_ROWS = 8 * CHUNK_ROWS

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene import rotations
-from rigidsim.scene.outlines import THINNESS, Arc, Box, Ellipsoid, Line, Outline, Revolved
+from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Line, Outline, Revolved
+from rigidsim.scene.bodies.shapes import SHAPES
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.shapes import SHAPES
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
     """Mesh of one solid about its own centre of mass, in its own axes.
 
     Args:
-        solid: a name in ``rigidsim.scene.shapes.SHAPES``.
+        solid: a name in ``rigidsim.scene.bodies.shapes.SHAPES``.
         dimensions: metres, those of the shape.
 
     Raises:

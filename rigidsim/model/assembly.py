@@ -14,6 +14,7 @@ from rigidsim.model.equations import (
     vertical_from_attitude,
 )
 from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
+from rigidsim.model.frames.orbital import orbital_states
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.model.mechanics import Mechanics
@@ -21,7 +22,6 @@ from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.needs import work_is_needed
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.orbital_frame import orbital_states
 from rigidsim.model.paired_products import paired_rates, paired_states
 from rigidsim.model.planar import SPIN, PlanarStates, planar_states, spin_equation
 from rigidsim.model.rotations import Symbolic
@@ -30,8 +30,8 @@ from rigidsim.model.step_limiter import PACE, arguments, pace_derivative, roots
 from rigidsim.model.tangents import GROWTH, tangent_block
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 RATES, VERTICAL = ["wx", "wy", "wz"], ["gx", "gy", "gz"]
 POSITION, VELOCITY = ["x", "y", "z"], ["vx", "vy", "vz"]

@@ -7,7 +7,7 @@ from typing import Any
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.scaling import loads_amplitude, potential_amplitude, source_rate
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm
-from rigidsim.scene.traced import largest_of
+from rigidsim.scene.tracing.numbers import largest_of
 
 
 def _driven(m: Mechanics) -> Any:

@@ -15,7 +15,7 @@ from rigidsim.model.load import Term
 from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.scene.arithmetic import dot, negligible
-from rigidsim.scene.traced import largest_of
+from rigidsim.scene.tracing.numbers import largest_of
 
 LEVI_CIVITA = {
     (0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1,

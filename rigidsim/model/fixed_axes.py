@@ -33,7 +33,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, eigen, negligible, norm
-from rigidsim.scene.traced import largest_of
+from rigidsim.scene.tracing.numbers import largest_of
 
 
 def _outer(a: Vector, b: Vector) -> Matrix:

@@ -22,7 +22,7 @@ from rigidsim.scene.scene import Scene
 
 @dataclass(frozen=True)
 class OrbitalFrame:
-    """What an attitude gives that is carried relative to a circular orbit (``rigidsim.model.orbital_frame``).
+    """What an attitude relative to a circular orbit gives (``rigidsim.model.frames.orbital``).
 
     Attributes:
         direction: unit vector towards the attracting body, body axes.

@@ -10,7 +10,7 @@ from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.scene.arithmetic import cross
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.traced import largest_of, smallest_of
+from rigidsim.scene.tracing.numbers import largest_of, smallest_of
 
 
 def tidal_range(scene: Scene, strength: Any, distance: Any) -> Any:

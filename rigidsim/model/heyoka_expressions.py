@@ -7,7 +7,7 @@ What heyoka does with expressions on its own account, and what is done about it 
 - The Taylor series of ``x**n`` divides by x for every n but 2, so a state that passes through zero ends as
   NaN: whole powers are products of squares.
 - ``x**0.5`` and the other fractional powers have no series at zero; what is a square there is rewritten with
-  a sign (``rigidsim.scene.piecewise``).
+  a sign (``rigidsim.scene.expressions.piecewise``).
 - The step is chosen from the series' last terms. They vanish at x = 0 for powers above the method's order
   (20 in double, less with a loose tolerance), and far from a short pulse in t: both can be stepped over.
 """
@@ -21,8 +21,8 @@ import heyoka as hy
 
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.two_part import rounded
-from rigidsim.scene import expressions
-from rigidsim.scene.expressions import Expression, Name, Node
+from rigidsim.scene.expressions import tree as expressions
+from rigidsim.scene.expressions.tree import Expression, Name, Node
 
 _NO_SIDES: Mapping[Node, Any] = {}
 

@@ -14,20 +14,20 @@ import heyoka as hy
 
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.numbers import Rounder, ScaledNumbers
-from rigidsim.model.orbit_states import OrbitStates, orbit_states
-from rigidsim.model.point_mass_states import PointMassStates
+from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
+from rigidsim.model.orbits.point_mass_states import PointMassStates
+from rigidsim.model.orbits.table_states import TablePlace, table_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.model.table_states import TablePlace, table_states
 from rigidsim.scene.arithmetic import Vector, dot, negligible
-from rigidsim.scene.expressions import Node
+from rigidsim.scene.expressions.tree import Node
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
-from rigidsim.scene.traced import largest_of
+from rigidsim.scene.tracing.numbers import largest_of
 
 T = TypeVar("T")
 

@@ -16,10 +16,10 @@ from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, Ta
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 Term = tuple[Vector, Symbolic]
 """A constant vector (mpf) times an expression."""

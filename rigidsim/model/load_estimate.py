@@ -28,7 +28,7 @@ from rigidsim.model.state_names import state_names
 from rigidsim.model.state_selection import Requirements
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
-from rigidsim.scene.expressions import names_used
+from rigidsim.scene.expressions.tree import names_used
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of

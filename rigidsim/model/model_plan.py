@@ -7,23 +7,23 @@ from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.frames.orbital import corotating_orbit
+from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
-from rigidsim.model.orbital_frame import corotating_orbit
+from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.paired_products import pairs_products
 from rigidsim.model.parity import refuse_odd_loads
 from rigidsim.model.planar import Plane, asked_plane, gradient_plane
-from rigidsim.model.reference_plane import refuse_without_plane
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
-from rigidsim.model.table_states import Carried, TablePlace, places_of
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces, surfaces_of
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 if TYPE_CHECKING:
     from rigidsim.model.averaged.average import Average

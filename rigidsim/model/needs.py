@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from rigidsim.model import central_forces, fixed_axes
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
-from rigidsim.model.local_frame import first_source, flies_about_source
+from rigidsim.model.frames.local import first_source, flies_about_source
+from rigidsim.model.frames.reference_plane import flies_in_plane
+from rigidsim.model.frames.rotating import rotating_orbit
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.reference_plane import flies_in_plane
-from rigidsim.model.rotating_frame import rotating_orbit
 from rigidsim.scene.arithmetic import negligible
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene

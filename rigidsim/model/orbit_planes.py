@@ -17,10 +17,10 @@ from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.rotations import Symbolic, constant
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 _CENTURY = 36525 * 86400
 _ARCSEC = ExactNumber(Fraction(1, 3600 * 180), pi_power=1)

@@ -7,7 +7,7 @@ body and across it in the orbit's plane, seen from the body, and s^2 = 3 G M / R
 
 Let u = s r. What the first two need of w and u are A = w_j w_k - u_j u_k and B = u_j w_k - w_j u_k, four
 products; but A + B = (w_j + u_j)(w_k - u_k) and A - B = (w_j - u_j)(w_k + u_k) are two. That leaves 12
-products in place of the 26 of the quaternion's equations (``rigidsim.model.orbital_frame``). It is how
+products in place of the 26 of the quaternion's equations (``rigidsim.model.frames.orbital``). It is how
 so(4) falls apart into two so(3), on which Steklov's body rests (Bobenko 1986).
 
 Of two orders next to each other the even one is far better here (what it leaves out turns the motion's phase
@@ -29,11 +29,11 @@ import heyoka as hy
 
 from rigidsim.model import rotations
 from rigidsim.model.formulations import AttitudeStates, OrbitalFrame
+from rigidsim.model.frames.orbital import in_space, relative_attitude
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load
 from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.model.numbers import Rounder, ScaledNumbers
-from rigidsim.model.orbital_frame import in_space, relative_attitude
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock

@@ -13,8 +13,8 @@ from typing import Any, Protocol, cast
 from rigidsim.scene.arithmetic import dot, norm
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.traced import Traced, largest_of, smallest_of
-from rigidsim.scene.traced_whole import binary_exponent
+from rigidsim.scene.tracing.numbers import Traced, largest_of, smallest_of
+from rigidsim.scene.tracing.whole import binary_exponent
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import ModelPlan, plan_model
 from rigidsim.model.numbers import Rounder
+from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.paired_products import even_order
 from rigidsim.model.refusals import refuse_out_of_range, refuse_singular_start
@@ -24,11 +25,10 @@ from rigidsim.model.scaling import Scaling, largest_rates
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.state_names import carries_sign, plain_angles, state_names
 from rigidsim.model.state_selection import Requirements
-from rigidsim.model.table_states import Pieces
-from rigidsim.scene.expressions import ATTITUDE_NAMES, names_used
+from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.traced import largest_of
+from rigidsim.scene.tracing.numbers import largest_of
 
 
 @dataclass(frozen=True)

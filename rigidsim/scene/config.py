@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
-from rigidsim.scene.body_table import POINT_OR_NAME
+from rigidsim.scene.bodies.table import POINT_OR_NAME
 from rigidsim.scene.frame_table import PLANE_OR_NORMAL
 from rigidsim.scene.overrides import FLAG, apply_overrides, written
 from rigidsim.scene.python_values import assignments_of, toml_text

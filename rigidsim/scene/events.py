@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.expression_parser import parse_expression
-from rigidsim.scene.expressions import (
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
     FLIGHT_NAMES,
     RATE_NAMES,

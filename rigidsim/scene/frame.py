@@ -7,9 +7,9 @@ from typing import Any
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import schema
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
-from rigidsim.scene.body import RigidBody
+from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.traced import largest_of
+from rigidsim.scene.tracing.numbers import largest_of
 
 ORBIT = "orbit"
 SPACE = "space"

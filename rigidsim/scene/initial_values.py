@@ -6,7 +6,7 @@ from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import attitude
-from rigidsim.scene.expressions import (
+from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
     FLIGHT_NAMES,
     RATE_NAMES,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rigidsim.scene.traced import called
+from rigidsim.scene.tracing.numbers import called
 
 
 def eccentric_anomaly(context: Any, mean: Any, eccentricity: Any) -> Any:

@@ -14,7 +14,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions import Expression
+from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.fields import ConfigTable
 from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.records import dataclass

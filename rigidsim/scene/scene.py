@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import attitude, schema
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, context_for, dot, transpose
-from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
+from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events

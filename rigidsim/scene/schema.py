@@ -20,9 +20,9 @@ from pydantic import (
     model_validator,
 )
 
-from rigidsim.scene.body_table import Body
+from rigidsim.scene.bodies.table import Body
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.expressions import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
+from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
 from rigidsim.scene.fields import (
     Angle,
     AnyQuantity,

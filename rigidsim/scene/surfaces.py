@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
-from rigidsim.scene.expressions import (
+from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
     FLIGHT_NAMES,
     RATE_NAMES,

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from rigidsim.errors import Problem
 from rigidsim.scene.events import Event
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions import Constant, Name, Operation
+from rigidsim.scene.expressions.tree import Constant, Name, Operation
 from rigidsim.scene.schema import Config
 from rigidsim.scene.units import time_unit
 from rigidsim.scene.validation_messages import key_path

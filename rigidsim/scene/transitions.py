@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import Any
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions import Constant, Expression, Node, Operation, fold, operation
+from rigidsim.scene.expressions.tree import Constant, Expression, Node, Operation, fold, operation
 
 WIDE = 4.0
 """An argument that stays within this can't run through a function's whole transition."""

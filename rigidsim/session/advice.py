@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rigidsim.accuracy.error_law import CLOSED_FORM
-from rigidsim.accuracy.estimate import label_rounding
+from rigidsim.accuracy.estimates.estimate import label_rounding
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.store.summary_parts import Advice, AdviceCode
 

@@ -49,7 +49,7 @@ def cheaper_model(
     suited = bool(loads) and all(isinstance(load, GravityGradient) for load in loads)
     if steps < LONG or not suited or config.model.level != FULL or config.output.record is None:
         return None
-    from rigidsim.accuracy.modelling import measure_modelling
+    from rigidsim.accuracy.models.modelling import measure_modelling
 
     for level in reversed(REDUCED):
         keys = [f'model.level="{level}"', "model.short_period=true"]

@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from rigidsim.accuracy.growth import UNCERTAIN
+from rigidsim.accuracy.estimates.growth import UNCERTAIN
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.scene.records import dataclass
 from rigidsim.session.statistics import SampleStatistics
@@ -20,8 +20,8 @@ from rigidsim.solve.trail import Trail, Waypoints
 from rigidsim.store.summary_parts import Caution, WarningCode
 
 if TYPE_CHECKING:
-    from rigidsim.accuracy.estimate import Estimate
-    from rigidsim.accuracy.modelling import ModellingError
+    from rigidsim.accuracy.estimates.estimate import Estimate
+    from rigidsim.accuracy.models.modelling import ModellingError
     from rigidsim.session.cheaper_model import CheaperModel
 
 NEAR_SINGULAR = 1e-3
@@ -66,7 +66,7 @@ class Diagnostics:
             waypoints: some of its step boundaries.
             go_on: asked again and again; False ends it, without a result.
         """
-        from rigidsim.accuracy.estimate import estimate_errors
+        from rigidsim.accuracy.estimates.estimate import estimate_errors
 
         progress = self.progress
         found = estimate_errors(
@@ -84,7 +84,7 @@ class Diagnostics:
 
     def modelled(self, trail: Trail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
         """With the error of a reduced model, arguments as of ``estimated``."""
-        from rigidsim.accuracy.modelling import measure_modelling
+        from rigidsim.accuracy.models.modelling import measure_modelling
 
         return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
 

@@ -21,7 +21,7 @@ from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
-from rigidsim.solve.turn_count import MOST_OF_A_CLOSED_FORM, radians_between
+from rigidsim.solve.turns.count import MOST_OF_A_CLOSED_FORM, radians_between
 
 _RADIANS_AT_ONCE = 5e4
 _PATIENCE = 0.1  # seconds, in place of those of other runs

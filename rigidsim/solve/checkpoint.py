@@ -11,7 +11,7 @@ from dataclasses import field
 
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.joined_angles import Continuity
+from rigidsim.solve.turns.joined import Continuity
 
 
 @dataclass(frozen=True)

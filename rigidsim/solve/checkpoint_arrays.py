@@ -16,9 +16,9 @@ from rigidsim.solve.angle_wrapping import AngleState
 from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics, Undefined
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.events import FoundEvent
-from rigidsim.solve.joined_angles import Continuity
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Mark
+from rigidsim.solve.turns.joined import Continuity
 
 Arrays = dict[str, np.ndarray]
 """Names to float64 or int64 arrays."""

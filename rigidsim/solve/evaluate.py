@@ -18,9 +18,9 @@ from rigidsim.solve.building import interruptible
 from rigidsim.solve.charts import Lift
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import CompiledFunction
-from rigidsim.solve.joined_angles import JoinedAngles
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.turns.joined import JoinedAngles
 
 _GROUP = 64  # rows; a multiple of every SIMD width
 

@@ -39,7 +39,7 @@ class Mark:
         time: two numbers whose sum it is, internal units.
         state: (states,), internal units.
         events, steps: how many were found and taken so far.
-        switching: what a motion with switching surfaces remembers (``rigidsim.solve.switching``).
+        switching: what a motion with switching surfaces remembers (``rigidsim.solve.switching.sides``).
         tiny: steps, the latest ones, that were too small (``Stepper.collapsed``).
     """
 

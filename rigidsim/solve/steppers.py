@@ -28,6 +28,6 @@ def stepper_of(
         return TableStepper(system, precision, tolerance, start, log)
     if not system.switches:
         return Stepper(system, precision, tolerance, start, log)
-    from rigidsim.solve.switching_stepper import SwitchingStepper
+    from rigidsim.solve.switching.stepper import SwitchingStepper
 
     return SwitchingStepper(system, precision, tolerance, start, log)

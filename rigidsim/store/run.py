@@ -187,7 +187,7 @@ def open_run(path: str | Path) -> SavedRun:
     Raises:
         RunFolderError: no run there, or a damaged summary.
     """
-    from rigidsim.store.sweep_folder import is_sweep
+    from rigidsim.store.sweeps.folder import is_sweep
 
     if is_sweep(path):
         what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")

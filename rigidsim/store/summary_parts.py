@@ -158,7 +158,7 @@ class TableErrors(Part):
 
 
 class ModellingWindow(Part):
-    """Where the full model ran beside a reduced one; see ``rigidsim.accuracy.modelling``.
+    """Where the full model ran beside a reduced one; see ``rigidsim.accuracy.models.modelling``.
 
     Attributes:
         start, end: seconds.

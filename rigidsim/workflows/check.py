@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rigidsim.accuracy.level import fully
+from rigidsim.accuracy.models.level import fully
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.solve.problem import prepare
 from rigidsim.store.summary_parts import Caution
 from rigidsim.store.understood import Body, Span, Start
 from rigidsim.workflows.read import load
-from rigidsim.workflows.sweep_check import QUICK, check_sweep
-from rigidsim.workflows.sweep_members import recording
+from rigidsim.workflows.sweeps.check import QUICK, check_sweep
+from rigidsim.workflows.sweeps.members import recording
 
 
 @dataclass(frozen=True)

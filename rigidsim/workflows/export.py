@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
     from rigidsim.look.angle_units import AngleUnit
-    from rigidsim.store.sweep_run import SavedSweep
+    from rigidsim.store.sweeps.run import SavedSweep
 
 
 def export(

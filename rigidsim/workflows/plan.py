@@ -12,7 +12,7 @@ import numpy as np
 
 from rigidsim.accuracy.choice import chosen
 from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
-from rigidsim.accuracy.level import choose_level
+from rigidsim.accuracy.models.level import choose_level
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from rigidsim.accuracy.level import CHEAPEST_FIRST, LevelChoice
-from rigidsim.accuracy.modelling import measure_modelling
+from rigidsim.accuracy.models.level import CHEAPEST_FIRST, LevelChoice
+from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load

@@ -12,10 +12,10 @@ from rigidsim.errors import ConfigError
 from rigidsim.scene.model_table import AUTO, FULL
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.guards import Observer
+from rigidsim.session.progress.watching import watched
 from rigidsim.session.session import Session
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
 from rigidsim.session.tuning import Tuning
-from rigidsim.session.watching import watched
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun
@@ -104,7 +104,7 @@ def _run_a_level(
     """The level given, or the cheapest whose measured error is within what is asked for."""
     failed: list[str] = []
     while experiment.config.model.level == AUTO:
-        from rigidsim.accuracy.level import choose_level
+        from rigidsim.accuracy.models.level import choose_level
 
         observer.choosing(experiment.config.name)
         choice = choose_level(experiment, loads=loads, without=failed)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.store import atomic
 from rigidsim.store.run import Run, SavedRun, open_run
-from rigidsim.store.sweep_folder import is_sweep
+from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.viewing import drawn
 
 if TYPE_CHECKING:
@@ -47,10 +47,10 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
 
 
 def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, Run]]:
-    from rigidsim.store.sweep_run import open_sweep
+    from rigidsim.store.sweeps.run import open_sweep
     from rigidsim.workflows.read import parse
     from rigidsim.workflows.run import run
-    from rigidsim.workflows.sweep_members import single_member
+    from rigidsim.workflows.sweeps.members import single_member
 
     if len(paths) != 1 or not is_sweep(paths[0]):
         raise RunFolderError("--member is for one sweep: give its folder (runs/NAME), and no other run")

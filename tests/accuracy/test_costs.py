@@ -15,10 +15,10 @@ import rigidsim
 from rigidsim.accuracy.certificate import Certificate, certify
 from rigidsim.accuracy.choice import choose
 from rigidsim.accuracy.setting import Setting
-from rigidsim.cli import tables as report
+from rigidsim.cli.screens import summary as report
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress import LineObserver
-from rigidsim.session.progress_bar import TerminalObserver
+from rigidsim.session.progress.bar import TerminalObserver
+from rigidsim.session.progress.progress import LineObserver
 from rigidsim.session.timings import NOT_KEPT, Phases
 from rigidsim.solve.loop import Progress
 

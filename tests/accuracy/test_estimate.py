@@ -12,12 +12,12 @@ from support import IMPATIENT, angles_between, config, unoptimised_code
 from support import run_estimated as run_text
 
 import rigidsim
-from rigidsim.accuracy.estimate import estimate_errors
-from rigidsim.accuracy.margins import Margins
+from rigidsim.accuracy.estimates.estimate import estimate_errors
+from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
-from rigidsim.solve import lanes
 from rigidsim.solve.assembly import assemble
+from rigidsim.solve.neighbours import lanes
 from rigidsim.solve.problem import prepare
 from rigidsim.store.variables import parts_in
 

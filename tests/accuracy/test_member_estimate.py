@@ -7,10 +7,10 @@ import pytest
 
 from experiments.sweep_coverage import KINDS, Found, found_of
 from rigidsim.scene.config import parse
-from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import MemberResults, warning_bits
 from rigidsim.solve.batch.lanes import BatchEngine
-from rigidsim.workflows.sweep_members import run_members
+from rigidsim.workflows.sweeps.members import run_members
 
 MEMBERS = 6
 

@@ -611,7 +611,7 @@ def test_the_summary_fits_eighty_columns(tables: dict[str, str], config: Config)
     """One line per invariant, with its drift, and no word broken."""
     from rich.console import Console
 
-    from rigidsim.cli import tables as report
+    from rigidsim.cli.screens import summary as report
 
     run = rigidsim.run(config(**tables))
     summary = run.summary
@@ -635,7 +635,7 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
     """Name, bar, percentage, rate and time left, none of them cut."""
     from rich.console import Console
 
-    from rigidsim.session.progress_bar import TerminalObserver
+    from rigidsim.session.progress.bar import TerminalObserver
     from rigidsim.solve.loop import Progress
     from rigidsim.solve.problem import prepare
 
@@ -664,7 +664,7 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
 
 
 def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[str]) -> None:
-    from rigidsim.session.progress import LineObserver
+    from rigidsim.session.progress.progress import LineObserver
     from rigidsim.solve.loop import Progress
     from rigidsim.solve.problem import prepare
 

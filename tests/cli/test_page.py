@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from rigidsim.cli.page import Page, console, page
+from rigidsim.cli.screens.page import Page, console, page
 
 LONG = "of the largest drift " * 20
 WORD = "x" * 250

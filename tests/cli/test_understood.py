@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from rigidsim.cli import tables
-from rigidsim.cli.understood import body_text, start_text, time_text, understood
+from rigidsim.cli.screens import summary as tables
+from rigidsim.cli.screens.understood import body_text, start_text, time_text, understood
 from rigidsim.scene.config import parse
 from rigidsim.scene.scene import build_scene
 from rigidsim.session.understood import body_of, span_of, start_of

@@ -17,9 +17,9 @@ from rigidsim.look.solids import (
     rotation_matrix,
     solid_mesh,
 )
-from rigidsim.scene.outlines import THINNESS, Arc, Line, Revolved
+from rigidsim.scene.bodies.outlines import THINNESS, Arc, Line, Revolved
+from rigidsim.scene.bodies.shapes import SHAPES, Shape
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.shapes import SHAPES, Shape
 
 # Area of the regular polygon inscribed in the unit circle, over pi.
 POLYGON = SEGMENTS / (2 * np.pi) * np.sin(2 * np.pi / SEGMENTS)

@@ -16,7 +16,7 @@ from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_mot
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, nutation, plane_vectors, second_order
 from rigidsim.model.averaged.spectrum import body_spectrum
 from rigidsim.scene.arithmetic import context_for, dot
-from rigidsim.scene.body import RigidBody
+from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.config import parse
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.solve.problem import InitialValueProblem, prepare

@@ -8,7 +8,7 @@ import pytest
 from support import config, run_text
 
 from rigidsim.formats.naming import Naming, labels
-from rigidsim.model.ephemeris import MEAN_DISTANCE, source_position
+from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, source_position
 
 
 def at(body: str, seconds: float) -> tuple[float, float, float]:

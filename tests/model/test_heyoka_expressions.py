@@ -12,10 +12,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rigidsim.model.heyoka_expressions import to_heyoka
-from rigidsim.scene import expressions
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.expression_parser import parse_expression
-from rigidsim.scene.expressions import Expression, ExpressionError, evaluate, fold, operate
+from rigidsim.scene.expressions import tree as expressions
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, fold, operate
 from rigidsim.solve.precision import Precision, precision_of
 
 NAMES = ("t", "wx", "wy")

@@ -15,7 +15,7 @@ from support import EPSILON, cases
 
 import rigidsim
 from rigidsim.model.loads import LoadModel, seconds
-from rigidsim.scene.expression_parser import parse_expression
+from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.transitions import narrow_parts
 
 SPUN = """name = "spun"

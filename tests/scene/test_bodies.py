@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rigidsim.scene.arithmetic import context_for, cross, diagonal, dot, eigen, multiply, transpose
-from rigidsim.scene.body import RigidBody, build_body, inverse_inertia
-from rigidsim.scene.body_pieces import parallel_axis
+from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
+from rigidsim.scene.bodies.pieces import parallel_axis
+from rigidsim.scene.bodies.shapes import SHAPES
 from rigidsim.scene.config import parse
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.shapes import SHAPES
 from rigidsim.solve.precision import precision_of
 
 DIGITS = 50

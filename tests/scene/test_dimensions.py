@@ -13,8 +13,15 @@ from rigidsim.scene import units
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import parse
 from rigidsim.scene.exact import ExactNumber, parse_quantity
-from rigidsim.scene.expression_parser import parse_expression
-from rigidsim.scene.expressions import FUNCTIONS, PIECEWISE, Constant, Expression, ExpressionError, evaluate
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import (
+    FUNCTIONS,
+    PIECEWISE,
+    Constant,
+    Expression,
+    ExpressionError,
+    evaluate,
+)
 from rigidsim.scene.scene import build_scene
 
 PAGE = Path(__file__).parents[2] / "docs" / "expressions.md"

@@ -13,10 +13,10 @@ from typing import Annotated, Any
 import pytest
 from pydantic import BaseModel, TypeAdapter
 
-from rigidsim.scene.body_table import Part, PointMass
+from rigidsim.scene.bodies.presets import PRESETS
+from rigidsim.scene.bodies.table import Part, PointMass
 from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.orbits import Orbit
-from rigidsim.scene.presets import PRESETS
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.sweep_table import AxisTable

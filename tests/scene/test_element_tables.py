@@ -10,8 +10,8 @@ import pytest
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import load, parse
-from rigidsim.scene.element_table import TableError, read_table
-from rigidsim.scene.interpolation import ORDER, Interpolation
+from rigidsim.scene.orbit_tables.elements import TableError, read_table
+from rigidsim.scene.orbit_tables.interpolation import ORDER, Interpolation
 from rigidsim.scene.scene import build_scene
 
 HEADER = "time [day], semi_major_axis [au], eccentricity, mean_anomaly [deg]"

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number
-from rigidsim.scene.expression_parser import DEEPEST_NESTING, LONGEST_TEXT, parse_expression
-from rigidsim.scene.expressions import (
+from rigidsim.scene.expressions.parser import DEEPEST_NESTING, LONGEST_TEXT, parse_expression
+from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
     Constant,
     Expression,

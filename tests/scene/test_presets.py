@@ -12,10 +12,10 @@ import pytest
 
 from experiments.closed_forms import free_top
 from experiments.toutatis import MOMENTS, PUBLISHED, RATES
-from rigidsim.scene.body import RigidBody, build_body
-from rigidsim.scene.body_table import Body
+from rigidsim.scene.bodies.body import RigidBody, build_body
+from rigidsim.scene.bodies.presets import PRESETS
+from rigidsim.scene.bodies.table import Body
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.presets import PRESETS
 
 CONTEXT = mpmath.MPContext()
 CONTEXT.prec = 200

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.exact import decimal_text, parse_number
-from rigidsim.scene.sweep import Sweep
 from rigidsim.scene.sweep_table import AxisTable
-from rigidsim.scene.swept_values import axis_values, nearest_double
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweeps.values import axis_values, nearest_double
 from rigidsim.workflows.read import parse
 
 BASE = """\

@@ -19,7 +19,7 @@ from rigidsim.session.tuning import Tuning
 from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.evaluate import Evaluator
-from rigidsim.solve.lanes import StepperLanes
+from rigidsim.solve.neighbours.lanes import StepperLanes
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock

@@ -11,7 +11,7 @@ from rich.console import Console
 from support import IMPATIENT
 
 import rigidsim
-from rigidsim.cli.tables import print_summary
+from rigidsim.cli.screens.summary import print_summary
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.solve.checkpoint import Undefined
 

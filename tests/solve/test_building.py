@@ -15,9 +15,9 @@ from support import config, run_text, same_bits
 import rigidsim
 from rigidsim.model.system import System
 from rigidsim.solve.building import building, give_up, interruptible, take_up
-from rigidsim.solve.followed_system import FollowedSystem
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.turn_count import TurnCounter
+from rigidsim.solve.turns.count import TurnCounter
+from rigidsim.solve.turns.followed import FollowedSystem
 
 PLAIN = "estimate = false"
 AWAKE = 60.0  # seconds that nobody waits for

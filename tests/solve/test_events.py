@@ -14,7 +14,7 @@ from rich.console import Console
 from support import EPSILON, amplification, angle_between, cases, config, law, run_text, wide
 
 import rigidsim
-from rigidsim.cli.tables import print_summary
+from rigidsim.cli.screens.summary import print_summary
 from rigidsim.errors import ConfigError
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.pacing import Pacing

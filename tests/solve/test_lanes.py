@@ -9,7 +9,7 @@ from support import config
 
 import rigidsim
 from rigidsim.model.system import System
-from rigidsim.solve.lanes import NEIGHBOURS, BatchLanes, OwnLanes, SeriesErrors
+from rigidsim.solve.neighbours.lanes import NEIGHBOURS, BatchLanes, OwnLanes, SeriesErrors
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.steppers import stepper_of

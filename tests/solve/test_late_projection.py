@@ -10,7 +10,7 @@ from support import IMPATIENT, angle_between, bits, cases, config, law, run_text
 
 import rigidsim
 from rigidsim.errors import ConfigError
-from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.projection import LATE
 

@@ -13,7 +13,7 @@ import rigidsim
 from rigidsim.look.figures import timelines
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.turn_count import Place, TurnCounter, angles_to_join
+from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join
 
 ANGLES = 'record = ["quaternion", "euler_angles"]'
 SYMMETRIC = "principal_moments = [1, 1, 1.5]"

@@ -9,7 +9,7 @@ import pytest
 from support import config, run_text
 
 import rigidsim
-from rigidsim.accuracy.level import choose_level
+from rigidsim.accuracy.models.level import choose_level
 from rigidsim.errors import ConfigError
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
@@ -257,7 +257,7 @@ def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(
     full: rigidsim.Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is promised is kept: the model advised is as near, at that part of the steps."""
-    from rigidsim.cli.verdicts import advice_line
+    from rigidsim.cli.screens.verdicts import advice_line
     from rigidsim.session import cheaper_model
 
     assert full.summary["cost"]["steps"] < cheaper_model.LONG

@@ -11,7 +11,7 @@ from support import config, run_text
 
 import rigidsim
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.turn_count import angle_rate, angles_to_join
+from rigidsim.solve.turns.count import angle_rate, angles_to_join
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 NODE, PERIAPSIS = 0.004, 0.006  # rad/s beside a mean motion of 1
@@ -105,7 +105,7 @@ def test_without_an_anomaly_nutation_follows_keplers_law() -> None:
 
 
 def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
-    from rigidsim.accuracy.modelling import measure_modelling
+    from rigidsim.accuracy.models.modelling import measure_modelling
 
     for level in ("spin_averaged", "orbit_averaged"):
         given = text(level, by_table=True)

@@ -26,19 +26,19 @@ from rigidsim.cli.app import app
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.sweep import Axis
+from rigidsim.scene.sweeps.sweep import Axis
 from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.store.seal import seal
-from rigidsim.store.sweep_folder import SweepFolder
-from rigidsim.store.sweep_generation import Work, ranges_of
-from rigidsim.store.sweep_run import open_sweep
+from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.generation import Work, ranges_of
+from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweep import resume_sweep, scanned
-from rigidsim.workflows.sweep import sweep as run_sweep
-from rigidsim.workflows.sweep_members import run_members, sweep_of
-from rigidsim.workflows.sweep_verify import verify_sweep
-from rigidsim.workflows.sweep_ways import task
-from rigidsim.workflows.sweep_workers import Workers, leave_tile
+from rigidsim.workflows.sweeps.members import run_members, sweep_of
+from rigidsim.workflows.sweeps.sweep import resume_sweep, scanned
+from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
+from rigidsim.workflows.sweeps.verify import verify_sweep
+from rigidsim.workflows.sweeps.ways import task
+from rigidsim.workflows.sweeps.workers import Workers, leave_tile
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -162,8 +162,8 @@ def test_a_longer_axis_and_one_more_output_compute_only_what_is_new(tmp_path: Pa
 
 
 def test_a_thousand_columns_prolonged_by_a_hundred_are_a_hundred(tmp_path: Path) -> None:
-    from rigidsim.scene.sweep import Sweep
-    from rigidsim.store.sweep_sources import positions
+    from rigidsim.scene.sweeps.sweep import Sweep
+    from rigidsim.store.sweeps.sources import positions
 
     short, long = (
         Sweep.of(parse(f'{CONFIG}[sweep.axes]\n"time.end" = {{linspace = [1, {end}, {count}]}}\n'
@@ -480,7 +480,7 @@ def test_a_killed_sweep_is_resumed_to_the_same_bits(folder: Path, tmp_path: Path
 
 @pytest.mark.slow  # three processes that import everything
 def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: Path) -> None:
-    from rigidsim.workflows.sweep import SweepObserver
+    from rigidsim.workflows.sweeps.sweep import SweepObserver
 
     class Killer(SweepObserver):
         killed = 0

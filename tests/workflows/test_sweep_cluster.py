@@ -12,8 +12,8 @@ from support import config
 
 from rigidsim.errors import RigidsimError
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweep import SweepObserver, sweep
-from rigidsim.workflows.sweep_cluster import Cluster
+from rigidsim.workflows.sweeps.cluster import Cluster
+from rigidsim.workflows.sweeps.sweep import SweepObserver, sweep
 
 distributed = pytest.importorskip("distributed")
 

@@ -15,10 +15,10 @@ from typer.testing import CliRunner, Result
 import rigidsim
 from rigidsim.cli.app import app
 from rigidsim.errors import RunFolderError
-from rigidsim.store.sweep_run import SavedSweep
+from rigidsim.store.sweeps.run import SavedSweep
 from rigidsim.workflows.export import export
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweep import sweep as run_sweep
+from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 
 CONFIG = config(
     initial="angular_velocity = [0.1, 1, 0.05]",

@@ -37,7 +37,7 @@ def analyse(
 
     Example: rigidsim analyse runs/earth_free_nutation --lines 5
     """
-    from rigidsim.cli.analysis_tables import print_analysis
+    from rigidsim.cli.screens.analysis import print_analysis
     from rigidsim.store.run import open_run
     from rigidsim.workflows.analyse import analyse as find
     from rigidsim.workflows.analyse import save

@@ -22,7 +22,7 @@ def check(
 
     Example: rigidsim check configs/heavy_top_nutating.toml
     """
-    from rigidsim.cli import tables
+    from rigidsim.cli.screens import summary as tables
     from rigidsim.workflows.check import check as validate
 
     valid = True

@@ -58,8 +58,8 @@ def export(
     """
     from rigidsim.formats.naming import Naming
     from rigidsim.store.run import open_run
-    from rigidsim.store.sweep_folder import is_sweep
-    from rigidsim.store.sweep_run import open_sweep
+    from rigidsim.store.sweeps.folder import is_sweep
+    from rigidsim.store.sweeps.run import open_sweep
     from rigidsim.workflows.export import export as write
 
     given = {"epoch": epoch, "axes": axes, "object_name": object_name}

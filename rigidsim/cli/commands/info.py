@@ -12,14 +12,14 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
 
     Example: rigidsim info runs/intermediate_axis
     """
-    from rigidsim.cli import tables
-    from rigidsim.cli.page import page
+    from rigidsim.cli.screens import summary as tables
+    from rigidsim.cli.screens.page import page
     from rigidsim.store.run import open_run
-    from rigidsim.store.sweep_folder import is_sweep
+    from rigidsim.store.sweeps.folder import is_sweep
 
     if is_sweep(run_path):
-        from rigidsim.cli.sweep_screens import print_sweep
-        from rigidsim.store.sweep_run import open_sweep
+        from rigidsim.cli.screens.sweeps import print_sweep
+        from rigidsim.store.sweeps.run import open_sweep
 
         found = open_sweep(run_path)
         if as_json:

@@ -27,7 +27,7 @@ def new(
 
     Example: rigidsim new coin my_coin
     """
-    from rigidsim.cli import tables
+    from rigidsim.cli.screens import summary as tables
     from rigidsim.workflows.templates import described, write_new
 
     if scene is None:

@@ -18,15 +18,15 @@ def plan(
 
     Example: rigidsim plan configs/heavy_top_nutating.toml
     """
-    from rigidsim.cli import tables
+    from rigidsim.cli.screens import summary as tables
     from rigidsim.workflows.plan import plan as make_plan
     from rigidsim.workflows.read import load
 
     experiment = load(config, overrides=overrides or [])
     if experiment.config.sweep is not None:
-        from rigidsim.cli.sweep_screens import print_sweep_plan
-        from rigidsim.scene.sweep import Sweep
-        from rigidsim.workflows.sweep_plan import plan_sweep
+        from rigidsim.cli.screens.sweeps import print_sweep_plan
+        from rigidsim.scene.sweeps.sweep import Sweep
+        from rigidsim.workflows.sweeps.plan import plan_sweep
 
         whole = plan_sweep(Sweep.of(experiment))
         if as_json:

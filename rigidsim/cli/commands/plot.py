@@ -36,7 +36,7 @@ def plot(
     from rigidsim.look.spectrum import save_spectrum
     from rigidsim.store import atomic
     from rigidsim.store.run import open_run
-    from rigidsim.store.sweep_folder import is_sweep
+    from rigidsim.store.sweeps.folder import is_sweep
     from rigidsim.workflows.analyse import analyse
 
     if is_sweep(run_path):
@@ -81,7 +81,7 @@ def _plot_sweep(run_path: Path, what: list[str] | None, out: Path | None) -> Non
     from rigidsim.look.figures.saving import figure_format
     from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
     from rigidsim.store import atomic
-    from rigidsim.store.sweep_run import open_sweep
+    from rigidsim.store.sweeps.run import open_sweep
 
     found = open_sweep(run_path)
     several = what is not None and (len(what) > 1 or ALL in what)

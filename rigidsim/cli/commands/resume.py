@@ -35,7 +35,7 @@ def resume(
 
     Example: rigidsim resume runs/intermediate_axis
     """
-    from rigidsim.store.sweep_folder import is_sweep
+    from rigidsim.store.sweeps.folder import is_sweep
 
     if is_sweep(run_path):
         if until is not None or overrides:
@@ -44,7 +44,7 @@ def resume(
                 "rigidsim sweep CONFIG again, which computes only what is new"
             )
         _resume_sweep(run_path, workers, as_json)
-    from rigidsim.session import progress
+    from rigidsim.session.progress import progress
     from rigidsim.workflows.resume import resume as go_on
 
     with progress.observer() as observer:
@@ -53,8 +53,8 @@ def resume(
 
 
 def _resume_sweep(path: Path, workers: int, as_json: bool) -> NoReturn:
-    from rigidsim.cli.sweep_screens import observer, print_sweep
-    from rigidsim.workflows.sweep import resume_sweep
+    from rigidsim.cli.screens.sweeps import observer, print_sweep
+    from rigidsim.workflows.sweeps.sweep import resume_sweep
 
     with observer() as watching:
         result = resume_sweep(path, workers=workers, observer=watching)

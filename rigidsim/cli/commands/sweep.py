@@ -43,9 +43,9 @@ def sweep(
 
     Example: rigidsim sweep configs/sweeps/first_flip.toml --workers 2
     """
-    from rigidsim.cli.sweep_screens import observer, print_sweep
+    from rigidsim.cli.screens.sweeps import observer, print_sweep
     from rigidsim.workflows.read import load
-    from rigidsim.workflows.sweep import sweep as run_all
+    from rigidsim.workflows.sweeps.sweep import sweep as run_all
 
     share = None if tiles is None else _share(tiles)
     if scheduler is not None and workers > 1:

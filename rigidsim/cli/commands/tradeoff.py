@@ -35,7 +35,7 @@ def tradeoff(
 
     Example: rigidsim tradeoff configs/asymmetric_top.toml
     """
-    from rigidsim.cli.tradeoff_tables import print_tradeoff
+    from rigidsim.cli.screens.tradeoff import print_tradeoff
     from rigidsim.workflows.read import load
     from rigidsim.workflows.tradeoff import tradeoff as measure
 

@@ -19,12 +19,12 @@ def verify(run_path: RunPath, members: MembersOption = 100, as_json: JsonOption 
 
     Example: rigidsim verify runs/intermediate_axis
     """
-    from rigidsim.cli import tables
-    from rigidsim.session import progress
-    from rigidsim.store.sweep_folder import is_sweep
+    from rigidsim.cli.screens import summary as tables
+    from rigidsim.session.progress import progress
+    from rigidsim.store.sweeps.folder import is_sweep
 
     if is_sweep(run_path):
-        from rigidsim.workflows.sweep_verify import verify_sweep
+        from rigidsim.workflows.sweeps.verify import verify_sweep
 
         verdict, what = verify_sweep(run_path, members=members), "member"
     else:

@@ -28,7 +28,7 @@ from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
 from rigidsim.model.load import Load
 from rigidsim.model.loads.gravity_gradient import GravityGradient
-from rigidsim.model.table_states import Carried
+from rigidsim.model.orbits.table_states import Carried
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
 from rigidsim.scene.model_table import ORBIT_AVERAGED

@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, dot, negligible
-from rigidsim.scene.body import RigidBody
+from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.records import dataclass
 
 

@@ -175,7 +175,7 @@ def plane_vectors(
 
 def equinoctial_axes(q: Any, p: Any, chi: Any) -> tuple[Vector, Vector]:
     """Unit vectors in an orbit's plane that longitudes count from, and across, from its elements (see
-    ``rigidsim.scene.tabulated_orbit``) and chi = sqrt(1 - p^2 - q^2).
+    ``rigidsim.scene.orbit_tables.pieces``) and chi = sqrt(1 - p^2 - q^2).
     """
     product = 2 * p * q
     return [1 - 2 * p * p, product, -2 * p * chi], [product, 1 - 2 * q * q, 2 * q * chi]

@@ -16,14 +16,14 @@ from rigidsim.model.averaged.orbit_terms import (
     turned,
 )
 from rigidsim.model.averaged.spectrum import orbit_harmonics
-from rigidsim.model.ephemeris import MEAN_DISTANCE
 from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.kepler import eccentric_anomaly
+from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tabulated_orbit import AXIS, TabulatedOrbit
 
 _DAY = 86400.0
 _SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}

@@ -11,19 +11,19 @@ from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.orbit_terms import OrbitPlace, plane_vectors
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.table_terms import TableTerms
-from rigidsim.model.ephemeris import source_position
 from rigidsim.model.kinematics import seconds
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbit_states import OrbitStates
+from rigidsim.model.orbits.ephemeris import source_position
+from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import dot
 from rigidsim.scene.epochs import J2000
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 
 @dataclass(frozen=True)

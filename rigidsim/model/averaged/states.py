@@ -14,12 +14,12 @@ from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, Res
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder, ScaledNumbers
+from rigidsim.model.orbits.table_states import TablePlace
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.model.table_states import TablePlace
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 _OF_FIGURE = ("figure_axis",)
 WHY = {

@@ -13,13 +13,13 @@ import heyoka as hy
 
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, equinoctial_axes, nutation, turned
 from rigidsim.model.numbers import Rounder
-from rigidsim.model.orbit_states import OrbitStates
+from rigidsim.model.orbits.kepler_states import OrbitStates
+from rigidsim.model.orbits.table_states import ElementStates, TablePlace, element_states
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.table_states import ElementStates, TablePlace, element_states
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import dot
+from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.tabulated_orbit import AXIS, TabulatedOrbit
 
 
 @dataclass(frozen=True)

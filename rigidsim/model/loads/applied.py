@@ -14,8 +14,8 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.state_names import state_names
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, parallel
-from rigidsim.scene.expression_parser import parse_expression
-from rigidsim.scene.expressions import (
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
     FLIGHT_NAMES,
     RATE_NAMES,

@@ -9,25 +9,25 @@ import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
 from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
+from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
-from rigidsim.scene.orbit_of_table import resolve_tabulated_orbit
+from rigidsim.scene.orbit_tables.orbit import resolve_tabulated_orbit
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
-from rigidsim.scene.tabulated_orbit import TabulatedOrbit
 
 
 class GravityGradientFields(LoadFields):

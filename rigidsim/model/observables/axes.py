@@ -1,6 +1,7 @@
 """Directions of the figure, spin and momentum axes in space, and their angles against the reference plane.
 
-With a unit axis a = (u, v, s) along the plane's X', Y' and normal n (``rigidsim.model.reference_plane``):
+With a unit axis a = (u, v, s) along the plane's X', Y' and normal n
+(``rigidsim.model.frames.reference_plane``):
 
     obliquity = atan2(|n x a|, n . a),    node longitude = atan2(u, -v),
 
@@ -15,6 +16,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.frames.reference_plane import reference_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     NO_UNIT,
@@ -28,7 +30,6 @@ from rigidsim.model.observables.observable import (
 from rigidsim.model.observables.scene_subject import is_planet
 from rigidsim.model.observables.steadiness import steady_directions
 from rigidsim.model.observables.vectors import figure_told, plane_told, unit
-from rigidsim.model.reference_plane import reference_plane
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.registry import register_observable

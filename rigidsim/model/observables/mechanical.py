@@ -15,6 +15,7 @@ from rigidsim.model.drift_scales import (
     rotational_scale,
     total_momentum_scale,
 )
+from rigidsim.model.frames.rotating import jacobi_constant
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     BODY,
@@ -25,10 +26,9 @@ from rigidsim.model.observables.observable import (
     Observable,
     same_unit,
 )
-from rigidsim.model.rotating_frame import jacobi_constant
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.registry import register_observable
-from rigidsim.scene.traced_whole import binary_magnitude
+from rigidsim.scene.tracing.whole import binary_magnitude
 
 WORK = "work"
 

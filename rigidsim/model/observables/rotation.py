@@ -12,6 +12,7 @@ to k. For a free body that turns nearly about its figure axis it grows uniformly
 
 from __future__ import annotations
 
+from rigidsim.model.frames.reference_plane import initial_normal, reference_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     MOMENTUM,
@@ -24,7 +25,6 @@ from rigidsim.model.observables.observable import (
 from rigidsim.model.observables.scene_subject import is_nearly_axial
 from rigidsim.model.observables.steadiness import steady_rotation
 from rigidsim.model.observables.vectors import along, figure_told, in_body, length, plane_told, unit
-from rigidsim.model.reference_plane import initial_normal, reference_plane
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply as apply_numbers

@@ -18,11 +18,11 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.frames.reference_plane import plane_drift
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Steady
 from rigidsim.model.observables.scene_subject import is_planet
 from rigidsim.model.observables.vectors import along, in_body, length
-from rigidsim.model.reference_plane import plane_drift
 from rigidsim.model.rotations import constant
 from rigidsim.model.scaling import loads_amplitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
+from rigidsim.model.frames.reference_plane import fixed_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.axes import figure_axis
 from rigidsim.model.observables.observable import (
@@ -27,7 +28,6 @@ from rigidsim.model.observables.observable import (
     same_unit,
 )
 from rigidsim.model.observables.vectors import along, figure_told, in_body
-from rigidsim.model.reference_plane import fixed_plane
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.registry import register_observable

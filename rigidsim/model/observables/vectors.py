@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import heyoka as hy
 
+from rigidsim.model.frames.reference_plane import reference_plane
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.reference_plane import reference_plane
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross

@@ -15,9 +15,9 @@ from rigidsim.model.scaling import Drive
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.model_table import FULL
 from rigidsim.scene.overrides import key_steps
-from rigidsim.scene.trace_graph import Guard, Untraceable
-from rigidsim.scene.traced import Traced
-from rigidsim.scene.traced_whole import TracedWhole
+from rigidsim.scene.tracing.graph import Guard, Untraceable
+from rigidsim.scene.tracing.numbers import Traced
+from rigidsim.scene.tracing.whole import TracedWhole
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.replay import Replay
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace

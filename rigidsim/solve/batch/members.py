@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.overrides import key_steps
-from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.batch.replay import Distinct, Swept
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 

@@ -1,6 +1,6 @@
 """Neighbours of the motions of many members, pushed at random as rounding does.
 
-The simulation of ``rigidsim.solve.neighbours``, for members side by side: each is followed at a loose
+The simulation of ``rigidsim.solve.neighbours.pushed``, for members side by side: each is followed at a loose
 tolerance by four lanes, itself and three neighbours. Between pushes lies a stretch of so many steps, after
 which lanes stand at slightly different times; how far they are apart is brought to one time by the equations.
 Draws are the same for every member, so that what is found of one depends on nobody beside it.
@@ -13,8 +13,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from rigidsim.solve.batch.neighbour_lanes import NeighbourLanes
-from rigidsim.solve.lanes import NEIGHBOURS
-from rigidsim.solve.neighbours import Pushes
+from rigidsim.solve.neighbours.lanes import NEIGHBOURS
+from rigidsim.solve.neighbours.pushed import Pushes
 
 _STRETCHES, _SHORTEST = 12, 4
 """Of a run, about, and steps of one at least. Half of a stretch's pushes come before it and half after, so

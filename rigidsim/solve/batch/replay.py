@@ -16,7 +16,7 @@ import numpy as np
 
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.trace_graph import Graph, Guard
+from rigidsim.scene.tracing.graph import Graph, Guard
 from rigidsim.solve.batch import double_double as dd
 from rigidsim.solve.batch.double_double import Doubled
 from rigidsim.solve.precision import precision_of

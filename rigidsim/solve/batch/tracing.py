@@ -19,11 +19,11 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.trace_graph import Graph, Untraceable
-from rigidsim.scene.traced import Traced
-from rigidsim.scene.traced_exact import swept_number
-from rigidsim.scene.traced_whole import TracedWhole
-from rigidsim.scene.tracing_context import TracingContext
+from rigidsim.scene.tracing.context import TracingContext
+from rigidsim.scene.tracing.exact import swept_number
+from rigidsim.scene.tracing.graph import Graph, Untraceable
+from rigidsim.scene.tracing.numbers import Traced
+from rigidsim.scene.tracing.whole import TracedWhole
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 

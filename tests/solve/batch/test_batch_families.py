@@ -11,9 +11,9 @@ from support import config
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import parse
-from rigidsim.scene.sweep import Sweep
-from rigidsim.scene.traced import Traced
-from rigidsim.scene.traced_whole import TracedWhole
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.tracing.numbers import Traced
+from rigidsim.scene.tracing.whole import TracedWhole
 from rigidsim.solve.batch.family import Alone, Families, batchable
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.problem import prepare

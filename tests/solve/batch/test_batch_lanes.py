@@ -6,7 +6,7 @@ from support import EPSILON, cases, config
 from test_batch_families import FREE, ORBIT, PLANAR, TOP, TORQUE, swept
 
 import rigidsim
-from rigidsim.scene.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.batch.family import Families
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun

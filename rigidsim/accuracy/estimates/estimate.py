@@ -1,0 +1,226 @@
+"""How wrong a run gets until its end, from neighbours of its motion (``rigidsim.solve.neighbours.pushed``).
+
+The size of a step's errors is known: an epsilon's rounding of each state, and what the tolerance lets the
+series be cut off by. What becomes of them is measured, over the whole run or as much of it as the cost
+allows. Where the motion has a closed form, some samples are simply held against that.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+
+import numpy as np
+
+from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
+from rigidsim.accuracy.estimates.course import Course, Followed
+from rigidsim.accuracy.estimates.exact_error import ExactError, exact_error
+from rigidsim.accuracy.estimates.following import follow, leading, loose
+from rigidsim.accuracy.estimates.growth import exponential_growth, power_of_time
+from rigidsim.accuracy.estimates.margins import MARGINS, Margins
+from rigidsim.scene.records import dataclass
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.trail import Trail, Waypoints
+
+_LAST_BITS = 0.5  # of a recorded value, rounded
+_LABEL = 0.25  # of a sample's time, rounded: what is recorded belongs to another moment
+_AS_LARGE = 4.0  # as the whole way: of a place that can't be told
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Largest errors of a run until its end.
+
+    Attributes:
+        attitude: rad, at most pi; None without an attitude.
+        rates: of the angular velocity, relative to its size.
+        position, velocity: m and m/s; None where the body has no place.
+        amplification: of the attitude's error (or the rates') over the law of rounding errors; 1 for a stable
+            motion.
+        growth_rate: 1/s, of exponential growth; 0 where it is none.
+        predictable_seconds: after the start, from which digits are gone; None for motions whose errors don't
+            grow exponentially.
+        seconds: of the run that neighbours followed from its start on; ``share``: the same as a part of it.
+        how: in words.
+        closed_form: whether the scene has one, against which the run was held.
+    """
+
+    attitude: float | None
+    rates: float
+    position: float | None
+    velocity: float | None
+    amplification: float = 1.0
+    growth_rate: float = 0.0
+    predictable_seconds: float | None = None
+    seconds: float = 0.0
+    share: float = 1.0
+    how: str = ""
+    closed_form: bool = False
+
+    @property
+    def leading(self) -> float:
+        """Of the attitude; without one of the rates."""
+        return self.rates if self.attitude is None else self.attitude
+
+
+def estimate_errors(
+    prepared: InitialValueProblem,
+    steps: int,
+    reached: float,
+    *,
+    trail: Trail | None = None,
+    waypoints: Waypoints | None = None,
+    stepper: Stepper | None = None,
+    nearest: float = 1.0,
+    uneven: float = math.inf,
+    go_on: Callable[[], bool] = lambda: True,
+    margins: Margins = MARGINS,
+) -> Estimate | None:
+    """Estimate the errors of a run.
+
+    Args:
+        steps: that it took.
+        reached: the time that it got to, seconds.
+        trail: some of the run's samples, to be held against a closed form.
+        waypoints: some of its step boundaries, where growth is looked at besides the beginning.
+        stepper: of the run; it is used where that is good enough, and left as it was.
+        nearest: singular factor of the run's chart where it was smallest.
+        uneven: its longest step over its shortest.
+        go_on: asked again and again; False ends it.
+
+    Returns:
+        None where ``go_on`` ended it.
+    """
+    scene, system = prepared.scene, prepared.system
+    carried = system.requirements.formulation != "rates"
+    if prepared.closed is not None:
+        error = CLOSED_FORM * float(prepared.precision.epsilon)
+        return _of_closed_form(prepared, error, carried)
+    start = float(prepared.clock.start)
+    end = start + math.ldexp(reached - float(scene.start), -system.scaling.time)
+    if trail is not None and trail.samples:
+        form, _ = closed_form_if_any(scene, driven=bool(prepared.python_loads))
+        if form is not None:
+            duration = reached - float(scene.start)
+            law = round_off_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
+            return _by_comparison(prepared, exact_error(prepared, form, trail), law, duration, margins)
+    lost = math.pi / float(prepared.precision.epsilon)
+    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, uneven, lost)
+    found = follow(course, margins, go_on)
+    if not go_on():
+        return None
+    return _conclusion(course, found, margins)
+
+
+def _of_closed_form(prepared: InitialValueProblem, error: float, carried: bool) -> Estimate:
+    flight = prepared.scene.free_flight
+    return Estimate(
+        error if carried else None,
+        error,
+        error * _size(prepared.scene.position) if flight else None,
+        error * _size(prepared.scene.velocity) if flight else None,
+        how="a few roundings of the closed form",
+    )
+
+
+def _by_comparison(
+    prepared: InitialValueProblem, found: ExactError, law: float, seconds: float, margins: Margins
+) -> Estimate:
+    """What was found, and some more for what lies between the samples that were compared."""
+    bits, label = _LAST_BITS * float(prepared.precision.epsilon), label_rounding(prepared, seconds)
+    rate = float(prepared.system.rate_bound)
+    extent, speed = _size(prepared.scene.position), _size(prepared.scene.velocity)
+
+    def with_margin(error: float | None, size: float = 1.0, pace: float = 0.0) -> float | None:
+        return None if error is None else margins.compared * error + bits * size + label * pace
+
+    attitude, rates = with_margin(found.attitude, pace=rate), with_margin(found.rates, pace=rate) or 0.0
+    amplification = (rates if attitude is None else attitude) / law if law > 0 else 1.0
+    return Estimate(
+        attitude=None if attitude is None else min(attitude, math.pi),
+        rates=rates,
+        position=with_margin(found.position, extent + speed * seconds, speed),
+        velocity=with_margin(found.velocity, speed),
+        amplification=amplification if amplification > margins.stable else 1.0,
+        seconds=seconds,
+        how="held against the closed form at some samples",
+        closed_form=True,
+    )
+
+
+def label_rounding(prepared: InitialValueProblem, seconds: float) -> float:
+    """By which times of samples are rounded, seconds."""
+    late = max(abs(float(prepared.scene.start)), abs(float(prepared.scene.start) + seconds))
+    return _LABEL * float(prepared.precision.epsilon) * late
+
+
+def _size(vector: object) -> float:
+    return math.hypot(*(float(x) for x in vector)) if vector is not None else 0.0  # type: ignore[attr-defined]
+
+
+def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimate:
+    prepared, spread, steps, end = course.prepared, followed.spread, course.steps, course.end
+    system, start, exponent = prepared.system, course.start, prepared.system.scaling.time
+    level, carried = float(prepared.precision.epsilon), course.carried
+    duration = math.ldexp(end - start, exponent)
+    flight = "x" in system.states
+    if not spread.times:
+        unknown = math.pi if spread.whole is False else 0.0
+        return Estimate(
+            unknown if carried else None, unknown, None, None, how="the motion could not be followed"
+        )
+    times = np.array(spread.times) - start
+    errors = level * margins.safety * leading(spread, carried)
+    longer = max((end - start) / times[-1], 1.0)
+
+    def beyond(errors: np.ndarray) -> float:
+        return float(longer ** min(max(power_of_time(times, errors), margins.power), margins.most_power))
+
+    turned = beyond(errors)
+    moved = max(turned, beyond(np.array(spread.position))) if flight else turned
+
+    label = math.ldexp(label_rounding(prepared, duration), -exponent)
+    rate = math.ldexp(float(system.rate_bound), exponent)
+
+    def at_end(name: str, size: float, most: float, pace: float = 0.0) -> float:
+        further = (moved if name in ("position", "velocity") else turned) * followed.more.get(name, 1.0)
+        found = float(max(getattr(spread, name))) * level * margins.safety * further
+        known = spread.whole and math.isfinite(found)
+        return float(min(found + _LAST_BITS * level * size + label * pace, most)) if known else most
+
+    lead = at_end("attitude" if carried else "rates", 1.0, sys.float_info.max, rate)
+    law = round_off_law(level, steps, float(system.rate_bound), duration)
+    amplification = lead / law if law > 0 else 1.0
+    growth, horizon = exponential_growth(times, errors, exponent, margins.power, margins.exponential)
+    scaling, size, speed = system.scaling, spread.extent, spread.fastest
+    place = margins.path * at_end("position", size, _AS_LARGE * size, speed)
+    pace = margins.path * at_end("velocity", speed, _AS_LARGE * speed)
+    return Estimate(
+        attitude=min(lead, math.pi) if carried else None,
+        rates=at_end("rates", 1.0, 2.0),
+        position=math.ldexp(place, scaling.length) if flight else None,
+        velocity=math.ldexp(pace, scaling.speed) if flight else None,
+        amplification=amplification if amplification > margins.stable else 1.0,
+        growth_rate=growth,
+        predictable_seconds=horizon,
+        seconds=math.ldexp(float(times[-1]), exponent),
+        share=followed.share,
+        how=_words(course, followed),
+    )
+
+
+def _words(course: Course, followed: Followed) -> str:
+    what = "neighbours of the motion, pushed at random as rounding does"
+    if loose(course.prepared):
+        what += " and as the tolerance lets the series do"
+    if followed.share >= 1:
+        return what + ", over the run"
+    what += f", over the first {100 * followed.share:.2g} % of the run"
+    spread = followed.spread
+    if not spread.whole or max(leading(spread, course.carried)) >= course.lost:
+        return what + ", after which no digit is left"
+    if followed.windows:
+        what += f" and in {followed.windows} windows beyond ({100 * followed.in_windows:.2g} %)"
+    return what + "; errors are taken to go on growing so, and growth that sets in elsewhere isn't seen"

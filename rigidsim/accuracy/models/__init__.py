@@ -1,0 +1,1 @@
+"""How wrong an averaged model is, and which one is good enough."""

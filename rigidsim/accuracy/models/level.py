@@ -1,0 +1,101 @@
+"""Which model keeps an accuracy of axes: the most averaged one whose measured error is within it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rigidsim.accuracy.models.modelling import measure_modelling
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.load import Load
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.model_table import AUTO, FULL, ORBIT_AVERAGED, SPIN_AVERAGED
+from rigidsim.scene.records import dataclass
+from rigidsim.solve.problem import prepare
+
+CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)
+
+
+@dataclass(frozen=True)
+class Considered:
+    """A level that was looked at.
+
+    Attributes:
+        error: forecast of its modelling error from the beginning of the span, rad; None where it has none.
+        why_not: why it isn't taken; empty for the one that is.
+    """
+
+    level: str
+    error: float | None
+    why_not: str
+
+
+@dataclass(frozen=True)
+class LevelChoice:
+    """What ``level = "auto"`` came to."""
+
+    experiment: Experiment
+    level: str
+    considered: Sequence[Considered]
+
+
+def choose_level(
+    experiment: Experiment, *, loads: Sequence[Load] = (), without: Sequence[str] = ()
+) -> LevelChoice | None:
+    """The model for the accuracy of axes that is asked for, each measured over the beginning of the span.
+
+    What isn't an average's to tell, such as a quaternion recorded, leaves the full model, whose attitude is
+    held to the same accuracy then.
+
+    Args:
+        without: levels that were tried and didn't keep it.
+
+    Returns:
+        None where the level is given.
+
+    Raises:
+        ConfigError: no accuracy is asked for.
+    """
+    config = experiment.config
+    if config.model.level != AUTO:
+        return None
+    asked = _asked(experiment)
+    considered: list[Considered] = []
+    for level in CHEAPEST_FIRST:
+        if level in without:
+            considered.append(Considered(level, None, "its measured error was larger than asked for"))
+            continue
+        other = experiment.having([f'model.level="{level}"'])
+        try:
+            found = measure_modelling(prepare(other, loads=loads))
+        except ConfigError as error:
+            considered.append(Considered(level, None, "; ".join(p.what for p in error.problems)))
+            continue
+        if found is not None and found.worst <= asked:
+            considered.append(Considered(level, found.worst, ""))
+            return LevelChoice(other, level, considered)
+        why = "the full model can't be followed beside it" if found is None else "more than asked for"
+        considered.append(Considered(level, None if found is None else found.worst, why))
+    considered.append(Considered(FULL, 0.0, ""))
+    return LevelChoice(fully(experiment), FULL, considered)
+
+
+def fully(experiment: Experiment) -> Experiment:
+    """The full model of an experiment whose level is open; others as they are.
+
+    Raises:
+        ConfigError: no accuracy is asked for.
+    """
+    if experiment.config.model.level != AUTO:
+        return experiment
+    _asked(experiment)
+    return experiment.having([f'model.level="{FULL}"'])
+
+
+def _asked(experiment: Experiment) -> float:
+    asked = experiment.config.integrator.accuracy_axis
+    if asked is None:
+        what = (
+            'given "auto", but [integrator] accuracy_axis says no error to hold; give it, or choose a level'
+        )
+        raise ConfigError(Problem("[model] level", what), experiment.source)
+    return float(asked)

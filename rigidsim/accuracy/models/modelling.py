@@ -1,0 +1,181 @@
+"""How wrong an averaged model is: measured over windows in which every rotation is resolved beside it.
+
+At the beginning, the middle and the end of the span the full motion starts from the averaged one's state,
+with what averaging removed added back, and both are followed. What they differ by is a growth, which is
+extrapolated over the span, and an oscillation, which is there whatever the span. A run that is hardly longer
+than the windows is followed to its end instead. The errors of the integration itself are another matter
+(``rigidsim.accuracy.estimates.estimate``).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+
+from rigidsim.accuracy.models.side_by_side import Window, rotation_rates, side_by_side
+from rigidsim.errors import ConfigError
+from rigidsim.model.averaged.average import Average
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.scene import Scene
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.trail import Trail
+
+_ORBITS = 8  # of the slowest source, from which a growth is told from what goes round with it
+_FEWEST_ORBITS = 2
+_ROTATIONS = 4000  # some 20,000 steps
+_MOST_ROTATIONS = 20_000  # for the fewest orbits
+_LEAST_ROTATIONS = 50
+_LIBRATIONS = 2
+_WHOLE = 4  # windows that a run is followed to its end in place of
+_SPARE = 2.0
+"""Times the extrapolated growth: it is told from three windows, and varies between them."""
+_SPARE_OF_WHOLE = 1.25  # for what lies between the samples
+_TURN = 2 * math.pi
+
+
+@dataclass(frozen=True)
+class ModellingError:
+    """What a reduced model leaves out.
+
+    Attributes:
+        momentum, figure: of the directions recorded, until the end of the run, rad; at most pi.
+        growth: rad/s, of the momentum's direction.
+        oscillation: rad, which doesn't grow: what isn't added back of the momentum's direction.
+        whole: whether the full model was followed to the end.
+        how: in words.
+        cpu_seconds: that it took.
+    """
+
+    level: str
+    momentum: float
+    figure: float | None
+    growth: float
+    oscillation: float
+    whole: bool
+    how: str
+    cpu_seconds: float
+    windows: Sequence[Window] = field(default_factory=list)
+
+    @property
+    def worst(self) -> float:
+        """Of both directions."""
+        return max(self.momentum, self.figure or 0.0)
+
+
+def measure_modelling(
+    prepared: InitialValueProblem, trail: Trail | None = None, go_on: Callable[[], bool] = lambda: True
+) -> ModellingError | None:
+    """Measure the modelling error of a run.
+
+    Args:
+        trail: some of the run's samples; without them windows lie at the beginning alone.
+        go_on: asked again and again; False ends it.
+
+    Returns:
+        None where ``go_on`` ended it, or where the full model can't be followed.
+    """
+    average = prepared.system.plan.average
+    assert average is not None
+    started = time.process_time()
+    scene = prepared.scene
+    begin, end = float(scene.start), float(scene.samples.last)
+    length = min(_length(scene, average), end - begin)
+    whole = end - begin <= _WHOLE * length
+    at_start = average.slow_states(prepared.system.scaling.momentum) or list(average.start)
+    places = [(begin, at_start)]
+    if not whole:
+        places += _places(prepared, trail, begin, end, length)
+    windows: list[Window] = []
+    for at, direction in places:
+        until = end if whole else at + length
+        try:
+            found = side_by_side(prepared, average, at, until, direction, go_on)
+        except ConfigError:
+            found = None
+        if found is None:
+            return None
+        windows.append(found)
+    spent = time.process_time() - started
+    if whole:
+        return _of_whole(average, windows[0], spent)
+    return _extrapolated(prepared, average, windows, end - begin, spent)
+
+
+def _length(scene: Scene, average: Average) -> float:
+    """Of a window, seconds."""
+    rates = rotation_rates(average)
+    rotation = _TURN / max(rates)
+    if average.resonance is not None:
+        libration = _TURN / average.resonance.libration_rate
+        return max(_ORBITS * _TURN / average.resonance.source.motion, _LIBRATIONS * libration)
+    slowest = max((_TURN / s.motion for s in average.sources if s.motion > 0), default=0.0)
+    orbits = min(_ORBITS * slowest, _ROTATIONS * rotation)
+    least = min(_FEWEST_ORBITS * slowest, _MOST_ROTATIONS * rotation)
+    return max(orbits, least, _LEAST_ROTATIONS * _TURN / min(r for r in rates if r > 0))
+
+
+def _places(
+    prepared: InitialValueProblem, trail: Trail | None, begin: float, end: float, length: float
+) -> list[tuple[float, list[Any]]]:
+    """Middle and end: the samples that are nearest, with the states there, the momentum's direction first."""
+    context, exponent = prepared.scene.context, prepared.system.scaling.time
+    kept = [] if trail is None else trail.samples
+    seen = [
+        (math.ldexp(float(time), exponent), [context.mpf(float(x)) for x in state])
+        for _, time, state, _ in kept
+    ]
+    seen = [(at, state) for at, state in seen if at > begin + length]
+    found = []
+    for wanted in ((begin + end) / 2, end - length):
+        if seen:
+            nearest = min(seen, key=lambda place: abs(place[0] - wanted))
+            if nearest not in found:
+                found.append(nearest)
+    return found
+
+
+def _of_whole(average: Average, window: Window, spent: float) -> ModellingError:
+    how = "every rotation was resolved beside the run to its end"
+    figure = window.recorded_figure
+    return ModellingError(
+        average.level,
+        min(_SPARE_OF_WHOLE * window.recorded, math.pi),
+        None if figure is None else min(_SPARE_OF_WHOLE * figure, math.pi),
+        math.hypot(*window.growth),
+        window.recorded,
+        True,
+        how,
+        spent,
+        [window],
+    )
+
+
+def _extrapolated(
+    prepared: InitialValueProblem, average: Average, windows: list[Window], span: float, spent: float
+) -> ModellingError:
+    rates = np.array([w.growth for w in windows])
+    doubt = max(w.doubt for w in windows)
+    mean = np.abs(rates.mean(axis=0)) + (rates.max(axis=0) - rates.min(axis=0)) / 2
+    along, across = (float(x) + doubt for x in mean)
+    # an error across the precession changes its rate, along it
+    shear = float(average.shear(prepared.scene.context, prepared.scene.start))
+    grown = math.hypot(along + shear * across * span / 2, across) * span
+    oscillation = max(w.recorded for w in windows)
+    growth = grown / span
+    momentum = _SPARE * grown + _SPARE_OF_WHOLE * oscillation
+    figure = None
+    if average.figure:
+        figure = _SPARE * grown + _SPARE_OF_WHOLE * max(w.recorded_figure or 0.0 for w in windows)
+        figure = min(figure, math.pi)
+    share = sum(w.end - w.start for w in windows) / span
+    steps = sum(w.steps for w in windows)
+    how = f"every rotation was resolved beside the run in {len(windows)} windows ({100 * share:.2g} % of it, "
+    how += f"{steps:,} steps), and the growth found there extrapolated to its end"
+    return ModellingError(
+        average.level, min(momentum, math.pi), figure, growth, oscillation, False, how, spent, windows
+    )

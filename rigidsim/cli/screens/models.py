@@ -1,0 +1,54 @@
+"""What a run and a plan say of models: how far an averaged one is from the full one, and at what cost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rigidsim.cli.screens.page import Page, Styled
+from rigidsim.look.readable_time import span_text
+from rigidsim.store.summary_parts import Modelling, TableErrors
+
+_YEAR = 365.25 * 86400  # s
+
+
+def print_modelling(found: Modelling | None, on: Page) -> None:
+    """How far a reduced model is from the full one."""
+    if found is None:
+        return
+    if found.momentum_axis is None:
+        on.line("averaged", f"modelling error {found.how}")
+        return
+    text = f"momentum's direction within {found.momentum_axis:.1e} rad of the full model's"
+    if found.figure_axis is not None:
+        text += f", figure axis within {found.figure_axis:.1e} rad"
+    on.line("averaged", text)
+    if not found.whole and found.growth is not None and found.oscillation is not None:
+        span = found.windows[0].end - found.windows[0].start
+        text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
+        text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * _YEAR:.1e} rad/yr"
+        on.line("", text)
+    if not found.short_period:
+        on.line("", "[model] short_period = true adds the nutation back that averaging removed")
+
+
+def interpolated(name: str, found: TableErrors) -> str:
+    """How near an orbit by a table is to what it was made of."""
+    expected = found.direction * found.expected
+    return (
+        f'"{name}": interpolation misses the source by {found.direction:.1e} rad at most with every other '
+        f"row left out, by about {expected:.0e} rad with all rows"
+    )
+
+
+def print_levels(levels: list[dict[str, Any]], on: Page) -> None:
+    """What each model would cost, and leave out."""
+    rows: list[list[Styled]] = []
+    for row in levels:
+        known = row["steps"] is not None
+        cost = [f"{row['steps']:,.0f}", span_text(row["cpu_seconds"], 2)] if known else ["", ""]
+        error = (
+            "" if row["error_rad"] is None else f"{row['error_rad']:.1e} rad" if row["error_rad"] else "none"
+        )
+        rows.append([row["level"], *cost, error, row["why_not"] or ("taken", "bold")])
+    if rows:
+        on.table(["model", "steps", "CPU", "leaves out", ""], rows)

@@ -1,0 +1,310 @@
+"""What the commands print on stdout: tables for people, never needed by the library."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+from rigidsim.cli.screens.models import interpolated, print_levels, print_modelling
+from rigidsim.cli.screens.page import Page, Styled, page
+from rigidsim.cli.screens.understood import understood
+from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
+from rigidsim.errors import ConfigError
+from rigidsim.look.readable_time import TimeWords, span_text
+from rigidsim.store.summary import Brief, Summary
+from rigidsim.store.summary_parts import ENGINE, Accuracy, Invariant
+from rigidsim.store.understood import Body, Span, Start
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from rigidsim.workflows.check import Checked
+
+
+def size(count: float) -> str:
+    """Bytes in a readable unit."""
+    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= factor:
+            return f"{count / factor:.3g} {unit}"
+    return f"{count:.0f} B"
+
+
+def _initial(value: float | tuple[float, ...] | None) -> str:
+    """A number, or the norm of a vector: enough to recognise it; all digits are in summary.json."""
+    if value is None:
+        return "-"
+    return f"|{math.hypot(*value):.6g}|" if isinstance(value, tuple) else f"{value:.6g}"
+
+
+def _scales(invariants: dict[str, Invariant]) -> str:
+    """What the drifts are relative to; invariants of the same scale together."""
+    names: dict[str, list[str]] = {}
+    for name, row in invariants.items():
+        names.setdefault(row.scale_name, []).append(name)
+    return "; ".join(f"{scale} ({', '.join(of)})" for scale, of in names.items())
+
+
+def _drift(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2e}"
+
+
+def print_summary(summary: Brief, folder: str, out: Console | None = None) -> None:
+    """The table at the end of ``run`` and of ``info``."""
+    on = page(out)
+    color = "green" if summary.status == "finished" else "yellow"
+    on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))
+    if summary.description:
+        on.say((summary.description, "dim"))
+    if summary.status != "finished":
+        on.say(summary.message)
+    if isinstance(summary, Summary):
+        _print_ended(summary, on)
+    on.line("folder", folder)
+    for number, command in enumerate(next_lines(summary.status, summary.exit_code, folder)):
+        on.line("" if number else "next", command, "cyan")
+
+
+def print_understood(body: Body | None, start: Start | None, time: Span | None, out: Console) -> None:
+    """Body, start and time as they were understood."""
+    _print_understood(body, start, time, page(out))
+
+
+def _print_understood(body: Body | None, start: Start | None, time: Span | None, on: Page) -> None:
+    for label, text in understood(body, start, time):
+        on.line(label, text)
+
+
+def _from_step(step: int | None) -> str:
+    return "" if step is None else f" from step {step:,} on"
+
+
+def _print_ended(summary: Summary, on: Page) -> None:
+    _print_understood(summary.body, summary.start, summary.time, on)
+    how = f"tolerance {summary.tolerance:.3g}"
+    if summary.method == "closed_form":
+        how = "in closed form"
+    if summary.held:
+        how += ", invariants projected" + _from_step(summary.hold_from_step)
+    on.line(
+        "model",
+        f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
+        f"{summary.precision} precision, {how}",
+    )
+    if summary.formulation == "planar":
+        on.line("", "whether a small push out of the plane would grow isn't examined")
+    cost = summary.cost
+    seconds = sum(v for k, v in cost.seconds.items() if k != ENGINE)
+    on.line(
+        "cost",
+        f"{cost.steps:,} steps, {summary.samples:,} of {summary.samples_planned:,} samples, "
+        f"{span_text(seconds)} wall ({span_text(cost.seconds[ENGINE])} integrating), "
+        f"{span_text(cost.cpu_seconds)} CPU",
+    )
+    if cost.cpu_by_phase:
+        spent = [f"{name.replace('_', ' ')} {span_text(s)}" for name, s in cost.cpu_by_phase.items()]
+        on.line("CPU", ", ".join(spent))
+    _print_invariants(summary, on)
+    on.line("drifts", "relative to: " + _scales(summary.invariants))
+    if summary.held:
+        on.line("held", "put back: what the drift would have been; held drifts are no independent check")
+    _print_accuracy(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
+    print_modelling(summary.modelling, on)
+    for number, (name, found) in enumerate(summary.tables.items()):
+        on.line("" if number else "tables", interpolated(name, found))
+    for number, name in enumerate(summary.events):
+        on.line("" if number else "events", _event(summary, name))
+    if summary.undefined_samples:
+        counts = summary.undefined_samples.items()
+        told = [f"{name} at {count:,} sample{'s' * (count > 1)}" for name, count in counts]
+        on.line("undefined", f"{', '.join(told)}; NaN is recorded there")
+    chaos = summary.lyapunov
+    if chaos is not None:
+        what = "chaotic" if chaos.chaotic else "regular"
+        moved = f"moved by {chaos.moved_over_second_half:.1g} over the second half"
+        on.line("motion", f"{what}: largest Lyapunov exponent {chaos.largest_exponent:.3g} 1/s ({moved})")
+    for warning in summary.warnings:
+        on.line("warning", warning, "bold red")
+    verdict, style = verdict_line(summary)
+    on.line("verdict", verdict, style)
+    for advice in filter(None, map(advice_line, summary.advice)):
+        on.line("advice", advice, "cyan")
+
+
+def _event(summary: Summary, name: str) -> str:
+    """How often, and when."""
+    count, times = summary.events[name], summary.event_times.get(name)
+    if times is None:
+        return f"{name}: {count:,}"
+    early = times.early or (times.first,)
+    if count > len(early):  # a few, and the last one
+        early = early[:3]
+    words = _words(summary)
+    told = [words.moment(time) for time in early]
+    if count > len(told):
+        told += ["..."] * (count > len(told) + 1) + [words.moment(times.last)]
+    return f"{name}: {count:,}, at {', '.join(told)}"
+
+
+def _words(summary: Summary) -> TimeWords:
+    time = summary.time
+    if time is None:  # of an older version
+        return TimeWords.of({}, 0.0, summary.time_reached)
+    return TimeWords.of({"epoch": time.epoch, "time_unit": time.unit}, time.start_s, time.end_s)
+
+
+def _print_invariants(summary: Summary, on: Page) -> None:
+    """Where it doesn't fit, without the last drifts, which say least."""
+    held = ["put back"] if summary.held else []
+    columns = ["invariant", "initial", "largest drift", "final", "bound", *held]
+    rows: list[list[Styled]] = []
+    for name, row in summary.invariants.items():
+        sound = row.largest_drift is None or row.largest_drift <= row.bound
+        largest = (_drift(row.largest_drift), "" if sound else "red")
+        rows.append([name, _initial(row.initial), largest, _drift(row.final_drift), _drift(row.bound)])
+        rows[-1] += [_drift(row.put_back)] if held else []
+    if not on.fits(columns, rows):
+        least = columns.index("final")
+        columns, rows = _without(columns, least), [_without(row, least) for row in rows]
+    on.table(columns, rows)
+
+
+def _without(row: list[Any], place: int) -> list[Any]:
+    return [cell for n, cell in enumerate(row) if n != place]
+
+
+def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
+    if accuracy.chosen:
+        on.line("chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
+    estimate = accuracy.estimated_attitude_error
+    if accuracy.certified is not None:
+        asked = "" if accuracy.requested is None else f", {accuracy.requested:.1e} asked for"
+        text = f"certified to {accuracy.certified:.1e} rad{asked} ({accuracy.how}, "
+        on.line(what, f"{text}{accuracy.times_compared} times)")
+    elif estimate is not None:
+        factor = accuracy.amplification or 1.0
+        unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 else ""
+        size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
+        if what == "axis":
+            size = f"momentum's direction integrated to about {estimate:.1e} rad at the end{unstable}"
+        on.line(what, size if estimate < math.pi else "unknown at the end")
+        share = accuracy.examined_share
+        if share is not None and share < 1 and estimate < math.pi:
+            seen = f"the growth of errors was followed over the first {100 * share:.2g} % of the run"
+            on.line("examined", f"{seen} (estimated_how in the summary says more)")
+    elif accuracy.amplification is None:
+        on.line("errors", accuracy.estimated_how)
+    if accuracy.certified_position is not None:
+        length = accuracy.requested_position or math.nan
+        text = f"certified to {accuracy.certified_position:.1e} m, {length:.1e} m asked for"
+        on.line("path", text)
+        return
+    place, speed = accuracy.estimated_position_error, accuracy.estimated_velocity_error
+    if place is not None and speed is not None:
+        text = f"position uncertain by about {place:.1e} m, velocity by {speed:.1e} m/s, at the end"
+        on.line("path", text)
+
+
+def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
+    """What ``rigidsim plan`` says."""
+    on = page(out)
+    on.say((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}")
+    parts = Body(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
+    _print_understood(*parts, on)
+    for effect in plan["loads"]:
+        on.line("load", effect)
+    for surface in plan["switching"]:
+        where = f"steps end on the kinks and jumps of {surface['surface']} ({surface['where']})"
+        on.say("  " + where)
+    if plan["turning"]:
+        on.say(f"  turns of {', '.join(plan['turning'])} count: steps are taken one by one")
+    reasons: list[list[Styled]] = [[row["states"], row["why"]] for row in plan["reasons"]]
+    reasons += [[(f"no {row['what']}", "dim"), (row["why"], "dim")] for row in plan["left_out"]]
+    on.table(["states", "carried because"], reasons)
+    on.say(("equations (internal units: powers of two)", "bold"))
+    for line in plan["equations"]:
+        on.say("  " + line, whole=True)
+    on.table(["invariant", "holds because"], [[row["name"], row["why"]] for row in plan["invariants"]])
+    on.line("recorded", ", ".join(plan["recorded"]))
+    predicted, pilot = plan["predicted"], plan["pilot"]
+    held = ", invariants held" + _from_step(plan["hold_from_step"]) if plan["hold_invariants"] else ""
+    on.line(
+        "settings",
+        f"{plan['precision']} precision, tolerance {plan['tolerance']:.3g}, Taylor order "
+        f"{plan['taylor_order']}{held}",
+    )
+    if plan["method"] == "closed_form":
+        on.line("method", f"{plan['closed_form']}: no steps are taken")
+    elif plan["closed_form"] is not None:
+        on.line("closed", f'{plan["closed_form"]}: method = "closed_form" would take no steps')
+    print_levels(plan["levels"], on)
+    if plan["accuracy"] is not None:
+        on.line("chosen", f"{plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
+    on.line(
+        "forecast",
+        f"{predicted['steps']:.3g} steps of about {span_text(pilot['step'])} "
+        f"(pilot of {pilot['steps']:.0f}), {span_text(predicted['total_seconds'])}, "
+        f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
+        f"timeline {size(predicted['timeline_bytes'])}",
+    )
+    for warning in plan["warnings"]:
+        on.line("warning", warning, "bold red")
+    error = predicted["attitude_error_rad"]
+    if error is not None and math.isfinite(error):
+        factor = predicted["amplification"]
+        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
+        on.line(
+            "accuracy", f"attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
+        )
+        seen = predicted["growth_seconds"]
+        if seen:
+            on.line(
+                "",
+                f"if errors go on growing as in the first {span_text(seen)}; what sets in later isn't seen "
+                "here, but by the run",
+            )
+
+
+def print_scenes(described: dict[str, str]) -> None:
+    """What ``rigidsim new`` can write."""
+    on = page()
+    on.table(["scene", "what it is"], described.items())
+    on.say("rigidsim new SCENE [NAME] writes NAME.toml")
+
+
+def print_checked(found: Checked) -> None:
+    """What a check found: errors on stderr, as of all commands."""
+    if not found.valid:
+        print(f"rigidsim: {ConfigError(found.problems, found.source).for_command_line()}", file=sys.stderr)
+        return
+    on = page()
+    on.say((found.source, "bold"), "  ", ("valid", "bold green"))
+    _print_understood(found.body, found.start, found.time, on)
+    for caution in found.cautions:
+        on.line("warning", caution.text, "bold red")
+
+
+def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:
+    """A verification in words, from ``Verdict.as_dict``; ``what`` were compared."""
+    on = page()
+    if verdict["identical"]:
+        on.say(f"identical: {verdict['samples']:,} {what}s, every variable, every bit")
+    else:
+        on.say(f"different: {verdict['path']}")
+    for problem in verdict["problems"]:
+        on.say(f"  {problem}")
+    first = verdict["first_difference"]
+    if first is not None:
+        on.say(
+            f"  first difference: {first['variable']} at {what} {first['sample']}: saved "
+            f"{first['saved']!r}, again {first['again']!r}, {first['size']:.3g} apart"
+        )
+    names = verdict["differing_variables"]
+    if names:
+        on.say(f"  variables that differ: {', '.join(names)}")
+    if verdict["environment"]:
+        on.say("  changed since, which can explain other bits:")
+        for line in verdict["environment"]:
+            on.say(f"    {line}")
+    elif names:
+        on.say("  versions, CPU features and settings are the same, so they don't explain it")

@@ -1,0 +1,218 @@
+"""From ``[body]`` to mass, centre of mass, inertia tensor and principal axes about the reference point.
+
+The reference point is the one that the body turns about: the centre of mass, unless the config names
+another. Positions in the result are body axes, metres, from the reference point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Any
+
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import (
+    Matrix,
+    Vector,
+    apply,
+    diagonal,
+    eigen,
+    multiply,
+    transpose,
+)
+from rigidsim.scene.bodies import table as body_table
+from rigidsim.scene.bodies.pieces import (
+    drawn,
+    parallel_axis,
+    pieces_of,
+    positive,
+    reference_point,
+    refusal,
+    refuse_dimensions,
+)
+from rigidsim.scene.bodies.presets import PRESETS
+from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.tracing.context import plain
+from rigidsim.scene.validation_messages import nearest, shown
+
+SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
+# A tensor that was printed by a double-precision program obeys the triangle inequality to about this.
+_ROUNDING_OF_INPUT = 1e-14
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """What mechanics needs of a body; numbers are mpf of the scene's context.
+
+    Attributes:
+        mass: kg, or None where the config gives none.
+        center_of_mass: body axes, from the reference point, m.
+        inertia: 3x3 tensor about the reference point, body axes, kg m^2.
+        principal_moments: its eigenvalues (a diagonal tensor keeps the order of its axes).
+        principal_axes: the matching unit axes as rows, body axes, right-handed.
+        drawing: solids for the pictures (see ``rigidsim.look.solids``), as plain JSON values.
+        source: which key the inertia came from, with the preset's reference where there is one.
+    """
+
+    mass: Any | None
+    center_of_mass: Vector
+    inertia: Matrix
+    principal_moments: Vector
+    principal_axes: Matrix
+    source: str
+    drawing: list[dict[str, Any]] = field(default_factory=list)
+
+
+def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> RigidBody:
+    """Work out the body that ``[body]`` describes, in the context's precision.
+
+    Args:
+        sequence: of Euler angles of parts that name none.
+
+    Raises:
+        ConfigError: not exactly one source of inertia, a dimension missing or foreign, a tensor that no
+            body has (asymmetric, negative, against the triangle inequality), a contradiction.
+    """
+    given = [name for name in SOURCES if getattr(table, name) is not None]
+    if len(given) != 1:
+        found = " and ".join(given) if given else "no source of inertia"
+        raise refusal("", f"given {found}; exactly one of {', '.join(SOURCES)} is needed")
+    source = given[0]
+    if source != "shape":
+        refuse_dimensions(table, (), "which only a shape has", "")
+    if source in ("principal_moments", "inertia_tensor", "preset"):
+        return _from_tensor(table, source, context)
+    if table.center_of_mass is not None:
+        raise refusal(
+            "center_of_mass",
+            f"it follows from {source}; remove it, and say with reference what the body turns about",
+        )
+    if source != "shape" and table.mass is not None:
+        raise refusal("mass", f"it follows from {source}; remove it")
+    return _from_pieces(table, source, context, sequence)
+
+
+def _from_tensor(table: body_table.Body, source: str, context: Any) -> RigidBody:
+    if table.reference is not None:
+        raise refusal(
+            "reference",
+            f"only shape, points and parts take it; {source} is taken about the point that the body "
+            "turns about already: remove it",
+        )
+    zero = [context.zero] * 3
+    center = [x.at(context) for x in table.center_of_mass] if table.center_of_mass else zero
+    mass = positive(table.mass, "mass", "mass", context) if table.mass is not None else None
+    drawing: list[dict[str, Any]] = []
+    described = source
+    if source == "preset":
+        preset = PRESETS.get(str(table.preset))
+        if preset is None:
+            near = nearest(str(table.preset), PRESETS)
+            raise refusal("preset", f"given {shown(table.preset)}{near}; allowed: {', '.join(PRESETS)}")
+        if table.mass is not None:
+            raise refusal("mass", "it follows from preset; remove it")
+        inertia = diagonal(preset.moments(context))
+        mass = parse_number(preset.mass, "kg").at(context)
+        described = f"preset {table.preset} ({preset.source})"
+        axes = [float(parse_number(a, "m").at(context)) for a in preset.semi_axes]
+        drawing = [{**drawn("ellipsoid", {"semi_axes": axes}, center), "name": str(table.preset)}]
+    elif source == "principal_moments":
+        assert table.principal_moments is not None
+        inertia = diagonal([x.at(context) for x in table.principal_moments])
+    else:
+        assert table.inertia_tensor is not None
+        _check_symmetric(table.inertia_tensor)
+        inertia = [[x.at(context) for x in row] for row in table.inertia_tensor]
+    return _finish(context, source, described, mass, center, inertia, drawing)
+
+
+def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
+    for i in range(3):
+        for j in range(i):
+            if tensor[i][j] != tensor[j][i]:
+                raise refusal(
+                    f"inertia_tensor[{i}][{j}]",
+                    f"given {float(tensor[i][j])!r}, but [{j}][{i}] is {float(tensor[j][i])!r}; "
+                    "the tensor must be symmetric: write the same number twice",
+                )
+
+
+def _from_pieces(table: body_table.Body, source: str, context: Any, sequence: str) -> RigidBody:
+    pieces = pieces_of(table, source, context, sequence)
+    total = sum((piece.mass for piece in pieces), context.zero)
+    center = [sum((p.mass * p.position[i] for p in pieces), context.zero) / total for i in range(3)]
+    reference = reference_point(table, source, center, context)
+    inertia = diagonal([context.zero] * 3)
+    drawing = []
+    for piece in pieces:
+        arm = [x - r for x, r in zip(piece.position, reference, strict=True)]
+        shifted = parallel_axis(piece.inertia, piece.mass, arm)
+        inertia = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(inertia, shifted, strict=True)]
+        drawing.append({**piece.drawing, "position": [float(plain(x)) for x in arm]})
+        if piece.drawing["solid"] == "point":
+            drawing[-1]["dimensions"] = {"mass_fraction": float(plain(piece.mass / total))}
+    center = [c - r for c, r in zip(center, reference, strict=True)]
+    return _finish(context, source, source, total, center, inertia, drawing)
+
+
+def _finish(
+    context: Any,
+    source: str,
+    described: str,
+    mass: Any,
+    center: Vector,
+    inertia: Matrix,
+    drawing: list[dict[str, Any]],
+) -> RigidBody:
+    moments, axes = eigen(context, inertia)
+    largest = max(abs(m) for m in moments)
+    if largest == 0:
+        raise refusal(source, "all moments are zero; a body that turns needs inertia about some axis")
+    slack = largest * context.mpf(_ROUNDING_OF_INPUT)
+    tiny = largest * context.mpf(2) ** (16 - context.prec)
+    moments = [context.zero if abs(m) < tiny else m for m in moments]
+    listed = ", ".join(context.nstr(m, 12) for m in moments)
+    if min(moments) < 0:
+        raise refusal(source, f"principal moments {listed}: a moment of inertia can't be negative")
+    if sorted(moments)[1] == 0:
+        raise refusal(source, f"principal moments {listed}: at most one can be zero (a rod's)")
+    small, middle, large = sorted(moments)
+    if small + middle < large - slack:
+        raise refusal(
+            source,
+            f"principal moments {listed}: the largest is more than the sum of the other two "
+            f"by {context.nstr(large - small - middle, 6)}, which no mass distribution allows "
+            "(I1 + I2 >= I3)",
+        )
+    if not drawing:
+        drawing = [_equivalent_cuboid(context, mass, center, moments, axes)]
+    return RigidBody(mass, center, inertia, moments, axes, described, drawing)
+
+
+def _equivalent_cuboid(
+    context: Any, mass: Any, center: Vector, moments: Vector, axes: Matrix
+) -> dict[str, Any]:
+    """The homogeneous cuboid that has these moments (of unit mass where none is known)."""
+    mass, center, moments = plain(mass), [plain(x) for x in center], [plain(m) for m in moments]
+    axes = [[plain(x) for x in row] for row in axes]
+    heavy = mass if mass else context.one
+    total = sum(moments) / 2
+    edges = [context.sqrt(max(12 * (total - m), context.zero) / heavy) for m in moments]
+    longest = max(edges)
+    visible = [float(max(edge, longest / 40)) for edge in edges]  # a plate stays visible edge on
+    drawing = drawn("cuboid", {"size": visible}, center)
+    q = attitude.quaternion_from_matrix(context, transpose(axes))
+    drawing["quaternion"] = [float(x) for x in q]
+    drawing["equivalent"] = True  # its shape isn't known, only its moments
+    return drawing
+
+
+def inverse_inertia(context: Any, body: RigidBody) -> Matrix:
+    """Inverse of the tensor; a rod's axis without inertia gets no angular acceleration (pseudo-inverse)."""
+    inverse = [context.zero if m == 0 else 1 / m for m in body.principal_moments]
+    return multiply(multiply(transpose(body.principal_axes), diagonal(inverse)), body.principal_axes)
+
+
+def momentum(body: RigidBody, angular_velocity: Vector) -> Vector:
+    """Angular momentum about the reference point, body axes."""
+    return apply(body.inertia, angular_velocity)

@@ -1,0 +1,202 @@
+"""Homogeneous solids in their own axes: dimensions, principal moments, landmarks, and what they look like.
+
+Formulas: Landau & Lifshitz, Mechanics, section 32, and standard tables; checked in the tests against
+numerical integration over the volume. All are evaluated in mpmath at the caller's precision.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import field
+from typing import Any
+
+from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Outline, Revolved, polygon
+from rigidsim.scene.records import dataclass
+
+Dimensions = Mapping[str, list[Any]]
+Vector = list[Any]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A solid of uniform density.
+
+    Attributes:
+        dimensions: names of the keys that size it, each with how many numbers it takes.
+        meaning: how it lies in its own axes, for readers of the table.
+        moments: (context, dimensions) -> principal moments per unit mass about the centre of mass, m^2.
+        outline: dimensions as float -> what it looks like.
+        landmarks: named points that a body can turn about, from the centre of mass, metres.
+        at_most: two dimensions, the first of which is at most the second.
+    """
+
+    dimensions: Mapping[str, int]
+    meaning: str
+    moments: Callable[[Any, Dimensions], Vector]
+    outline: Callable[[Dimensions], Outline]
+    landmarks: Mapping[str, Callable[[Any, Dimensions], Vector]] = field(default_factory=dict)
+    at_most: tuple[str, str] | None = None
+
+
+def _cuboid(_: Any, d: Dimensions) -> Vector:
+    a, b, c = (x**2 / 12 for x in d["size"])
+    return [b + c, a + c, a + b]
+
+
+def _plate(_: Any, d: Dimensions) -> Vector:
+    a, b = (x**2 / 12 for x in d["size"])
+    return [b, a, a + b]
+
+
+def _ellipsoid(_: Any, d: Dimensions) -> Vector:
+    a, b, c = (x**2 / 5 for x in d["semi_axes"])
+    return [b + c, a + c, a + b]
+
+
+def _sphere(_: Any, d: Dimensions) -> Vector:
+    return [2 * d["radius"][0] ** 2 / 5] * 3
+
+
+def _spherical_shell(_: Any, d: Dimensions) -> Vector:
+    return [2 * d["radius"][0] ** 2 / 3] * 3
+
+
+def _cylinder(_: Any, d: Dimensions) -> Vector:
+    r2, h2 = d["radius"][0] ** 2, d["height"][0] ** 2
+    return [(3 * r2 + h2) / 12] * 2 + [r2 / 2]
+
+
+def _tube(_: Any, d: Dimensions) -> Vector:
+    r2, h2 = d["inner_radius"][0] ** 2 + d["outer_radius"][0] ** 2, d["height"][0] ** 2
+    return [(3 * r2 + h2) / 12] * 2 + [r2 / 2]
+
+
+def _cone(_: Any, d: Dimensions) -> Vector:
+    r2, h2 = d["radius"][0] ** 2, d["height"][0] ** 2
+    return [3 * (4 * r2 + h2) / 80] * 2 + [3 * r2 / 10]
+
+
+def _rod(context: Any, d: Dimensions) -> Vector:
+    return [d["length"][0] ** 2 / 12] * 2 + [context.zero]
+
+
+def _disk(_: Any, d: Dimensions) -> Vector:
+    r2 = d["radius"][0] ** 2
+    return [r2 / 4, r2 / 4, r2 / 2]
+
+
+def _ring(_: Any, d: Dimensions) -> Vector:
+    r2 = d["radius"][0] ** 2
+    return [r2 / 2, r2 / 2, r2]
+
+
+def _torus(_: Any, d: Dimensions) -> Vector:
+    major, minor = d["major_radius"][0] ** 2, d["minor_radius"][0] ** 2
+    return [(4 * major + 5 * minor) / 8] * 2 + [major + 3 * minor / 4]
+
+
+def _upright(radius: float, height: float) -> Revolved:
+    h = height / 2
+    return polygon((0, -h), (radius, -h), (radius, h), (0, h))
+
+
+def _drawn_plate(d: Dimensions) -> Box:
+    a, b = d["size"]
+    return Box(a, b, THINNESS * max(a, b))
+
+
+def _drawn_ball(d: Dimensions) -> Ellipsoid:
+    return Ellipsoid(*d["radius"] * 3)
+
+
+def _drawn_tube(d: Dimensions) -> Revolved:
+    outer, h = d["outer_radius"][0], d["height"][0] / 2
+    inner = min(d["inner_radius"][0], (1 - THINNESS) * outer)  # a wall without thickness is drawn with some
+    return polygon((inner, -h), (outer, -h), (outer, h), (inner, h), (inner, -h))
+
+
+def _drawn_cone(d: Dimensions) -> Revolved:
+    apex, base = -3 * d["height"][0] / 4, d["height"][0] / 4
+    return polygon((0, apex), (d["radius"][0], base), (0, base))
+
+
+def _drawn_torus(major: float, minor: float) -> Revolved:
+    return Revolved((Arc((major, 0.0), minor, -math.pi, math.pi),))
+
+
+SHAPES: dict[str, Shape] = {
+    "cuboid": Shape(
+        {"size": 3},
+        "edges along x, y, z",
+        _cuboid,
+        lambda d: Box(*d["size"]),
+        {"corner": lambda _, d: [-x / 2 for x in d["size"]]},
+    ),
+    "plate": Shape(
+        {"size": 2},
+        "thin rectangle with edges along x and y",
+        _plate,
+        _drawn_plate,
+        {"corner": lambda c, d: [-x / 2 for x in d["size"]] + [c.zero]},
+    ),
+    "ellipsoid": Shape(
+        {"semi_axes": 3}, "semi-axes along x, y, z", _ellipsoid, lambda d: Ellipsoid(*d["semi_axes"])
+    ),
+    "sphere": Shape({"radius": 1}, "solid ball", _sphere, _drawn_ball),
+    "spherical_shell": Shape({"radius": 1}, "thin hollow ball", _spherical_shell, _drawn_ball),
+    "cylinder": Shape(
+        {"radius": 1, "height": 1},
+        "axis along z",
+        _cylinder,
+        lambda d: _upright(*d["radius"], *d["height"]),
+    ),
+    "tube": Shape(
+        {"inner_radius": 1, "outer_radius": 1, "height": 1},
+        "hollow cylinder, axis along z",
+        _tube,
+        _drawn_tube,
+        at_most=("inner_radius", "outer_radius"),
+    ),
+    "cone": Shape(
+        {"radius": 1, "height": 1},
+        "axis along z, apex towards -z",
+        _cone,
+        _drawn_cone,
+        {"apex": lambda c, d: [c.zero, c.zero, -3 * d["height"][0] / 4]},
+    ),
+    "rod": Shape(
+        {"length": 1},
+        "thin, along z",
+        _rod,
+        lambda d: _upright(THINNESS * d["length"][0], d["length"][0]),
+        {"end": lambda c, d: [c.zero, c.zero, -d["length"][0] / 2]},
+    ),
+    "disk": Shape(
+        {"radius": 1},
+        "thin, normal along z",
+        _disk,
+        lambda d: _upright(d["radius"][0], 2 * THINNESS * d["radius"][0]),
+    ),
+    "ring": Shape(
+        {"radius": 1},
+        "thin hoop, normal along z",
+        _ring,
+        lambda d: _drawn_torus(d["radius"][0], 2 * THINNESS * d["radius"][0]),
+    ),
+    "torus": Shape(
+        {"major_radius": 1, "minor_radius": 1},
+        "axis along z",
+        _torus,
+        lambda d: _drawn_torus(*d["major_radius"], *d["minor_radius"]),
+        at_most=("minor_radius", "major_radius"),
+    ),
+}
+"""The shapes that ``[body] shape`` and ``[[body.parts]] shape`` take; one more needs an entry here alone."""
+
+DIMENSIONS = {
+    key: max(other.dimensions.get(key, 0) for other in SHAPES.values())
+    for shape in SHAPES.values()
+    for key in shape.dimensions
+}
+"""Every key that sizes some shape, and how many numbers it takes at most."""

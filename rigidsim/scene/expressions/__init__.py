@@ -1,0 +1,1 @@
+"""Expressions of time, the state and parameters: how they are written, and what they mean."""

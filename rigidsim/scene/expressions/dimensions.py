@@ -1,0 +1,168 @@
+"""Dimensions of expressions: what can be checked where units are written in them.
+
+A bare number, and a parameter without a unit, is in SI of whatever dimension fits, so that nothing is known
+of a product with it. Time and the state have their dimensions (angles have none). Sums are checked, arguments
+of functions, and what a component is needed in; but only where a unit is written in one of the parts, so
+that ``sin(t)``, which takes t in seconds, stays what it was.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from fractions import Fraction
+
+from rigidsim.scene import units
+from rigidsim.scene.exact import ExactNumber, Quantity
+from rigidsim.scene.expressions.tree import FLIGHT_NAMES, RATE_NAMES
+from rigidsim.scene.records import dataclass
+
+_WORD_OF_UNIT = re.compile(
+    r"[ \t]*(?P<join>[*/]?)[ \t]*(?P<name>[A-Za-z][A-Za-z0-9_]*)"
+    r"(?P<power>[ \t]*(?:\^|\*\*)[ \t]*-?[0-9]+(?![\d.]))?"
+)
+
+
+class DimensionError(ValueError):
+    """Values of different dimensions where one is needed; the text says which."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is known of a value's dimension.
+
+    Attributes:
+        powers: of base units, sorted; empty for a number or an angle; None where any is possible.
+        written: whether a unit was written in it.
+    """
+
+    powers: units.Powers | None
+    written: bool = False
+
+    def times(self, other: Measure, power: int = 1) -> Measure:
+        """The product with a power (1 or -1) of another."""
+        written = self.written or other.written
+        if self.powers is None or other.powers is None:
+            return Measure(None, written)
+        found = dict(self.powers)
+        for base, exponent in other.powers:
+            found[base] = found.get(base, Fraction(0)) + power * exponent
+        return Measure(_sorted(found), written)
+
+    def power(self, exponent: ExactNumber | None) -> Measure:
+        """A power; an exponent that isn't rational leaves numbers alone known."""
+        if not self.powers:
+            return self
+        if exponent is None or exponent.pi_power:
+            return Measure(None, self.written)
+        return Measure(_sorted({base: p * exponent.rational for base, p in self.powers}), self.written)
+
+    def with_other(self, other: Measure) -> Measure:
+        """Of a sum, or whatever takes values of one dimension.
+
+        Raises:
+            DimensionError: they have different ones, and a unit is written in either.
+        """
+        written = self.written or other.written
+        if self.powers is None or other.powers is None or self.powers == other.powers:
+            return Measure(other.powers if self.powers is None else self.powers, written)
+        if written:
+            raise DimensionError(f"{self} and {other} can't be added or compared")
+        return Measure(None)
+
+    def __str__(self) -> str:
+        if self.powers is None:
+            return "a value of any dimension"
+        return f'a value in "{units.unit_text(self.powers)}"' if self.powers else "a number or an angle"
+
+
+NUMBER = Measure(())
+ANY = Measure(None)
+_STATE = {"t": "s", **dict.fromkeys(RATE_NAMES, "rad/s")}
+_STATE |= dict(zip(FLIGHT_NAMES, ["m"] * 3 + ["m/s"] * 3, strict=True))
+
+
+def of_name(name: str) -> Measure:
+    """Of time or a component of the state."""
+    unit = _STATE.get(name)
+    return NUMBER if unit is None else Measure(_SI[unit])
+
+
+def of_number(number: ExactNumber) -> Measure:
+    """Of a constant: of its unit, where it has one."""
+    return of_unit(number.unit) if isinstance(number, Quantity) else ANY
+
+
+def of_unit(unit: str) -> Measure:
+    """Of what has this unit written behind it."""
+    return Measure(units.powers(unit), written=True)
+
+
+def of_function(name: str, arguments: Sequence[Measure]) -> Measure:
+    """Of a function's value.
+
+    Raises:
+        DimensionError: it can't have such arguments.
+    """
+    common = arguments[0]
+    for other in arguments[1:]:
+        common = common.with_other(other)
+    if name in ("abs", "min", "max"):
+        return common
+    if name == "sqrt":
+        return common.power(ExactNumber(Fraction(1, 2)))
+    if common.powers and common.written and name not in ("sign", "step", "pulse", "atan2"):
+        raise DimensionError(
+            f'"{name}" takes a number or an angle, given {common}; divide by '
+            f'"(1 {units.unit_text(common.powers)})" if that is meant'
+        )
+    return Measure((), any(argument.written for argument in arguments))
+
+
+def check_unit(measure: Measure, needed: str) -> None:
+    """Whether a value can be what is needed.
+
+    Raises:
+        DimensionError: its dimension is another, and a unit is written in it.
+    """
+    if measure.written and measure.powers is not None and measure.powers != units.powers(needed):
+        raise DimensionError(f'the expression is {measure}, where "{needed}" is needed')
+
+
+def end_of_unit(text: str, position: int, names: Collection[str], parameters: Collection[str]) -> int:
+    """Where a unit ends that begins behind a position; the position itself where none does.
+
+    Args:
+        names: of the state and of time, which are never units: t is no tonne.
+        parameters: these are units only within a text that can't be meant otherwise, as ``m`` in "9.81 m/s^2"
+            and in "0.1 N m", since products have their sign.
+
+    Raises:
+        DimensionError: it can be meant otherwise, as "5 N*m" where m is a parameter.
+    """
+    end, certain = position, False
+    while (match := _WORD_OF_UNIT.match(text, end)) is not None:
+        name, join = match["name"], match["join"]
+        called = text[match.end() :].lstrip(" \t").startswith("(") and match["power"] is None
+        if called or name in names or (join and end == position) or not units.is_unit(name):
+            break
+        if join and name in parameters:
+            raise DimensionError(
+                f'"{name}" is a parameter here, and a unit as well; write the unit without "{join}", or '
+                "parentheses around the number with its unit"
+            )
+        end, certain = match.end(), certain or name not in parameters
+    return end if certain else position
+
+
+def _sorted(powers: dict[str, Fraction]) -> units.Powers:
+    return tuple(sorted((base, power) for base, power in powers.items() if power))
+
+
+_SI: dict[str, units.Powers] = {
+    "s": (("second", Fraction(1)),),
+    "rad/s": (("second", Fraction(-1)),),
+    "m": (("meter", Fraction(1)),),
+    "m/s": (("meter", Fraction(1)), ("second", Fraction(-1))),
+}
+"""Written out, so that expressions without units need no library of units."""

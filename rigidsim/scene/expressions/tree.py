@@ -1,0 +1,245 @@
+"""Expressions of time, the state and parameters as trees, and their values.
+
+Numbers, parameters and what sums, products, quotients and whole powers make of them stay exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import field
+from fractions import Fraction
+from typing import Any
+
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.records import dataclass
+
+# Past any value that means something, and still quick to take the sine of: 5000 decimal digits fit.
+_LARGEST_BITS = 20_000
+_LARGEST_EXPONENTIAL = 13_862  # its exp is just below 2**_LARGEST_BITS
+LARGEST_POWER = 64
+
+_ONE_ARGUMENT = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt erf sigmoid"
+FUNCTIONS = {**dict.fromkeys(_ONE_ARGUMENT.split(), 1), "atan2": 2}
+"""Every smooth function and the number of its arguments."""
+PIECEWISE = {"abs": 1, "sign": 1, "min": 2, "max": 2, "step": 1, "pulse": 3, "wrap": 1}
+"""Those with kinks and jumps; ``rigidsim.scene.expressions.piecewise`` writes them out."""
+RESERVED = frozenset({*FUNCTIONS, *PIECEWISE, "pi", "e"})
+"""Names that no parameter may have."""
+ONE = ExactNumber(Fraction(1))
+
+RATE_NAMES = ("wx", "wy", "wz")
+ATTITUDE_NAMES = ("qw", "qx", "qy", "qz", "phi", "theta", "psi")
+FLIGHT_NAMES = ("x", "y", "z", "vx", "vy", "vz")
+"""Names of the state in expressions, beside t."""
+
+
+class ExpressionError(ValueError):
+    """An expression that can't be read or has no value; the text shows the place.
+
+    Attributes:
+        column: of the place, counted from 1; None where the error has no place in the text.
+    """
+
+    def __init__(self, what: str, text: str = "", position: int | None = None) -> None:
+        self.column = None if position is None else position + 1
+        if position is not None:
+            first = max(0, position - 60)
+            shown = "".join(c if c.isprintable() else " " for c in text[first : position + 40])
+            what = f"column {self.column}: {what}\n  {shown}\n  {' ' * (position - first)}^"
+        super().__init__(what)
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number, exact; ``span`` is its place in the text, as for every node."""
+
+    value: ExactNumber
+    span: tuple[int, int] = field(compare=False)
+
+
+@dataclass(frozen=True)
+class Name:
+    """Time or a component of the state."""
+
+    name: str
+    span: tuple[int, int] = field(compare=False)
+
+
+@dataclass(frozen=True)
+class Operation:
+    """sum or product (of two or more operands), quotient, power, negative, or a function: a smooth one or
+    ``sign``.
+    """
+
+    operator: str
+    operands: tuple[Node, ...]
+    span: tuple[int, int] = field(compare=False)
+
+
+Node = Constant | Name | Operation
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An expression as written and as understood."""
+
+    text: str
+    root: Node
+
+    def error(self, what: str, node: Node) -> ExpressionError:
+        """An error about a part of the expression, which it names."""
+        part = self.text[slice(*node.span)]
+        part = part if len(part) <= 60 else part[:57] + "..."
+        return ExpressionError(f'{what} in "{part}"', self.text, node.span[0])
+
+
+def _exact(operator: str, numbers: list[ExactNumber]) -> ExactNumber | None:
+    """The exact result; None where it isn't a rational times a power of pi, or is too long."""
+    if any(number.swept for number in numbers):
+        from rigidsim.scene.tracing.exact import exactly
+
+        return exactly(operator, numbers)
+    a, b = numbers[0], numbers[-1]
+    x, y, pi_power = a.rational, b.rational, a.pi_power
+    whole = operator == "power" and y.denominator == 1 and not b.pi_power and (x != 0 or y >= 0)
+    if operator == "negative":
+        x = -x
+    elif operator == "sum" and (a.pi_power == b.pi_power or not x):
+        x, pi_power = x + y, b.pi_power
+    elif operator == "product":
+        x, pi_power = x * y, a.pi_power + b.pi_power
+    elif operator == "quotient" and y:
+        x, pi_power = x / y, a.pi_power - b.pi_power
+    elif whole and _bits(x) * abs(y) <= _LARGEST_BITS:
+        x, pi_power = x ** int(y), a.pi_power * int(y)
+    else:
+        return None
+    return ExactNumber(x, pi_power) if _bits(x) <= _LARGEST_BITS and abs(pi_power) <= 64 else None
+
+
+def _bits(x: Fraction) -> int:
+    return max(x.numerator.bit_length(), x.denominator.bit_length())
+
+
+def operation(operator: str, operands: tuple[Node, ...], span: tuple[int, int]) -> Node:
+    """The operation, or the number that it exactly is; chains are one sum, or one product after a number."""
+    numbers = [operand.value for operand in operands if isinstance(operand, Constant)]
+    exact = _exact(operator, numbers) if len(numbers) == len(operands) else None
+    if exact is not None:
+        return Constant(exact, span)
+    first, last = operands[0], operands[-1]
+    inverse = _exact("quotient", [ONE, last.value]) if isinstance(last, Constant) else None
+    if operator == "quotient" and inverse is not None:
+        return operation("product", (Constant(inverse, last.span), first), span)
+    if operator == "product" and isinstance(last, Constant):
+        first, last = last, first
+    if operator == "product" and isinstance(first, Constant):
+        head, *tail = _chain(operator, last)
+        front = _exact(operator, [first.value, head.value]) if isinstance(head, Constant) else None
+        operands = (first, head, *tail) if front is None else (Constant(front, span), *tail)
+    elif operator in ("sum", "product"):
+        operands = (*_chain(operator, first), last)
+    return Operation(operator, operands, span)
+
+
+def _chain(operator: str, node: Node) -> tuple[Node, ...]:
+    return node.operands if isinstance(node, Operation) and node.operator == operator else (node,)
+
+
+def fold(expression: Expression, combine: Callable[[Node, list[Any]], Any]) -> Any:
+    """``combine(node, its operands' results)`` at the root; operands go first, nothing recurses."""
+    results: list[Any] = []
+    waiting: list[tuple[Node, bool]] = [(expression.root, False)]
+    while waiting:
+        node, ready = waiting.pop()
+        operands = node.operands if isinstance(node, Operation) else ()
+        if operands and not ready:
+            waiting.append((node, True))
+            waiting += [(operand, False) for operand in reversed(operands)]
+        else:
+            first = len(results) - len(operands)
+            results[first:] = [combine(node, results[first:])]
+    return results[0]
+
+
+def names_used(expression: Expression) -> frozenset[str]:
+    """Names of time and the state that the expression reads; parameters are numbers by now."""
+    found: set[str] = set()
+    fold(expression, lambda node, _: found.add(node.name) if isinstance(node, Name) else None)
+    return frozenset(found)
+
+
+def constant_value(expression: Expression, context: Any) -> Any:
+    """The value of an expression without names, as mpf; None where a name occurs.
+
+    Raises:
+        ExpressionError: a constant part has no finite value.
+    """
+    return evaluate(expression, dict.fromkeys(names_used(expression)), context)
+
+
+def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) -> Any:
+    """The value where the names have these values (mpf), as an mpf of the context.
+
+    Raises:
+        ExpressionError: no finite value; the text names the part at fault.
+    """
+
+    def combine(node: Node, operands: list[Any]) -> Any:
+        if isinstance(node, Constant):
+            return node.value.at(context)
+        if isinstance(node, Name):
+            value = values[node.name]
+            return None if value is None else context.convert(value)
+        return None if None in operands else operate(expression, node, operands, context)
+
+    return fold(expression, combine)
+
+
+def operate(expression: Expression, node: Operation, operands: list[Any], context: Any) -> Any:
+    """One operation on mpf operands.
+
+    Raises:
+        ExpressionError: no finite value, or one beyond 2**20000.
+    """
+    operator, first, last = node.operator, operands[0], operands[-1]
+    refused, why = _REFUSED.get(operator, (None, ""))
+    if refused and refused(first, last):
+        raise expression.error(why, node)
+    if operator == "sigmoid":
+        small = context.exp(-abs(first))
+        value = (1 if first >= 0 else small) / (1 + small)
+    elif operator in _ARITHMETIC:
+        value = _ARITHMETIC[operator](operands)
+    else:
+        value = getattr(context, operator)(*operands)
+    if value and context.mag(value) > _LARGEST_BITS:
+        raise expression.error(_TOO_LARGE, node)
+    return value
+
+
+_ARITHMETIC: dict[str, Callable[[list[Any]], Any]] = {
+    "sum": lambda a: sum(a[1:], a[0]),
+    "product": math.prod,
+    "negative": lambda a: -a[0],
+    "quotient": lambda a: a[0] / a[1],
+    "power": lambda a: a[0] ** (int(a[1]) if a[1] == int(a[1]) else a[1]),
+}
+_TOO_LARGE = "a value beyond 1e6000"
+_REFUSED: dict[str, tuple[Callable[[Any, Any], bool], str]] = {
+    "quotient": (lambda x, y: y == 0, "division by zero"),
+    "power": (
+        lambda x, y: (x < 0 and y != int(y)) or (x == 0 and y < 0),
+        "a power that isn't real and finite (of zero or of a negative number)",
+    ),
+    "log": (lambda x, _: x <= 0, "log needs a number above zero"),
+    "sqrt": (lambda x, _: x < 0, "sqrt needs a number of at least zero"),
+    "asin": (lambda x, _: abs(x) > 1, "an inverse sine or cosine needs a number from -1 to 1"),
+    "acos": (lambda x, _: abs(x) > 1, "an inverse sine or cosine needs a number from -1 to 1"),
+    "atan2": (lambda y, x: x == y == 0, "atan2 needs two numbers that aren't both zero"),
+    "exp": (lambda x, _: x > _LARGEST_EXPONENTIAL, _TOO_LARGE),
+    "sinh": (lambda x, _: abs(x) > _LARGEST_EXPONENTIAL, _TOO_LARGE),
+    "cosh": (lambda x, _: abs(x) > _LARGEST_EXPONENTIAL, _TOO_LARGE),
+}
+"""Where an operation on its first and last operand has no real, finite value."""

@@ -1,0 +1,1 @@
+"""Orbits given by tables of elements, and what is interpolated between their rows."""

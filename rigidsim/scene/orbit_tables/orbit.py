@@ -1,0 +1,107 @@
+"""From the keys of a load to the orbit that its table gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.orbit_tables.elements import ElementTable, TableError, read_table
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbits import Orbit
+from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.tracing.exact import TracedExact
+from rigidsim.scene.tracing.numbers import Traced, Untraceable
+
+
+@lru_cache(8)
+def tabulated_orbit(
+    name: str,
+    text: str,
+    bits: int,
+    constants: tuple[tuple[str, ExactNumber], ...],
+    strength: tuple[Any, ...] | None,
+) -> TabulatedOrbit:
+    """An orbit by a table, made once however often a scene is built.
+
+    Args:
+        name, text: of the table.
+        bits: of the scene's precision.
+        constants: elements that the table doesn't have, by their names, and maybe the period.
+        strength: gravitational parameter of Kepler's third law, m^3/s^2, as the parts of an mpf; None where
+            none is known.
+
+    Raises:
+        TableError: says what is wrong with it.
+    """
+    table = read_table(text, bits)
+    context = table.context
+    given = dict(constants)
+    for key in given:
+        if key in table.columns:
+            raise TableError(f"has a column {key}, which is given beside it, too; remove one of them")
+    if "semi_major_axis" not in table.columns and "semi_major_axis" not in given:
+        raise TableError("has no column semi_major_axis; add one, or give semi_major_axis beside table")
+    period = given.pop("period", None)
+    if period is not None:
+        rate = 2 * context.pi / period.at(context)
+        motion: Callable[[Any], Any] = lambda axis: rate  # noqa: E731
+    elif strength is None:
+        raise TableError("needs a mean motion; give period beside table")
+    else:
+        mass = context.make_mpf(strength)
+        motion = lambda axis: context.sqrt(mass / axis**3)  # noqa: E731
+    columns = {key: value.at(context) for key, value in given.items()}
+    made_of = (name, text, bits, constants, strength)
+    orbit = TabulatedOrbit(made_of, name, _listed(table), columns, motion)
+    _ = orbit.error
+    return orbit
+
+
+def _listed(table: ElementTable) -> ElementTable:
+    return ElementTable(list(table.times), {k: list(v) for k, v in table.columns.items()}, table.context)
+
+
+_NO_CONSTANTS = ("table", "node_rate", "periapsis_rate")
+
+
+def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroundings) -> TabulatedOrbit:
+    """Work out the orbit of a table.
+
+    Args:
+        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None where none is known.
+
+    Raises:
+        ConfigError: no such table, a bad one, or one that doesn't cover the run.
+    """
+    name = fields.table
+    assert name is not None
+    given = [
+        (key, getattr(fields, key)) for key in sorted(fields.model_fields_set) if key not in _NO_CONSTANTS
+    ]
+    if isinstance(strength, Traced) or any(isinstance(value, TracedExact) for _, value in given):
+        raise Untraceable("an orbit by a table depends on it")
+    for rate in ("node_rate", "periapsis_rate"):
+        if getattr(fields, rate).sign != 0:
+            raise around.fault(f"orbit.{rate}", "given beside table, whose columns say what moves; remove it")
+    if fields.period is not None and fields.period.sign <= 0:
+        raise around.fault("orbit.period", f"given {float(fields.period):g} s; a positive time is allowed")
+    if name not in around.tables:
+        known = ", ".join(around.tables) or "none"
+        what = f'given "{name}", but this config was given as text, without files beside it; put the '
+        raise around.fault("orbit.table", what + f'CSV into [tables."{name}"] text (there now: {known})')
+    parts = None if strength is None else strength._mpf_
+    constants = tuple((key, value.alone) for key, value in given if value is not None)
+    try:
+        orbit = tabulated_orbit(name, around.tables[name], around.context.prec, constants, parts)
+    except TableError as error:
+        raise around.fault("orbit.table", f'given "{name}": {error}') from None
+    times = orbit.table.times
+    if around.span is not None and not (times[0] <= around.span[0] and around.span[1] <= times[-1]):
+        first, last, start, end = (around.context.nstr(t, 8) for t in (times[0], times[-1], *around.span))
+        what = (
+            f'given "{name}", which reaches from t = {first} s to {last} s, but the run goes from {start} s '
+        )
+        raise around.fault("orbit.table", what + f"to {end} s; give more rows, or change [time] start or end")
+    return orbit

@@ -1,0 +1,301 @@
+"""An orbit whose elements a table gives over time, in elements without singularities.
+
+With longitude of periapsis pi, node W and inclination i these are (Broucke & Cefalu 1972, Celestial Mechanics
+5, 303, with sin(i/2) in place of the tangent)
+
+    k = e cos pi, h = e sin pi,   q = sin(i/2) cos W, p = sin(i/2) sin W,   a,   mean longitude l = M + pi.
+
+They are smooth where e or i passes zero, and angles that turn need not be unwrapped, but for the mean
+longitude: its whole turns between two rows follow from Kepler's third law, or the table is refused. Between
+rows all are interpolated (``rigidsim.scene.orbit_tables.interpolation``). Without a column of the anomaly
+the mean longitude advances at the rate of Kepler's third law, or of ``period``.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rigidsim.scene.kepler import eccentric_anomaly
+from rigidsim.scene.orbit_tables.element_interpolation import (
+    AXIS,
+    EXCENTRIC,
+    LONGITUDE,
+    TILTED,
+    InterpolationError,
+    interpolation_error,
+)
+from rigidsim.scene.orbit_tables.elements import ElementTable, TableError
+from rigidsim.scene.orbit_tables.interpolation import Interpolation
+
+_DOUBTFUL_TURN = 0.25  # of a turn, by which the mean longitude may be off what Kepler's law expects
+_LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
+
+
+class TabulatedOrbit:
+    """Elements over time; numbers are mpf of the scene's precision, SI.
+
+    Attributes:
+        key: what it is made of; orbits with the same key are the same.
+        name: of the table.
+        table: its numbers.
+        motion: from a semi-major axis (m) to the mean motion (rad/s).
+    """
+
+    def __init__(
+        self,
+        key: Any,
+        name: str,
+        table: ElementTable,
+        constants: Mapping[str, Any],
+        motion: Callable[[Any], Any],
+    ) -> None:
+        self.key, self.name, self.table, self.motion = key, name, table, motion
+        self.context = table.context
+        self._constants = constants
+        self._rows = self._regular()
+        moving = [name for name, values in self._rows.items() if isinstance(values, list)]
+        self.moving: tuple[str, ...] = tuple(moving)
+        """The elements that change: among axis, k, h, q, p, longitude."""
+        columns = np.array([self._rows[name] for name in moving], dtype=object).T
+        self._interpolation = Interpolation(list(table.times), columns)
+        self._pieces: dict[int, dict[str, list[Any]]] = {}
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TabulatedOrbit) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    # --- rows -----------------------------------------------------------------------------------------------
+
+    def _column(self, name: str) -> Any:
+        """Values of a column, one constant, or None."""
+        return self.table.columns.get(name, self._constants.get(name))
+
+    def _regular(self) -> dict[str, Any]:
+        """The elements of the module: for each a list over the rows, or one constant."""
+        context, count = self.context, len(self.table.times)
+        zero = context.zero
+
+        def pairs(size: Any, angle: Any) -> tuple[Any, Any]:
+            if not isinstance(size, list) and size == 0:
+                return zero, zero
+            if not (isinstance(size, list) or isinstance(angle, list)):
+                return size * context.cos(angle), size * context.sin(angle)
+            sizes, angles = (x if isinstance(x, list) else [x] * count for x in (size, angle))
+            both = list(zip(sizes, angles, strict=True))
+            return [s * context.cos(w) for s, w in both], [s * context.sin(w) for s, w in both]
+
+        axis, e, tilt, node = (
+            self._column(name)
+            for name in ("semi_major_axis", "eccentricity", "inclination", "ascending_node")
+        )
+        e, tilt, node = (zero if x is None else x for x in (e, tilt, node))
+        periapsis = self._column("longitude_of_periapsis")
+        if periapsis is None:
+            argument = self._column("periapsis")
+            periapsis = _sum(zero if argument is None else argument, node)
+        self._longitude_of_periapsis = periapsis
+        half = [context.sin(x / 2) for x in tilt] if isinstance(tilt, list) else context.sin(tilt / 2)
+        self._check("semi_major_axis", axis, lambda x: x > 0, "a positive length")
+        self._check("eccentricity", e, lambda x: 0 <= x < 1, "0 (a circle) to below 1")
+        self._check("inclination", half, lambda x: 0 <= x < _LARGEST_TILT, "0 to 178 deg")
+        k, h = pairs(e, periapsis)
+        q, p = pairs(half, node)
+        found = {AXIS: axis, "k": k, "h": h, "q": q, "p": p}
+        longitude = self._column("mean_longitude")
+        if "mean_anomaly" in self.table.columns:
+            longitude = _sum(self.table.columns["mean_anomaly"], periapsis)
+        if isinstance(longitude, list):
+            found[LONGITUDE] = self._unwrapped(longitude, axis)
+        return found
+
+    def _check(self, name: str, values: Any, allowed: Callable[[Any], bool], words: str) -> None:
+        for row, value in enumerate(values if isinstance(values, list) else [values]):
+            if not allowed(value):
+                at = f"row {row + 1}: " if isinstance(values, list) else ""
+                raise TableError(f"{at}{name} is out of range; {words} is allowed")
+
+    def _unwrapped(self, longitude: list[Any], axis: Any) -> list[Any]:
+        """With the whole turns that Kepler's law gives between the rows."""
+        context, times = self.context, self.table.times
+        axes = axis if isinstance(axis, list) else [axis] * len(times)
+        rates, turn = [self.motion(a) for a in axes], 2 * context.pi
+        found = [longitude[0]]
+        for i in range(1, len(times)):
+            expected = (rates[i - 1] + rates[i]) / 2 * (times[i] - times[i - 1])
+            off = (longitude[i] - found[-1] - expected) / turn
+            part = off - context.nint(off)
+            if abs(part) > _DOUBTFUL_TURN:
+                raise TableError(
+                    f"rows {i} and {i + 1}: the mean longitude is {float(abs(part)):.2f} turns off the "
+                    f"{float(expected / turn):.6g} turns of Kepler's third law between them, so that whole "
+                    "turns can't be told; give rows closer together, a column semi_major_axis, or period; or "
+                    "leave the anomaly's column out for a mean longitude by Kepler's law"
+                )
+            found.append(found[-1] + expected + part * turn)
+        return found
+
+    # --- pieces ---------------------------------------------------------------------------------------------
+
+    def piece(self, number: int) -> dict[str, list[Any]]:
+        """Of each moving element the coefficients of the powers 0 to 5 of (t - t_i) / (t_{i+1} - t_i)."""
+        if number not in self._pieces:
+            coefficients = self._interpolation.piece(number)
+            self._pieces[number] = {name: list(coefficients[:, i]) for i, name in enumerate(self.moving)}
+        return self._pieces[number]
+
+    def row(self, number: int) -> dict[str, Any]:
+        """All elements of a row of the table."""
+        return {name: x[number] if isinstance(x, list) else x for name, x in self._rows.items()}
+
+    def number_at(self, time: Any) -> int:
+        """Of the piece that a time lies in; the first or last beyond the table's ends."""
+        return min(max(bisect_right(self.table.times, time) - 1, 0), len(self.table.times) - 2)
+
+    def at(self, time: Any) -> dict[str, Any]:
+        """All elements at a time (s): moving ones as interpolated, and the constant ones."""
+        number, times = self.number_at(time), self.table.times
+        x = (time - times[number]) / (times[number + 1] - times[number])
+        found = {name: values for name, values in self._rows.items() if name not in self.moving}
+        for name, c in self.piece(number).items():
+            found[name] = ((((c[5] * x + c[4]) * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0]
+        return found
+
+    def eccentric_longitude(self, elements: Mapping[str, Any], longitude: Any) -> Any:
+        """K of l = K - k sin K + h cos K (Kepler's equation)."""
+        context, k, h = self.context, elements["k"], elements["h"]
+        e = context.sqrt(k * k + h * h)
+        if e == 0:
+            return longitude
+        periapsis = context.atan2(h, k)
+        return eccentric_anomaly(context, longitude - periapsis, e) + periapsis
+
+    def starting_longitude(self, time: Any) -> Any:
+        """The mean longitude at a time; where no column gives it, from the anomaly at time zero of the scene
+        by the mean motion of that time's axis.
+        """
+        elements = self.at(time)
+        if LONGITUDE in elements:
+            return elements[LONGITUDE]
+        given = self._constants.get("mean_longitude")
+        if given is None:
+            periapsis = self._longitude_of_periapsis
+            if isinstance(periapsis, list):
+                periapsis = self.context.atan2(elements["h"], elements["k"])
+            given = self._constants.get("mean_anomaly", self.context.zero) + periapsis
+        return given + self.motion(elements[AXIS]) * time
+
+    @property
+    def described(self) -> str:
+        """For ``plan``: the table, and how well interpolation does between its rows."""
+        times, error = self.table.times, self.error
+        nstr = self.context.nstr
+        return (
+            f'by the table "{self.name}" ({len(times)} rows, t = {nstr(times[0], 8)} to '
+            f"{nstr(times[-1], 8)} s; with every other row left out interpolation misses the source's "
+            f"direction by at most {error.direction:.1e} rad and its distance by {error.distance:.1e} of it, "
+            f"with all rows by about {error.expected:.3f} of that where they follow smooth functions)"
+        )
+
+    # --- sizes ----------------------------------------------------------------------------------------------
+
+    def _each(self, name: str) -> list[Any]:
+        values = self._rows[name]
+        return values if isinstance(values, list) else [values]
+
+    @cached_property
+    def semi_major_axis(self) -> Any:
+        """The constant, or the mean over the rows, m."""
+        axes = self._each(AXIS)
+        return sum(axes, self.context.zero) / len(axes)
+
+    @cached_property
+    def largest_eccentricity(self) -> Any:
+        """Over the rows."""
+        count = max(len(self._each("k")), len(self._each("h")))
+        k, h = (x if len(x) == count else x * count for x in (self._each("k"), self._each("h")))
+        return max(self.context.sqrt(a * a + b * b) for a, b in zip(k, h, strict=True))
+
+    @property
+    def smallest_axis(self) -> Any:
+        """Over the rows, m."""
+        return min(self._each(AXIS))
+
+    @property
+    def pericentre(self) -> Any:
+        """Least distance, m."""
+        return self.smallest_axis * (1 - self.largest_eccentricity)
+
+    def normal(self, time: Any) -> list[Any]:
+        """Unit vector at a time (s) about which the body goes in the direct sense, space axes."""
+        q, p = (self.at(time)[name] for name in TILTED)
+        chi = self.context.sqrt(1 - p * p - q * q)
+        return [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
+
+    @property
+    def mean_motion(self) -> Any:
+        """Of the mean axis, rad/s."""
+        return self.motion(self.semi_major_axis)
+
+    def fastest_rate(self) -> Any:
+        """Angular rate of the direction at the least pericentre, rad/s."""
+        e = self.largest_eccentricity
+        return self.motion(self.smallest_axis) * self.context.sqrt(1 - e * e) / (1 - e) ** 2
+
+    @cached_property
+    def normal_drift(self) -> Any:
+        """Bound of the rate at which the plane turns, rad/s: twice what neighbouring rows show."""
+        return 4 * self._fastest(TILTED)
+
+    @cached_property
+    def shape_drift(self) -> Any:
+        """Bound of the rate at which the periapsis turns where the orbit is most eccentric, rad/s: twice what
+        neighbouring rows show.
+        """
+        e = self.largest_eccentricity
+        return 2 * self._fastest(EXCENTRIC) / e if e > 0 else self.context.zero
+
+    def _fastest(self, pair: tuple[str, str]) -> Any:
+        """Largest rate of a pair of elements between neighbouring rows, 1/s."""
+        times, largest = self.table.times, self.context.zero
+        if pair[0] not in self.moving:
+            return largest
+        one, other = (self._rows[name] for name in pair)
+        for i in range(len(times) - 1):
+            change = self.context.hypot(one[i + 1] - one[i], other[i + 1] - other[i])
+            largest = max(largest, change / (times[i + 1] - times[i]))
+        return largest
+
+    @property
+    def longitude_exponent(self) -> int:
+        """Binary, of a unit of which the mean longitude passes less than one over the whole table, rad."""
+        span = self.table.times[-1] - self.table.times[0]
+        return int(self.context.mag(self.motion(self.smallest_axis) * span)) + 1
+
+    @cached_property
+    def error(self) -> InterpolationError:
+        """Of interpolation, see ``InterpolationError``.
+
+        Raises:
+            TableError: rows so far apart that the table means little between them.
+        """
+        count = len(self.table.times)
+        elements = {name: self._each(name) for name in (AXIS, *EXCENTRIC, *TILTED)}
+        elements = {name: rows if len(rows) == count else rows * count for name, rows in elements.items()}
+        if LONGITUDE in self.moving:
+            elements[LONGITUDE] = self._rows[LONGITUDE]
+        return interpolation_error(self.table.times, elements, self.moving)
+
+
+def _sum(one: Any, other: Any) -> Any:
+    if isinstance(one, list) and isinstance(other, list):
+        return [x + y for x, y in zip(one, other, strict=True)]
+    if isinstance(other, list):
+        one, other = other, one
+    return [x + other for x in one] if isinstance(one, list) else one + other

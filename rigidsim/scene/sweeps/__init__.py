@@ -1,0 +1,1 @@
+"""What ``[sweep]`` makes of one config: its members, each with exact values."""

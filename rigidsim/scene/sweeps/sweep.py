@@ -1,0 +1,318 @@
+"""A sweep: the members of ``[sweep]``, each a single experiment that is known by its exact values."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from dataclasses import replace as exchanged
+from functools import cached_property, lru_cache
+
+from rigidsim.errors import ConfigError, MemberError, Problem
+from rigidsim.scene.config import Experiment, parse, validated
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.overrides import apply_overrides, key_steps
+from rigidsim.scene.python_values import toml_text
+from rigidsim.scene.sweep_table import SweepTable
+from rigidsim.scene.sweeps.keys import unit_and_length
+from rigidsim.scene.sweeps.values import AxisValues, axis_values
+from rigidsim.scene.toml_text import parse_toml
+from rigidsim.scene.validation_messages import shown
+
+MOST_MEMBERS = 100_000_000
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")
+_SAME_FOR_ALL = {
+    "name": "the sweep has one name",
+    "description": "the sweep has one description",
+    "sweep": "a sweep can't change itself",
+    "output": "all members record the same",
+}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept key.
+
+    Attributes:
+        key: dotted, with indices from 0.
+        name: of its dimension (product) or variable (zip).
+        unit: SI unit of its numbers; "1" for none.
+    """
+
+    key: str
+    name: str
+    unit: str
+    values: AxisValues
+
+    @property
+    def numeric(self) -> bool:
+        """Whether its values are numbers, or vectors of them."""
+        return self.values.entry is not None
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """The keys of its numbers, one by one: ``initial.angular_velocity[0]`` ...; none without numbers."""
+        if not self.numeric:
+            return ()
+        components = self.values.components
+        return tuple(f"{self.key}[{i}]" for i in range(components)) if components else (self.key,)
+
+    def exact(self, index: int) -> tuple[ExactNumber, ...]:
+        """The numbers of one value, SI, in the order of ``columns``."""
+        assert self.values.entry is not None
+        return tuple(number.exact for number in self.values.entry(index))
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """All members of an experiment with a ``[sweep]``.
+
+    Attributes:
+        experiment: the config as it was given, with its ``[sweep]``.
+        base: the single experiment that the members are variations of.
+        axes: in the order in which the config has them; the last runs fastest in a product.
+    """
+
+    experiment: Experiment
+    base: Experiment
+    axes: tuple[Axis, ...]
+
+    @classmethod
+    def of(cls, experiment: Experiment) -> Sweep:
+        """The sweep of a config.
+
+        Raises:
+            ConfigError: it has none, or one that names no members; every problem found. Whether members can
+                be run is for ``experiment(member)`` to tell.
+        """
+        table = experiment.config.sweep
+        if table is None:
+            what = "missing; a sweep has one, or is asked for with --sweep KEY=SPEC"
+            raise ConfigError(Problem("[sweep]", what), experiment.source)
+        problems: list[Problem] = []
+        axes = []
+        for key, given in table.axes.items():
+            where = f'[sweep] axes."{key[:60]}"'
+            try:
+                plain = _plain_key(key)
+                unit, length = unit_and_length(plain, parse_toml(experiment.text, experiment.source))
+                values = axis_values(given, plain, table.seed, length)
+                name = _default_name(plain) if given.name is None else given.name
+                if not _NAME.fullmatch(name):
+                    raise ValueError(
+                        f"given the name {shown(name)}; allowed: letters, digits and underscores, beginning "
+                        "with a letter"
+                    )
+                axes.append(Axis(plain, name, unit, values))
+                if axes[-1].numeric:  # its unit, where it has one, is known
+                    axes[-1].exact(0)
+            except ValueError as error:
+                problems.append(Problem(where, str(error)))
+            except ConfigError as error:
+                problems += [Problem(where, problem.what) for problem in error.problems]
+        problems += _clashes(axes)
+        if not problems:
+            problems += _counts(table, axes)
+        if problems:
+            raise ConfigError(problems, experiment.source)
+        return cls(experiment, _without_sweep(experiment), tuple(axes))
+
+    @property
+    def table(self) -> SweepTable:
+        """``[sweep]`` as it stands in the config."""
+        assert self.experiment.config.sweep is not None
+        return self.experiment.config.sweep
+
+    @property
+    def product(self) -> bool:
+        """Whether its members are all combinations."""
+        return self.table.mode == "product"
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Members along each dimension: one for each axis of a product, a single one otherwise."""
+        sizes = tuple(axis.values.count for axis in self.axes)
+        return sizes if self.product else sizes[:1]
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions."""
+        return tuple(axis.name for axis in self.axes) if self.product else ("member",)
+
+    @property
+    def count(self) -> int:
+        """Of members."""
+        return math.prod(self.shape)
+
+    def indices(self, member: int) -> tuple[int, ...]:
+        """Which value of each axis a member has; the last axis runs fastest."""
+        if not self.product:
+            return (member,) * len(self.axes)
+        found = []
+        for size in reversed(self.shape):
+            member, index = divmod(member, size)
+            found.append(index)
+        return tuple(reversed(found))
+
+    def texts(self, member: int) -> tuple[str, ...]:
+        """The values that a member is known by, as a config says them, in the order of the axes."""
+        return tuple(axis.values.text(i) for axis, i in zip(self.axes, self.indices(member), strict=True))
+
+    def overrides(self, member: int) -> list[str]:
+        """``KEY=VALUE`` texts that make the base experiment the member."""
+        return [f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(member), strict=True)]
+
+    def experiment_of(self, member: int) -> Experiment:
+        """The member as a single experiment.
+
+        Raises:
+            ConfigError: a value that its key doesn't take; says which member it is.
+        """
+        try:
+            return self.base.having(self.overrides(member))
+        except ConfigError as error:
+            raise self.blamed(member, error) from None
+
+    def worked_out(self, member: int) -> Experiment:
+        """As ``experiment_of`` in a tenth of the time, without the member's own text: to try it out.
+
+        Raises:
+            ConfigError: as there.
+        """
+        try:
+            table = parse_toml(self.base.text, self.base.source)
+            apply_overrides(table, self.overrides(member))
+            return exchanged(self.base, config=validated(table, self.base.source))
+        except ConfigError as error:
+            raise self.blamed(member, error) from None
+
+    def blamed(self, member: int, error: ConfigError) -> MemberError:
+        """The error naming the member beside the key; one that does is left as it is."""
+        if isinstance(error, MemberError):
+            return error
+        named = ", ".join(
+            f"{axis.name} = {shown_text(text)}"
+            for axis, text in zip(self.axes, self.texts(member), strict=True)
+        )
+        problems = [
+            Problem(f"[sweep] member {member} ({named})", f"{problem.where}: {problem.what}")
+            for problem in error.problems
+        ]
+        return MemberError(problems, self.experiment.source)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The dotted keys of all swept numbers, axis by axis; vectors by their components."""
+        return tuple(key for axis in self.axes for key in axis.columns)
+
+    @property
+    def numeric(self) -> bool:
+        """Whether members differ in numbers alone."""
+        return all(axis.numeric for axis in self.axes)
+
+    def exact(self, members: Sequence[int]) -> list[list[ExactNumber]]:
+        """The swept numbers of some members, SI, a list for each of ``columns``.
+
+        Raises:
+            ValueError: the sweep isn't ``numeric``.
+        """
+        if not self.numeric:
+            raise ValueError("members of this sweep differ in more than numbers")
+        rows = [self.indices(member) for member in members]
+        found: list[list[ExactNumber]] = []
+        for number, axis in enumerate(self.axes):
+            kept = lru_cache(maxsize=None)(axis.exact)
+            values = [kept(row[number]) for row in rows]
+            found += [[value[i] for value in values] for i in range(len(axis.columns))]
+        return found
+
+    def members(self) -> Iterator[Experiment]:
+        """All members, one after the other."""
+        return (self.experiment_of(member) for member in range(self.count))
+
+
+def shown_text(text: str) -> str:
+    """A value's text, shortened for messages."""
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _plain_key(key: str) -> str:
+    """A key without blanks.
+
+    Raises:
+        ConfigError, ValueError: it is no key of a member.
+    """
+    steps = key_steps(key, "axes")
+    first = str(steps[0])
+    if first in _SAME_FOR_ALL:
+        raise ValueError(f"can't be swept: {_SAME_FOR_ALL[first]}")
+    return ".".join(part.strip() for part in key.split("."))
+
+
+def _default_name(key: str) -> str:
+    return re.sub(r"\[(\d+)\]", r"_\1", key.rpartition(".")[2]).strip("\"'")
+
+
+def _clashes(axes: Sequence[Axis]) -> list[Problem]:
+    """Names given twice, and keys of which one holds the other."""
+    problems: list[Problem] = []
+    names: dict[str, str] = {}
+    keys: dict[str, tuple[str | int, ...]] = {}
+    for axis in axes:
+        where = f'[sweep] axes."{axis.key}"'
+        if axis.name in names:
+            what = f'is named "{axis.name}" like axes."{names[axis.name]}"; give one of them another name'
+            problems.append(Problem(where, what))
+        names[axis.name] = axis.key
+        steps = tuple(key_steps(axis.key, "axes"))
+        for other, others in keys.items():
+            shorter = min(len(steps), len(others))
+            if steps[:shorter] == others[:shorter]:
+                what = f'sets what axes."{other}" sets, too; sweep one of them'
+                problems.append(Problem(where, what))
+        keys[axis.key] = steps
+    return problems
+
+
+def _counts(table: SweepTable, axes: Sequence[Axis]) -> list[Problem]:
+    """Axes that don't fit each other, or make too many members."""
+    sizes = [axis.values.count for axis in axes]
+    if table.mode == "zip":
+        if len(set(sizes)) > 1:
+            given = ", ".join(f'"{axis.key}" {axis.values.count}' for axis in axes)
+            what = f'given "zip", which needs axes of one length: {given}; or choose mode = "product"'
+            return [Problem("[sweep] mode", what)]
+        return [] if "member" not in {axis.name for axis in axes} else [_taken("member")]
+    count = math.prod(sizes)
+    if count > MOST_MEMBERS:
+        given = " x ".join(f"{size:,}" for size in sizes)
+        about = f"{count:.3g}".replace("e+", "e")
+        what = f"ask for {given} = {about} members; at most 1e8 are allowed: take fewer values"
+        return [Problem("[sweep] axes", what)]
+    return []
+
+
+def _taken(name: str) -> Problem:
+    return Problem("[sweep] axes", f'the name "{name}" is taken; give that axis another')
+
+
+def _without_sweep(experiment: Experiment) -> Experiment:
+    """The config without its ``[sweep]``, and everything else as it was written."""
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
+    tables = parse_toml(experiment.text, experiment.source)
+    del tables["sweep"]
+    text = ""
+    try:
+        document = tomlkit.parse(experiment.text)
+        document.remove("sweep")
+        text = document.as_string()
+        same = parse_toml(text, experiment.source) == tables
+    except (TOMLKitError, ConfigError, KeyError, ValueError):
+        same = False
+    base = parse(text if same else toml_text(tables), source=experiment.source)
+    if base.config.integrator.hold_invariants == "auto":  # which members of a sweep haven't
+        base = base.having(["integrator.hold_invariants=false"])
+    return exchanged(base, given=experiment.given, settings=experiment.settings)

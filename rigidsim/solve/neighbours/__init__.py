@@ -1,0 +1,1 @@
+"""Neighbours of a motion, carried along to learn how its errors grow."""

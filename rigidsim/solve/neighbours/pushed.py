@@ -1,0 +1,333 @@
+"""How a run's rounding errors end, simulated: neighbours of the motion that are pushed at random all along.
+
+A neighbour follows the motion at a small distance and gets, again and again, a push as a step's rounding
+gives one, but many times as large. Its distance over that factor is an error as the run's own is: made
+anywhere, in any state, and carried by the motion from there to the end, whatever it passes on the way. No law
+of growth is assumed.
+
+Distances stay small (or are drawn in), so that they grow as infinitely small ones do. The neighbours are
+lanes of one batch, beside the motion itself in the first; a loose tolerance is good enough, since what is cut
+off from the series is a smooth function of the state and nearly the same in all lanes.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable
+from dataclasses import field
+
+import numpy as np
+
+from rigidsim.model.state_names import TANGENT
+from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
+from rigidsim.solve.neighbours.chords import attitude_chords
+from rigidsim.solve.neighbours.lanes import NEIGHBOURS, Lanes, SeriesErrors
+
+_HOPELESS_STEPS = 32_768
+"""More than were expected: the motion comes to no end, say towards a collision."""
+_LARGEST = 2.0**-24
+"""Distance from which neighbours are drawn in. A chord that is drawn in leaves the surfaces on which the
+motion's invariants are constant by half its square, which must stay below what the pushes did."""
+_DRAWN_IN = 2.0**-2
+_SATURATED = 2.0**-14
+"""Distance that isn't small: the stretch is gone through once more, in two or from nearer."""
+_FIRST_PUSHES = 2.0**-40
+"""Distance that stands for one epsilon, at first."""
+_STEPS_AT_ONCE = 192.0
+_FEWEST_STRETCHES, _MOST_STRETCHES, _FEWEST_OF_WINDOW = 32, 512, 12
+"""Between pushes where growth is slow: so many steps, or so many stretches of the whole. They are counted
+in steps, among which those of a close passage are many, not in time, of which they take little."""
+_FEWEST_STEPS, _FEWEST_OF_ALL = 6.0, 12
+"""In a stretch, whose last one is cut short, of the shortest motions; but so many stretches at any rate."""
+_MOST_STEPS_AT_ONCE = 4096
+_LONGER = 1.5
+"""A stretch may last, over the mean, when the motion takes few steps in it."""
+_CALM, _WILD = 4.0, 16.0
+"""Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
+_MOST_CLOSER = 40
+_APART = ("pace", "work", "stride")
+"""States that nothing feels."""
+_GROUPS: dict[str, tuple[str, ...]] = {
+    "rates": ("wx", "wy", "wz"),
+    "position": ("x", "y", "z"),
+    "velocity": ("vx", "vy", "vz"),
+}
+
+
+@dataclass
+class Spread:
+    """How far errors of one epsilon at each step have come, at times along the motion.
+
+    Attributes:
+        times: internal units, ascending.
+        steps: that the motion took until then, of the loose tolerance.
+        rates, attitude, position, velocity: root mean square over the neighbours, in epsilons of internal
+            units; attitude as an angle, rates relative to their size; zeros where the motion has none.
+        extent, fastest: largest distance from the origin and speed so far, internal units.
+        whole: False where the motion could not be followed to the end asked for.
+    """
+
+    times: list[float] = field(default_factory=list)
+    steps: list[int] = field(default_factory=list)
+    rates: list[float] = field(default_factory=list)
+    attitude: list[float] = field(default_factory=list)
+    position: list[float] = field(default_factory=list)
+    velocity: list[float] = field(default_factory=list)
+    extent: float = 0.0
+    fastest: float = 0.0
+    whole: bool = True
+
+
+@dataclass(frozen=True)
+class Pushes:
+    """What a step does to each state, in epsilons.
+
+    Attributes:
+        own: of the state's own size, at random.
+        shared: of the largest state's, at random.
+        series: what the series is cut off by, over what it is in these states.
+        first: of the state's own size, at the start.
+        clock: of the time, for loads that depend on it.
+    """
+
+    own: float = 0.4
+    shared: float = 0.0
+    series: float = 1.0
+    first: float = 0.5
+    clock: float = 0.3
+
+
+def _length(vector: np.ndarray) -> float:
+    return math.sqrt(float(vector @ vector))
+
+
+class Neighbours:
+    """A motion with neighbours.
+
+    Args:
+        system: built for double precision, without a partner chart.
+        lanes: of it.
+        start, end: of what is to be followed, internal units.
+        steps: that the motion is expected to take there; decides how far apart pushes are.
+        epsilon: what pushes are counted in.
+        rounded: (states,) bool, which of the initial values were.
+        series: of a tolerance far above epsilon.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        lanes: Lanes,
+        start: float,
+        end: float,
+        steps: float,
+        pushes: Pushes,
+        epsilon: float,
+        rounded: np.ndarray,
+        series: SeriesErrors | None = None,
+    ) -> None:
+        self._system, self._lanes, self._pushes = system, lanes, pushes
+        self._epsilon, self._series = epsilon, series
+        names, attitude = system.states, system.mechanics.attitude
+        groups: dict[str, tuple[str, ...]] = dict(_GROUPS)
+        self._chords = attitude_chords(system)
+        if attitude is not None:
+            groups["attitude"] = tuple(attitude.names)
+        self._places = {
+            group: [names.index(n) for n in members if n in names] for group, members in groups.items()
+        }
+        grouped = {i for places in self._places.values() for i in places}
+        apart = {n for n in names if n in _APART or n.startswith(TANGENT)}
+        alone = [[i] for i, n in enumerate(names) if i not in grouped and n not in apart]
+        groups_of_places = [*filter(None, self._places.values()), *alone]
+        self._members = np.zeros((len(groups_of_places), len(names)))
+        for row, places in enumerate(groups_of_places):
+            self._members[row, places] = 1.0
+        self._felt = np.array([n not in apart for n in names])
+        exponents = system.state_exponents
+        self._units = np.ldexp(1.0, np.array([exponents[i] for i in self._places["rates"][:3]], np.int32))
+        self._angles = list(system.angle_states)
+        self._turn = math.ldexp(2 * math.pi, -system.angle_unit)
+        initial = np.array([float(x) for x in system.initial])
+        self._begin(initial, start, end, steps, _FEWEST_STRETCHES)
+        self._push(pushes.first, np.abs(initial), rounded)
+
+    def _begin(self, initial: np.ndarray, start: float, end: float, steps: float, fewest: int) -> None:
+        self._states = np.repeat(initial[:, None], NEIGHBOURS + 1, axis=1)
+        self._random = np.random.default_rng(0)  # the same pushes each time
+        self._factor = _FIRST_PUSHES  # distance for one epsilon
+        self._largest = np.abs(initial)
+        self._weigh()
+        self._time, self.steps = start, 0
+        self._pace(end, steps, fewest)
+        self._stretch = self._longest
+        self._apart: np.ndarray = np.zeros(NEIGHBOURS)
+        self.spread = Spread()
+
+    def _pace(self, end: float, steps: float, fewest: float) -> None:
+        """Set how far apart pushes are, to a time that takes so many steps."""
+        fewest = max(_FEWEST_OF_ALL, min(fewest, steps / _FEWEST_STEPS))
+        stretches = min(max(fewest, steps / _STEPS_AT_ONCE), _MOST_STRETCHES)
+        stretches = max(stretches, steps / _MOST_STEPS_AT_ONCE)
+        self._longest = _LONGER * (end - self._time) / stretches
+        self._steps_at_once = round(max(steps / stretches, _FEWEST_STEPS))
+        self._most_steps = self.steps + 4 * steps + _HOPELESS_STEPS
+
+    def elsewhere(self, state: np.ndarray, start: float, end: float, steps: float) -> Neighbours:
+        """Of a part of the motion that begins in another state (states,), in the same lanes.
+
+        Args:
+            steps: that the part is expected to take.
+        """
+        other = copy.copy(self)
+        other._begin(state, start, end, steps, _FEWEST_OF_WINDOW)
+        other._push(self._pushes.first, np.abs(state), state != 0)
+        return other
+
+    @property
+    def lanes(self) -> Lanes:
+        """Those that carry them now."""
+        return self._lanes
+
+    @property
+    def tolerance(self) -> float:
+        """Of their steps."""
+        return self._lanes.tolerance
+
+    def prepare_for(self, steps: float, end: float) -> None:
+        """So many more steps than were expected follow, to another end."""
+        self._lanes = self._lanes.again(steps)
+        self._pace(end, steps, _FEWEST_STRETCHES)
+
+    def follow(self, until: float, go_on: Callable[[], bool], lost: float = math.inf) -> Spread:
+        """Go on to a time, unless all is lost before.
+
+        Args:
+            until: internal units.
+            go_on: asked between stretches; False ends it.
+            lost: spread of the attitude (or the rates) past which nothing more is to be learnt.
+        """
+        spread = self.spread
+        while spread.whole and self._time < until and go_on() and not self.all_lost(lost):
+            spread.whole = self._go(until)
+        return spread
+
+    def all_lost(self, lost: float) -> bool:
+        """Whether neither the attitude (or the rates) nor the place can be told any more."""
+        spread = self.spread
+        if not spread.times:
+            return False
+        if (spread.rates if self._chords is None else spread.attitude)[-1] < lost:
+            return False
+        return not self._places["position"] or spread.position[-1] * self._epsilon > spread.extent
+
+    def _go(self, until: float) -> bool:
+        """One stretch, as long as growth allows; False where the motion can't be followed."""
+        before, distances = self._states.copy(), self._apart
+        for _ in range(_MOST_CLOSER):
+            time = min(self._time + self._stretch, until)
+            if until - time < 0.01 * self._stretch:
+                time = until
+            found = self._advance(before, time, self._steps_at_once)
+            if found is None:
+                return False
+            taken, time = found
+            grown = self._distances(self._states)
+            if grown.max() < _SATURATED:
+                break
+            if taken > 4:
+                self._stretch = (time - self._time) / 2
+            else:
+                before = self._drawn_in(before, 2.0**-8)
+                distances = self._distances(before)
+        else:
+            return False
+        growth = float((grown / np.maximum(distances, 1e-300)).max())
+        if growth > _WILD:
+            self._stretch = max(self._stretch / 2, (time - self._time) / max(taken, 1))
+        elif growth < _CALM:
+            self._stretch = min(2 * self._stretch, self._longest)
+        self.steps += taken
+        self._time = time
+        largest = np.maximum(np.abs(before[:, 0]), np.abs(self._states[:, 0]))
+        self._largest = np.maximum(self._largest, largest)
+        self._weigh()
+        moved = before[:, 0] != self._states[:, 0]  # what stands still isn't rounded
+        if angles := self._angles:  # which grow, and step control with them
+            self._states[angles] -= self._turn * np.rint(self._states[angles, :1] / self._turn)
+        self._push(self._pushes.own * math.sqrt(taken), largest, moved, taken)
+        far = float(self._apart.max())
+        if far > _LARGEST:
+            self._states = self._drawn_in(self._states, _DRAWN_IN * _LARGEST / far)
+            self._apart = _DRAWN_IN * _LARGEST / far * self._apart
+        self._note()
+        return True
+
+    def _advance(self, states: np.ndarray, time: float, most: int) -> tuple[int, float] | None:
+        """Steps taken by the motion, at most so many, and the time that it got to; None where a state isn't
+        finite.
+        """
+        # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
+        # neighbours' lasts for the stretch
+        steps = min(most, self._steps_at_once * _LONGER * (time - self._time) / self._longest)
+        wrong = self._pushes.clock * abs(self._time) * self._factor / math.sqrt(max(steps, 1.0))
+        shifts = np.concatenate([[0.0], wrong * self._random.standard_normal(NEIGHBOURS)])
+        found = self._lanes.advance(states, self._time + shifts, time + shifts, most)
+        if found is None or not np.isfinite(found[0]).all() or self.steps > self._most_steps:
+            return None
+        self._states, taken, reached = found
+        return max(taken, 1), reached
+
+    def _push(self, own: float, sizes: np.ndarray, moved: np.ndarray, taken: int = 0) -> None:
+        """Add errors to the neighbours: ``own`` of each size, and of the series over some steps."""
+        normal = self._random.standard_normal((len(sizes), NEIGHBOURS))
+        pushed = own * sizes[:, None] * normal
+        pushed[~moved] = 0.0
+        if taken and self._pushes.shared:
+            alike = self._random.standard_normal((len(sizes), NEIGHBOURS)) * (self._largest > 0)[:, None]
+            pushed += own / self._pushes.own * self._pushes.shared * float(sizes[self._felt].max()) * alike
+        if taken and self._series is not None:
+            wrong = self._pushes.series * self._series.of_step(self._states[:, 0], self._time) / self._epsilon
+            # one step stands for all of the stretch: they add up, or walk where their errors change sign
+            times = taken + math.sqrt(taken) * self._random.standard_normal(NEIGHBOURS)
+            pushed += wrong[:, None] * times
+        pushed[~self._felt] = 0.0
+        self._states[:, 1:] += self._factor * pushed
+        self._apart = self._distances(self._states)
+
+    def _drawn_in(self, states: np.ndarray, factor: float) -> np.ndarray:
+        """Neighbours nearer by a factor, in the same directions."""
+        self._factor *= factor
+        nearer = states.copy()
+        nearer[:, 1:] = states[:, :1] + factor * (states[:, 1:] - states[:, :1])
+        return nearer
+
+    def _distances(self, states: np.ndarray) -> np.ndarray:
+        """Of each neighbour (neighbours,), relative to the size of what is apart."""
+        apart = states[:, 1:] - states[:, :1]
+        found: np.ndarray = np.sqrt((self._weights @ (apart * apart)).max(axis=0))
+        return found
+
+    def _weigh(self) -> None:
+        """Of squared differences in squared distances; states that never moved are none to be near to."""
+        sizes = (self._members * self._largest).max(axis=1, keepdims=True)
+        self._weights = np.where(sizes > 0, self._members / np.maximum(sizes, 1e-150) ** 2, 0.0)
+
+    def _note(self) -> None:
+        spread, motion = self.spread, self._states[:, 0]
+        wrong = np.sqrt((((self._states[:, 1:] - motion[:, None]) / self._factor) ** 2).mean(axis=1))
+        places, units = self._places, self._units
+        rates = places["rates"][:3]
+        size = _length(units * motion[rates])
+        spread.times.append(self._time)
+        spread.steps.append(self.steps)
+        spread.rates.append(_length(units * wrong[rates]) / size if size > 0 else 0.0)
+        turned = 0.0 if self._chords is None else self._chords.between(self._states)
+        spread.attitude.append(turned / self._factor)
+        spread.position.append(_length(wrong[places["position"]]))
+        spread.velocity.append(_length(wrong[places["velocity"]]))
+        if places["position"]:
+            spread.extent = max(spread.extent, _length(motion[places["position"]]))
+            spread.fastest = max(spread.fastest, _length(motion[places["velocity"]]))

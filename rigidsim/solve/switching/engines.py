@@ -1,0 +1,331 @@
+"""The engines of a motion with switching surfaces, and what the state doesn't tell of it.
+
+Sides are parameters of the equations, and so are the turns of angles and the sign of the quaternion where an
+expression depends on them: both go on from step to step by continuity. Along surfaces the motion has
+equations of its own, which are compiled when they are first needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.system import System
+from rigidsim.solve.building import interruptible
+from rigidsim.solve.engine import Integrator
+from rigidsim.solve.event_units import of_order_one
+from rigidsim.solve.events import BESIDE, EventLog, engine_events
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.switching.resting import Meeting
+from rigidsim.solve.switching.sides import HELD, SLIDES, Choice, Look, Probe, continued
+from rigidsim.solve.switching.sliding import sliding
+
+_BISECTIONS = 4  # of a step for each bit of the precision
+
+Root = tuple[Any, int, int]
+"""Time, number of a surface, and the side that it leads to."""
+
+
+class SwitchedEngines(Stepper):
+    """What a stepper with surfaces has beside its steps: an engine for each way to go on, and a memory."""
+
+    single_steps = careful = True
+
+    def __init__(
+        self,
+        system: System,
+        precision: Precision,
+        tolerance: Scalar | None,
+        start: Scalar,
+        log: EventLog | None = None,
+    ) -> None:
+        self._roots: list[Root] = []
+        self._probes: dict[int, Probe] = {}
+        self._slid: dict[tuple[int, tuple[int, ...], tuple[int, ...]], Integrator] = {}
+        self._chart = 0
+        surfaces = system.plan.surfaces
+        self._modes = [1] * len(surfaces.found)
+        self._fresh, self._count, self._since = False, 0, 0.0
+        super().__init__(system, precision, tolerance, start, log)
+        probe = self._probe
+        pars = self._pars([0.0] * probe.angles, 1.0)
+        _, plain, quaternion = probe.values(self.state, self.time, pars)
+        begun = dict(zip(("phi", "theta", "psi"), system.scene.euler_angles or (), strict=False))
+        asked = [float(begun.get(name, a)) for name, a in zip(surfaces.turning, plain, strict=True)]
+        # in the partner chart, where a run may begin, angles are plain already
+        self._angles = [a + 2 * np.pi * continued(b, a) for a, b in zip(plain, asked, strict=True)]
+        given = [float(x) for x in system.scene.quaternion]
+        same = not quaternion or float(np.dot(given, quaternion)) >= 0
+        self._quaternion = [x if same else -x for x in quaternion]
+        self._dense = self._integrator
+
+    # --- what it remembers ----------------------------------------------------------------------------------
+
+    @property
+    def _along(self) -> tuple[int, ...]:
+        return tuple(j for j, mode in enumerate(self._modes) if mode == SLIDES)
+
+    @property
+    def _held(self) -> dict[int, tuple[int, int]]:
+        """Surfaces kept to at rest: the one whose side each has, and whether that or the opposite."""
+        return {
+            j: (abs(mode) - HELD, 1 if mode > 0 else -1)
+            for j, mode in enumerate(self._modes)
+            if abs(mode) >= HELD
+        }
+
+    @property
+    def _probe(self) -> Probe:
+        if self._chart not in self._probes:
+            system = self.system if self._chart == 0 else self.system.partner
+            assert system is not None
+            self._probes[self._chart] = interruptible(lambda: Probe(system, self.precision))
+        return self._probes[self._chart]
+
+    def mark(self) -> Mark:
+        """Remember this boundary."""
+        memory = (
+            *map(float, self._modes),
+            *self._angles,
+            *self._quaternion,
+            float(self._fresh),
+            float(self._count),
+            self._since,
+        )
+        return replace(super().mark(), switching=memory)
+
+    def back_to(self, mark: Mark) -> None:
+        """Return to a boundary."""
+        memory = list(mark.switching)
+        s, a, q = len(self._modes), len(self._angles), len(self._quaternion)
+        self._modes = [int(x) for x in memory[:s]]
+        self._angles, self._quaternion = memory[s : s + a], memory[s + a : s + a + q]
+        fresh, count, self._since = memory[s + a + q :]
+        self._fresh, self._count = bool(fresh), int(count)
+        self.failure = ""
+        self._enter()
+        super().back_to(mark)
+
+    def use(self, chart: int) -> None:
+        """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
+        self._chart = chart
+        self._enter()
+        self._longest = self._bounds[chart]
+
+    def _enter(self) -> None:
+        """Go on with the equations of this chart along these surfaces."""
+        key = self._chart, self._along, tuple(self._modes[j] for j in self._held)
+        if key not in self._slid:
+            system = self.system if self._chart == 0 else self.system.partner
+            assert system is not None
+            first = key == (0, (), ()) and hasattr(self, "_integrator")
+            along, held = self._along, self._held
+            compiled = (
+                self._integrator if first else interruptible(lambda: self._compiled(system, along, held))
+            )
+            self._slid[key] = compiled
+        entered = self._slid[key]
+        if entered is not self._integrator:
+            entered.dtime = self._integrator.dtime
+            entered.state[:] = self._integrator.state
+            self._integrator = entered
+
+    def _compiled(
+        self, system: System, along: tuple[int, ...] = (), held: Mapping[int, tuple[int, int]] | None = None
+    ) -> Integrator:
+        held = held or {}
+        options = dict(self.precision.options)
+        equations, kind = system.equations, self.precision.scalar
+        shifted = [u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
+        events = [
+            hy.nt_event(u, self._noting(j), fp_type=kind)
+            for j, u in enumerate(of_order_one(system, shifted, system.surfaces))
+            if j not in along and j not in held
+        ]
+        if along:
+            found = sliding(system, along, held)
+            equations = found.equations
+            for j, side in zip(along, found.sides, strict=True):
+                for end, way in ((1, hy.event_direction.positive), (-1, hy.event_direction.negative)):
+                    leaves = self._noting(j, end)
+                    events.append(hy.nt_event(side - float(end), leaves, direction=way, fp_type=kind))
+        if self.has_events:
+            offsets = system.parameters + len(system.surfaces)
+            events += engine_events(system, self.precision, self.log, offsets=offsets)
+        if self._tolerance is not None:
+            options["tol"] = self._tolerance
+        integrator = hy.taylor_adaptive(
+            equations,
+            self.precision.array(system.initial),
+            time=self._start,
+            nt_events=events,
+            compact_mode=self.precision.compact or system.wide or len(along) > 1,
+            **options,
+        )
+        self._slid[(self._chart, along, tuple(self._modes[j] for j in held))] = integrator
+        return integrator
+
+    def _noting(self, j: int, end: int = 0) -> Callable[[Integrator, Scalar, int], None]:
+        def called(_: Integrator, time: Scalar, way: int) -> None:
+            self._roots.append((time, j, end or way))
+
+        return called
+
+    # --- parameters -----------------------------------------------------------------------------------------
+
+    def _pars(self, turns: list[float], sign: float, over: dict[int, int] | None = None) -> np.ndarray:
+        modes = [(over or {}).get(j, mode) or 1 for j, mode in enumerate(self._modes)]
+        sides = [math.copysign(1.0, mode) for mode in modes]
+        numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
+        return self._array(numbers)
+
+    def _array(self, numbers: list[float]) -> np.ndarray:
+        return np.array([self.precision.of_double(x) for x in numbers], dtype=self.precision.scalar)
+
+    def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
+        """At this boundary; turns and sign go on from the latest step."""
+        turns, sign = self._joined(self.state, self.time)
+        return self._pars(turns, sign, over)
+
+    def _look(self, state: np.ndarray, time: Scalar) -> Look:
+        """At a state of the latest step."""
+        return self._probe.look(state, time, self._pars(*self._joined(state, time)))
+
+    def _values(self, state: np.ndarray, time: Scalar) -> np.ndarray:
+        """The arguments alone, likewise."""
+        return self._probe.values(state, time, self._pars(*self._joined(state, time)))[0]
+
+    def _joined(self, state: np.ndarray, time: Scalar) -> tuple[list[float], float]:
+        if not (self._angles or self._quaternion):
+            return [], 1.0
+        zeros = self._pars([0.0] * len(self._angles), 1.0)
+        _, plain, quaternion = self._probe.values(state, time, zeros)
+        turns = [continued(b, a) for a, b in zip(plain, self._angles, strict=True)]
+        same = not quaternion or float(np.dot(quaternion, self._quaternion)) >= 0
+        return turns, 1.0 if same else -1.0
+
+    def _follow(self) -> None:
+        """Continue angles and quaternion to the end of the step just taken."""
+        if not (self._angles or self._quaternion):
+            return
+        turns, sign = self._joined(self.state, self.time)
+        zeros = self._pars([0.0] * len(self._angles), 1.0)
+        _, plain, quaternion = self._probe.values(self.state, self.time, zeros)
+        self._angles = [a + 2 * np.pi * n for a, n in zip(plain, turns, strict=True)]
+        self._quaternion = [sign * x for x in quaternion]
+
+    def _set(self, engine: Integrator) -> None:
+        """Give an engine its parameters at this boundary.
+
+        The engine finds a zero at a step's very beginning again and again, in place of those that follow. So
+        an argument that is zero there but for rounding is watched for the zero of its sum with a rounding, on
+        the side that the motion is on; and an event that lies there, and was found on the way to it, for the
+        zero of its sum with next to nothing.
+        """
+        pars = self._parameters()
+        look = self._probe.look(self.state, self.time, pars)
+        moved = []
+        for j, mode in enumerate(self._modes):  # what a unit of time makes of the state tells its size
+            noise = self._probe.noise(look, j, [self.state, look.field])
+            near = abs(float(look.u[j])) <= noise and abs(mode) < HELD
+            moved.append(mode * noise if near else 0.0)
+        if self.has_events:
+            moved += [self._beside(*found) for found in self._probe.crossings(self.state, self.time, pars)]
+        offsets = self._array(moved)
+        everything = np.concatenate([pars, offsets])
+        engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
+
+    def _beside(self, value: float, noise: float) -> float:
+        """What to add to an event's expression."""
+        if self._along and abs(value) <= noise:  # it is zero all along the surface, and crosses nothing
+            return 2 * noise
+        return 2.0 ** (-self.precision.bits - BESIDE) if self._fresh and value == 0 else 0.0
+
+    def _at_rest(self, on: list[int], look: Look) -> Choice | None:
+        """How to go on where swings about the meeting of two surfaces have come down to rounding."""
+        small = [
+            i
+            for i, mode in enumerate(self._modes)
+            if i in on
+            or abs(mode) >= HELD
+            or abs(float(look.u[i])) <= self._probe.swing_noise(look, i, self.state)
+        ]
+        if len(small) < 2:
+            return None
+
+        def at(sides: Mapping[int, int], state: np.ndarray, time: Scalar) -> Look:
+            return self._probe.look(state, time, self._parameters(dict(sides)))
+
+        meeting = Meeting(at, self._probe, np.array(self.state), self.time, self._epsilon)
+        kept = {j: self._modes[j] for j in (*self._along, *self._held)}
+        return meeting.rest(sorted({*small, *kept}), kept)
+
+    def _keep_to_surfaces(self) -> None:
+        """Take off what rounding moved the state away from the surfaces that it slides along."""
+        state = self._integrator.state
+        look = self._look(state, self.time)
+        for j in (*self._along, *self._held):
+            gradient = look.gradients[j]
+            square = sum((g * g for g in gradient), gradient[0] * 0)
+            if square != 0:
+                state[:] = state - (look.u[j] / square) * gradient
+
+    def _seen(self, j: int, begin: Scalar, before: np.ndarray) -> Scalar | None:
+        """A time of the latest step at which an argument has the sign of its side, if any.
+
+        Args:
+            before: the state in which the step began.
+        """
+        end, mode = self._integrator.time, self._modes[j]
+        look = self._look(before, begin)
+        known = self._probe.noise(look, j, [before])
+        beside = mode * float(look.u[j]) > known  # of the surface, as the step began
+        some = self.precision.bits // 2
+        for power in range(1, _BISECTIONS * self.precision.bits):
+            then = begin + (end - begin) * self.precision.of_double(2.0**-power)
+            value = mode * float(self._values(self._integrator.update_d_output(then), then)[j])
+            if value > 0:
+                return then
+            if power >= some and (beside or abs(value) <= known):  # nearer than that it is on the surface
+                break
+        return begin if beside else None
+
+    def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
+        """A root that the engine missed."""
+        for _ in range(_BISECTIONS * self.precision.bits):
+            middle = begin + (end - begin) / 2
+            if not begin < middle < end:
+                break
+            value = self._values(self._integrator.update_d_output(middle), middle)[j]
+            if self._modes[j] * float(value) > 0:
+                begin = middle
+            else:
+                end = middle
+        return end
+
+    def _moved(self, j: int) -> int:
+        """The side of a surface that a step leads to, which is taken back; 0 for none."""
+        engine = self._integrator
+        time, before = engine.dtime, np.array(engine.state)
+        self._set(engine)
+        muted, self.log.muted = self.log.muted, True
+        engine.step(self._longest, write_tc=True)
+        end, after = engine.time, np.array(engine.state)
+        found = 0
+        for part in (1 / 16, 1 / 2, 1.0):
+            then = time[0] + self.precision.of_double(part) * (end - time[0])
+            look = self._look(engine.update_d_output(then), then)
+            if abs(float(look.u[j])) > self._probe.noise(look, j, [before, after]):
+                found = 1 if look.u[j] > 0 else -1
+                break
+        self.log.muted = muted
+        self._roots.clear()
+        engine.dtime = time
+        engine.state[:] = before
+        return found

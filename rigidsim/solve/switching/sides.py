@@ -1,0 +1,233 @@
+"""On which side of its switching surfaces a motion goes on: decided by the fields of all sides (Filippov).
+
+Where it arrives on a surface whose other side carries it away, it crosses; where both sides push it back, it
+slides along (``rigidsim.solve.switching.sliding``). On several surfaces at once each combination of
+crossing and sliding is tried, and the one that agrees with its own field is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.step_limiter import slopes
+from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
+from rigidsim.solve.precision import Precision, Scalar
+
+SLIDES = 0
+"""In the place of a side, 1 or -1."""
+HELD = 2
+"""In the place of a side: of a surface that the motion keeps to while it slides along surface number m, whose
+side it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.resting``."""
+_ROUNDINGS = 32.0  # of the terms of an argument, below which it is zero
+_RATE_ROUNDINGS = 1024.0  # of the terms of its rate, which are products of derivatives
+
+
+@dataclass(frozen=True)
+class Look:
+    """What there is to know of the surfaces at a state.
+
+    Attributes:
+        u: (surfaces,), the arguments.
+        by_time: (surfaces,), their partial derivatives.
+        gradients: (surfaces, states).
+        field: (states,), derivatives of the states.
+        time: internal units.
+    """
+
+    u: np.ndarray
+    by_time: np.ndarray
+    gradients: np.ndarray
+    field: np.ndarray
+    time: Scalar
+
+    def rate(self, j: int) -> Scalar:
+        """Of an argument along the motion."""
+        return sum((g * f for g, f in zip(self.gradients[j], self.field, strict=True)), self.by_time[j])
+
+    def rate_size(self, j: int) -> float:
+        """What the rate's rounding is a part of."""
+        pairs = zip(self.gradients[j], self.field, strict=True)
+        return sum((abs(float(g) * float(f)) for g, f in pairs), abs(float(self.by_time[j])))
+
+    def size(self, j: int, states: Sequence[np.ndarray]) -> float:
+        """What the argument's rounding is a part of, where states were of these sizes shortly before."""
+        largest = [max(abs(float(x)) for x in row) for row in zip(*states, strict=True)]
+        terms = (abs(float(g)) * x for g, x in zip(self.gradients[j], largest, strict=True))
+        return sum(terms, abs(float(self.by_time[j]) * float(self.time)))
+
+
+class Probe:
+    """Compiled functions of a system that say where its surfaces are."""
+
+    def __init__(self, system: System, precision: Precision) -> None:
+        self._epsilon = float(precision.epsilon)
+        self.surfaces, self._states = len(system.surfaces), len(system.states)
+        self.angles, self.signed = len(system.turning), bool(system.signed)
+        self.parameters = self.surfaces + self.angles + self.signed
+        named = [hy.par[self.parameters - 1], hy.time]  # functions without them take no such argument
+        variables = system.variables
+        by_time, gradients = [], []
+        for u in system.surfaces:
+            explicit, by_state = slopes(u)
+            by_time += explicit or [hy.expression(0.0)]
+            gradients += [by_state.get(name, hy.expression(0.0)) for name in system.states]
+        field = [right for _, right in system.equations]
+        options = {"compact_mode": True, **precision.options}
+        self._values = hy.cfunc(
+            [*system.surfaces, *system.turning, *system.signed, *named], variables, **options
+        )
+        found = [c.expression for c in system.crossings]
+        sizes = [[g * g for g in slopes(expression)[1].values()] for expression in found]
+        lengths = [hy.sqrt(hy.sum(squares)) if squares else hy.expression(0.0) for squares in sizes]
+        self._crossings = hy.cfunc([*found, *lengths, *named], variables, **options)
+        outputs = [*system.surfaces, *by_time, *gradients, *field, *named]
+        self._everything = hy.cfunc(outputs, variables, **options)
+
+    def values(
+        self, state: np.ndarray, time: Scalar, pars: np.ndarray
+    ) -> tuple[np.ndarray, list[float], list[float]]:
+        """The arguments, in the run's precision; the plain angles and the plain quaternion, where needed."""
+        found = self._values(np.array(state), pars=pars, time=time)
+        rest = [float(x) for x in found[self.surfaces : -2]]
+        return found[: self.surfaces], rest[: self.angles], rest[self.angles :]
+
+    def crossings(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[tuple[float, float]]:
+        """Values of the events' expressions, and what rounding of the states, of order one, makes of them."""
+        found = [float(x) for x in self._crossings(np.array(state), pars=pars, time=time)[:-2]]
+        noise, half = _RATE_ROUNDINGS * self._epsilon, len(found) // 2
+        return [(value, noise * size) for value, size in zip(found[:half], found[half:], strict=True)]
+
+    def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
+        """Everything."""
+        found = self._everything(np.array(state), pars=pars, time=time)
+        s, n = self.surfaces, self._states
+        return Look(
+            found[:s], found[s : 2 * s], found[2 * s : 2 * s + s * n].reshape(s, n), found[-2 - n : -2], time
+        )
+
+    def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
+        """Below which an argument is zero, as far as rounding lets it be known."""
+        return _ROUNDINGS * self._epsilon * look.size(j, states)
+
+    def swing_noise(self, look: Look, j: int, state: np.ndarray) -> float:
+        """Likewise where it is the small difference of states of order one, as swings are that come to rest:
+        what is left of them then is rounding's.
+        """
+        gradient = math.hypot(*(float(x) for x in look.gradients[j]))
+        return _ROUNDINGS * self._epsilon * gradient * max(abs(float(x)) for x in state)
+
+    def rate_noise(self, look: Look, j: int) -> float:
+        """Likewise of its rate."""
+        return _RATE_ROUNDINGS * self._epsilon * look.rate_size(j)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How to go on from some surfaces.
+
+    Attributes:
+        modes: for each surface 1, -1 or ``SLIDES``; None where there is no way, or more than one.
+        why: in that case.
+    """
+
+    modes: Mapping[int, int] | None
+    why: str = ""
+    tangential: bool = False
+
+
+class Fields:
+    """The fields of all combinations of sides of some surfaces, at one state."""
+
+    def __init__(self, at: Any, probe: Probe, surfaces: Sequence[int]) -> None:
+        """``at``: from sides by number to a ``Look``."""
+        self.surfaces = list(surfaces)
+        self._looks = {
+            sides: at(dict(zip(surfaces, sides, strict=True)))
+            for sides in product((1, -1), repeat=len(surfaces))
+        }
+        looks = self._looks.values()
+        self._noise = [max(probe.rate_noise(look, j) for look in looks) for j in surfaces]
+        m = len(surfaces)
+        above, below = self._looks[(1,) * m], self._looks[(-1,) * m]
+        self._base = np.array([float((above.rate(j) + below.rate(j)) / 2) for j in surfaces])
+        self._parts = np.zeros((m, m))
+        for k in range(m):
+            other = self._looks[tuple(-1 if i == k else 1 for i in range(m))]
+            self._parts[:, k] = [float((above.rate(j) - other.rate(j)) / 2) for j in surfaces]
+
+    @property
+    def add_up(self) -> bool:
+        """Whether the parts of all surfaces in the field do."""
+        m = len(self.surfaces)
+        above = self._looks[(1,) * m].field.astype(np.float64)
+        below = self._looks[(-1,) * m].field.astype(np.float64)
+        parts = []
+        for k in range(m):
+            other = self._looks[tuple(-1 if i == k else 1 for i in range(m))].field.astype(np.float64)
+            parts.append((above - other) / 2)
+        for sides, look in self._looks.items():
+            expected = (above + below) / 2 + sum(s * part for s, part in zip(sides, parts, strict=True))
+            size = np.abs(above) + np.abs(below) + np.abs(look.field.astype(np.float64))
+            if np.any(np.abs(expected - look.field.astype(np.float64)) > 1e-9 * size):
+                return False
+        return True
+
+    def idle(self) -> list[int]:
+        """Surfaces that the motion stays on, or touches, whatever the sides."""
+        return [
+            j
+            for j, noise in zip(self.surfaces, self._noise, strict=True)
+            if all(abs(float(look.rate(j))) <= noise for look in self._looks.values())
+        ]
+
+    def choose(self) -> Choice:
+        """The one combination whose field agrees with it."""
+        found, added = [], len(self.surfaces) == 1 or self.add_up
+        for modes in product((1, -1, SLIDES), repeat=len(self.surfaces)):
+            if SLIDES not in modes:
+                look = self._looks[modes]
+                agrees = all(
+                    s * float(look.rate(j)) > noise
+                    for s, j, noise in zip(modes, self.surfaces, self._noise, strict=True)
+                )
+            else:
+                agrees = added and self._slides(modes)
+            if agrees:
+                found.append(dict(zip(self.surfaces, modes, strict=True)))
+        if len(found) == 1:
+            return Choice(found[0])
+        if found:
+            return Choice(None, "it could leave it in more than one way, so that what follows isn't unique")
+        return Choice(None, "no side agrees with its own field", tangential=True)
+
+    def _slides(self, modes: Sequence[int]) -> bool:
+        along = [i for i, mode in enumerate(modes) if mode == SLIDES]
+        beside = [i for i, mode in enumerate(modes) if mode != SLIDES]
+        across = self._parts[np.ix_(along, along)]
+        right = -self._base[along] - self._parts[np.ix_(along, beside)] @ np.array(
+            [float(modes[i]) for i in beside]
+        )
+        if np.any(np.abs(np.diag(across)) <= [self._noise[i] for i in along]):
+            return False
+        try:
+            inner = np.linalg.solve(across, right)
+        except np.linalg.LinAlgError:
+            return False
+        if np.any(np.abs(inner) > 1) or np.any(np.linalg.eigvals(across).real >= 0):
+            return False
+        sides = np.array([float(mode) for mode in modes])
+        sides[along] = inner
+        rates = self._base + self._parts @ sides
+        return all(modes[i] * rates[i] > self._noise[i] for i in beside)
+
+
+def continued(before: float, plain: float) -> float:
+    """How many full turns a plain angle lacks to be next to a continuous one."""
+    return float(np.rint((before - plain) / (2 * math.pi)))

@@ -1,0 +1,339 @@
+"""Steps that end on switching surfaces: no step passes over a kink or a jump.
+
+The engine finds where a step's own polynomials take an argument through zero. A step that leaves its side is
+taken again up to there, and the next one begins on the other side, or goes along the surface. A root counts
+only where it leads away from the side that the motion is on: the zero at which a step begins doesn't, so
+that no cooldown is needed and a checkpoint holds all there is. All steps are single ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.system import System
+from rigidsim.solve.events import EventLog
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.step_bounds import bound_of_sparse_series
+from rigidsim.solve.switching.engines import Root, SwitchedEngines
+from rigidsim.solve.switching.sides import HELD, SLIDES, Choice, Fields, Look
+from rigidsim.solve.switching.sliding import MOST_AT_ONCE
+
+_ATTEMPTS = 32  # at one step
+_MOST_SWITCHES = 256
+"""At intervals shorter than ``_SHORTEST``: they accumulate, or go on for ever with what rounding leaves of
+their swing, whose time is the square root of its size."""
+_SHORTEST = 2.0**-8  # internal units of time; with more digits less, see ``_window``
+_ROUNDINGS = 2.0**15  # in the square of an interval
+_WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
+_NEAR = 2.0**-12  # of a step: within it Newton's method improves a root
+
+
+class SwitchingStepper(SwitchedEngines):
+    """A stepper of a system with surfaces, or with angles whose turns matter.
+
+    Attributes:
+        switches: how often it came to a surface so far, in this process.
+        begun: the boundary at which the motion begins, on the sides that it goes to.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        precision: Precision,
+        tolerance: Scalar | None,
+        start: Scalar,
+        log: EventLog | None = None,
+    ) -> None:
+        super().__init__(system, precision, tolerance, start, log)
+        self.switches = 0
+        self._unsettled = ""
+        self._begin()
+        self.begun = self.mark()
+
+    # --- steps ----------------------------------------------------------------------------------------------
+
+    def step(self) -> bool:
+        """One step with dense output, not past a surface; False when the state is no longer finite, or the
+        motion can't be continued (``failure`` says why then).
+        """
+        return self._step(self._longest)[0]
+
+    def skip(self, count: int) -> bool:
+        """As ``Stepper.skip``, step by step."""
+        smallest, largest = np.inf, 0.0
+        for _ in range(count):
+            fine, on = self._step(self._longest)
+            if not fine:
+                return False
+            smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
+            if not on or self.collapsed:
+                break
+        self.smallest, self.largest = smallest, largest
+        return True
+
+    def to(self, time: float) -> bool:
+        """As ``Stepper.to``."""
+        for _ in range(100_000):
+            high, low = self._integrator.dtime
+            left = (time - high) - low
+            if left <= abs(time) * self._epsilon:
+                return True
+            if not self._step(min(left, self._longest))[0]:
+                break
+        return False
+
+    def dense(self, time: Scalar) -> np.ndarray:
+        """As ``Stepper.dense``."""
+        return np.array(self._dense.update_d_output(time))
+
+    def settle(self) -> None:
+        """Take note that the state was set from outside: sides are those that it lies on."""
+        self._roots.clear()
+        # it lies beside surfaces that it kept to
+        self._modes = [mode if abs(mode) == 1 else 1 for mode in self._modes]
+        self._agree()
+        self._enter()
+
+    def _step(self, longest: Scalar) -> tuple[bool, bool]:
+        """Whether all went well, and whether the watcher lets the call go on."""
+        if self._unsettled:
+            self.failure = self._unsettled
+            return False, False
+        self._watched()
+        self._quieten()
+        log, events = self.log, len(self.log.found)
+        for _ in range(_ATTEMPTS):
+            begun = self._integrator
+            self._set(begun)
+            time, before = begun.dtime, np.array(begun.state)
+            self._roots.clear()
+            outcome, size = begun.step(longest, write_tc=True)
+            bound = bound_of_sparse_series(begun.tc) if self._fresh or not self.steps else np.inf
+            if bound < abs(float(size)):
+                log.back_to(events)
+                self._roots.clear()
+                begun.dtime = time
+                begun.state[:] = before
+                outcome, size = begun.step(self.precision.of_double(bound), write_tc=True)
+            if outcome == hy.taylor_outcome.err_nf_state:
+                return False, False
+            natural = abs(float(size))
+            root = self._first_root(time[0], before)
+            if root is None:
+                break
+            log.drop_after(events, root[0] + self._width(root[0]))
+            at_once = root[0] - time[0] - time[1] <= 0
+            if not at_once:
+                size = self._again(root, time, before)
+                break
+            # it begins on the surface, and leaves its side at once
+            log.back_to(events)
+            begun.dtime = time
+            begun.state[:] = before
+            if not self._arrive(root, [before]):
+                return False, False
+        else:
+            assert root is not None
+            return self._fail(root[1], "it turns back to it again and again"), False
+        self._dense = begun
+        self.smallest, self.largest = abs(float(size)), natural
+        self.steps += 1
+        self._judge(time[0], 1)
+        on = True if self.watcher is None else self.watcher(begun)
+        self._follow()
+        self._fresh = False
+        if root is not None and not self._arrive(root, [before, np.array(self.state)]):
+            return False, False
+        if self._along:
+            self._keep_to_surfaces()
+        return True, on
+
+    def _width(self, time: Scalar) -> Scalar:
+        size = _WIDTH * self._epsilon * max(abs(float(time)), 1.0)
+        return self.precision.of_double(size)
+
+    def _quieten(self) -> None:
+        """Events at the surface that the latest step ended on were found by it."""
+        time = self.time
+        self.log.quiet_until = time + self._width(time) if self._fresh else None
+
+    def _again(self, root: Root, time: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar:
+        """The step up to a root, once more nearer to it; returns its size."""
+        engine, size = self._integrator, root[0] - time[0] - time[1]
+        muted, self.log.muted = self.log.muted, True
+        try:
+            for attempt in range(2):
+                engine.dtime = time
+                engine.state[:] = before
+                engine.step(size, write_tc=True)
+                if attempt or root[1] in self._along:
+                    break
+                look = self._look(engine.state, engine.time)
+                rate = look.rate(root[1])
+                if rate == 0:
+                    break
+                correction = look.u[root[1]] / rate
+                if not 0 < abs(float(correction)) < _NEAR * float(size):
+                    break
+                size = size - correction
+        finally:
+            self.log.muted = muted
+        return size
+
+    def _first_root(self, begin: Scalar, before: np.ndarray) -> Root | None:
+        """The first root at which the step just taken leaves its side."""
+        engine = self._integrator
+        end, after = engine.time, np.array(engine.state)
+        states = [before, after]
+        roots = sorted(self._roots, key=lambda root: root[0])
+        for n, (time, j, side) in enumerate(roots):
+            if self._modes[j] == SLIDES:
+                return roots[n]
+            if side != -self._modes[j]:
+                continue
+            following = next((t for t, i, _ in roots[n + 1 :] if i == j), end)
+            middle = time + (following - time) / 2
+            look = self._look(engine.update_d_output(middle), middle)
+            if float(look.u[j]) * side > self._probe.noise(look, j, states):
+                return roots[n]
+        values = self._values(after, end)
+        for j, mode in enumerate(self._modes):
+            if abs(mode) >= HELD or mode * float(values[j]) >= 0:
+                continue
+            look = self._look(after, end)
+            if -mode * float(look.u[j]) <= self._probe.noise(look, j, states):
+                continue
+            inside = self._seen(j, begin, before)
+            if inside is None:
+                return begin, j, -mode
+            return self._bisected(j, inside, end), j, -mode
+        return None
+
+    # --- surfaces -------------------------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        """The sides of the start."""
+        look = self._agree()
+        on = [
+            j
+            for j in range(len(self._modes))
+            if abs(float(look.u[j])) <= self._probe.noise(look, j, [self.state])
+        ]
+        if on:
+            choice = self._at_rest(on, look) or self._chosen(on)
+            if choice.modes is None:
+                self._fail(on[0], f"the motion starts there, and {choice.why}")
+                self._unsettled = self.failure
+            else:
+                self._take(choice)
+
+    @property
+    def _window(self) -> float:
+        """Internal units of time within which ``_MOST_SWITCHES`` are an accumulation."""
+        return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * self._epsilon) ** 0.5)
+
+    def _arrive(self, root: Root, states: list[np.ndarray]) -> bool:
+        """Go on from a surface; False where that can't be."""
+        _, j, side = root
+        self._fresh = True
+        self.switches += 1
+        now = float(self.time)
+        if now - self._since > self._window:
+            self._since, self._count = now, 0
+        self._count += 1
+        if self._count > _MOST_SWITCHES:
+            return self._fail(j, f"its sides changed more than {_MOST_SWITCHES} times in almost no time")
+        if self._modes[j] == SLIDES:
+            self._modes[j] = side
+            for i, (by, sign) in self._held.items():
+                if by == j:
+                    self._modes[i] = sign * side
+            self._enter()
+            return True
+        look = self._look(self.state, self.time)
+        on = [j, *self._along, *self._held]
+        for i in range(len(self._modes)):
+            if i not in on and abs(float(look.u[i])) <= self._probe.noise(look, i, states):
+                on.append(i)
+        choice = self._at_rest(on, look) or self._chosen(on, hint=(j, side))
+        if choice.modes is None:
+            return self._fail(j, choice.why)
+        self._take(choice)
+        return True
+
+    def _agree(self, known: Collection[int] = ()) -> Look:
+        """Put all surfaces but those known on the sides that the state lies on: an argument that reads the
+        side of another surface jumps with it. Returns the last look.
+        """
+        for _ in range(len(self._modes) + 1):
+            look, changed = self._look(self.state, self.time), False
+            for j, mode in enumerate(self._modes):
+                u = float(look.u[j])
+                beyond = mode * u < 0 and abs(u) > self._probe.noise(look, j, [self.state])
+                if beyond and j not in known and abs(mode) < HELD:
+                    self._modes[j], changed = -mode, True
+            if not changed:
+                break
+        return look
+
+    def _take(self, choice: Choice) -> None:
+        assert choice.modes is not None
+        for j, mode in choice.modes.items():
+            self._modes[j] = mode
+        self._agree(choice.modes)
+        self._enter()
+        if self._along:
+            self._keep_to_surfaces()
+
+    def _chosen(self, on: list[int], hint: tuple[int, int] | None = None) -> Choice:
+        """How to go on from surfaces that the state lies on."""
+
+        def at(sides: dict[int, int]) -> Look:
+            return self._probe.look(self.state, self.time, self._parameters(sides))
+
+        moving = [j for j in on if hint is not None and j == hint[0]]
+        for j in on:
+            if j not in moving and j not in Fields(at, self._probe, [j]).idle():
+                moving.append(j)
+        idle = {j: self._modes[j] or 1 for j in on if j not in moving}
+        if not moving:
+            return self._by_trial(idle)
+        if len(moving) > MOST_AT_ONCE:
+            return Choice(None, f"more than {MOST_AT_ONCE} surfaces meet there")
+        fields = Fields(at, self._probe, moving)
+        choice = fields.choose()
+        if choice.modes is not None:
+            return Choice({**idle, **choice.modes})
+        if not choice.tangential or hint is None:
+            return choice
+        # touched: rounding hides the rates, but the step was seen to get to the other side
+        return Choice({**idle, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
+
+    def _by_trial(self, idle: dict[int, int]) -> Choice:
+        """At rest on a surface: the side on which a step stays on its own."""
+        modes = dict(idle)
+        for j in idle:
+            kept = []
+            for side in (1, -1):
+                self._modes[j] = side
+                moved = self._moved(j)
+                if moved == 0 or moved == side:
+                    kept.append(side if moved else 0)
+            self._modes[j] = idle[j]
+            if kept == [1, -1]:
+                return Choice(None, "it could leave it to either side")
+            if not kept:
+                return Choice(None, "both sides lead back to it with growing speed")
+            modes[j] = kept[0] or idle[j]
+        return Choice(modes)
+
+    def _fail(self, j: int, why: str) -> bool:
+        surface = self.system.plan.surfaces.found[j]
+        self.failure = (
+            f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; make the change smooth, for '
+            "instance tanh(u/width) in place of sign(u)"
+        )
+        return False

@@ -1,0 +1,1 @@
+"""Full turns of angles between samples, counted along the motion."""

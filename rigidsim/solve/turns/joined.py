@@ -1,0 +1,290 @@
+"""Angles that are functions of the state, joined from sample to sample with their full turns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import field, replace
+
+import heyoka as hy
+import mpmath
+import numpy as np
+
+from rigidsim.model.outputs import Recorded
+from rigidsim.model.system import System
+from rigidsim.scene.records import dataclass
+from rigidsim.solve.angle_wrapping import AngleWrapping
+from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.precision import Precision
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join, doubtful_rows, is_sparse, nearest
+from rigidsim.solve.turns.followed import FollowedSystem
+from rigidsim.solve.turns.steady import SteadyAngles, advances_steadily
+
+UNDEFINED = 16.0
+"""Rounding errors of an angle's sine and cosine below which both are but rounding: there it is NaN."""
+_DOUBTFUL = 2.0  # rad, as in ``turn_count``
+_POLE = 1e-6  # size of an angle's sine and cosine below which dense samples aren't looked at in parts
+
+
+@dataclass
+class Continuity:
+    """What joins the variables of a block of samples to those of the block before.
+
+    Attributes:
+        turns: full turns added to the joined angles, (angles,).
+        last_angles, last_quaternion: of the latest sample, float64, the angles before those turns; None
+            before the first block.
+        last_time, last_state: of the latest sample, float64, internal units, where turns are counted from it.
+        wrapped_from: time (internal units) of the first sample whose turns aren't known: from there on angles
+            are recorded within one turn; nan where all are known, and -inf apart from the samples.
+    """
+
+    turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    last_angles: np.ndarray | None = None
+    last_quaternion: np.ndarray | None = None
+    last_time: float = math.nan
+    last_state: np.ndarray | None = None
+    wrapped_from: float = math.nan
+
+
+class JoinedAngles:
+    """The angles of a system that are joined.
+
+    Between dense samples they take the nearest way. Between sparse ones they advance steadily, where that is
+    known (``rigidsim.model.observables.steadiness``), and are followed along the motion elsewhere.
+
+    Attributes:
+        dense: whether the samples tell all turns.
+        sparse: whether there are angles that are followed, since the samples are too sparse to tell turns.
+        columns: of the system's outputs, one for each angle.
+
+    Args:
+        compiled: compiles expressions of the states.
+        precision: the run's.
+        countable: whether the motion between sparse samples can be followed.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        compiled: Callable[[list[hy.expression]], CompiledFunction],
+        wrapping: AngleWrapping,
+        *,
+        precision: Precision,
+        countable: bool,
+    ) -> None:
+        self.variables = angles_to_join(system)
+        self.columns = [r.first + i for r in self.variables for i in range(r.count)]
+        self._system, self._wrapping = system, wrapping
+        self.dense = not self.variables or not is_sparse(system)
+        steady = [] if self.dense else [r for r in self.variables if advances_steadily(system, r)]
+        self._others = [r for r in self.variables if r not in steady]
+        self.sparse = bool(self._others) and not self.dense
+        self._followed = FollowedSystem(system)
+        followed = self._followed.system
+        countable = countable and followed is not None
+        followed = followed or system
+        self._steady = SteadyAngles(followed, steady) if steady else None
+        self._counter = TurnCounter(followed, self._others) if self._others and countable else None
+        self._way = TurnCounter(followed, steady) if steady and countable else None
+        sizes = [size for r in self.variables for size in r.squared_sizes]
+        self.sizes = compiled(sizes) if sizes else None
+        self._least = (UNDEFINED * float(precision.epsilon)) ** 2
+        nothing = precision.array([mpmath.mpf(0)])
+        with np.errstate(invalid="ignore"):
+            self._zero, self._undefined = nothing[0], (nothing / nothing)[0]
+
+    def __bool__(self) -> bool:
+        return bool(self.variables)
+
+    def first(self) -> Continuity:
+        """Before the first sample."""
+        return Continuity(np.zeros(max(3, len(self.columns)), dtype=np.int64))
+
+    def part(self, variable: Recorded) -> slice | None:
+        """Where a variable's angles are among the joined ones; None where it isn't."""
+        place = 0
+        for joined in self.variables:
+            if joined.name == variable.name:
+                return slice(place, place + joined.count)
+            place += joined.count
+        return None
+
+    def joined(
+        self, known: Continuity, angles: np.ndarray, sizes: np.ndarray | None, samples: SampleBlock
+    ) -> tuple[np.ndarray, Continuity]:
+        """Angles (n, angles) with their turns, and what the next block is joined to.
+
+        Args:
+            angles: without turns.
+            sizes: squared, of those that have one, (their number, n).
+        """
+        squared = self._all_sizes(sizes, len(angles))
+        lost = (squared < self._least) | ~np.isfinite(squared)
+        if lost.any():
+            angles = angles.copy()
+            angles[lost] = self._zero  # no direction
+        plain, size = angles.astype(np.float64), np.sqrt(squared)
+        times, states = samples.times.astype(np.float64), self._followed.states(samples)
+        block = _Block(times, states, plain, size)
+        if known.wrapped_from == -math.inf:  # apart from the samples
+            turns, wrapped_from = np.zeros(angles.shape, dtype=np.int64), known.wrapped_from
+        elif self.dense:
+            turns = known.turns[: len(self.columns)] + np.cumsum(self._nearest(known, block), axis=0)
+            wrapped_from = known.wrapped_from
+        else:
+            turns, wrapped_from = self._sparse_turns(known, block)
+        found = self._wrapping.unwrapped(angles, turns)
+        found[lost] = self._undefined
+        known = replace(known, turns=turns[-1], last_angles=plain[-1], wrapped_from=wrapped_from)
+        if not self.dense or self._counter is not None:
+            known = replace(known, last_time=float(times[-1]), last_state=states[-1])
+        return found, known
+
+    def follow(self, known: Continuity, time: float) -> None:
+        """Count turns from the latest sample on as far as the run has come, for a fifth of a second at most.
+
+        Args:
+            time: internal units.
+        """
+        latest = _latest(known)
+        if self._counter is not None and latest is not None and math.isnan(known.wrapped_from):
+            self._counter.begin(_of(latest, self._columns_of(self._others)))
+            self._counter.follow(time)
+
+    def _all_sizes(self, sizes: np.ndarray | None, count: int) -> np.ndarray:
+        """(n, angles), squared; 1 for Euler angles, which are told by their middle one."""
+        found = np.ones((count, len(self.columns)))
+        if sizes is None:
+            return found
+        place = 0
+        plain = np.asarray(sizes).astype(np.float64)
+        for variable in self.variables:
+            if variable.squared_sizes:
+                part = self.part(variable)
+                found[:, part] = plain[place : place + variable.count].T
+                place += variable.count
+        return found
+
+    def _columns_of(self, variables: Sequence[Recorded]) -> np.ndarray:
+        """Where their angles are among the joined ones."""
+        all_of = np.arange(len(self.columns))
+        return np.concatenate([all_of[:0], *(all_of[self.part(r)] for r in variables)])
+
+    def _doubtful(self, jumps: np.ndarray, angles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """Rows whose turns dense samples don't tell, since an angle is near its pole."""
+        found: set[int] = set()
+        for variable in self.variables:
+            part = self.part(variable)
+            if not variable.squared_sizes:
+                rows = doubtful_rows(jumps[:, part], angles[:, part], self._system.sequence)
+            else:
+                rows = np.flatnonzero((np.abs(jumps[:, part]) > _DOUBTFUL).any(axis=1))
+                rows = np.array([r for r in rows if (sizes[r, part] > _POLE).all()], dtype=np.int64)
+            found |= set(rows.tolist())
+        return np.array(sorted(found), dtype=np.int64)
+
+    def _nearest(self, known: Continuity, block: _Block) -> np.ndarray:
+        """The full turns (n, angles) from row to row that make each angle nearest to the sample before, but
+        for those near a pole, whose way is followed.
+        """
+        before = block.angles[0] if known.last_angles is None else known.last_angles
+        angles = np.vstack([before, block.angles])
+        made = -np.rint(np.diff(angles, axis=0) / (2 * np.pi)).astype(np.int64)
+        if self._counter is None:
+            return made
+        jumps = nearest(np.diff(angles, axis=0))
+        for row in self._doubtful(jumps, angles, block.sizes):
+            latest = block.place(row - 1) if row else _latest(known)
+            if latest is not None:
+                self._counter.begin(latest)
+                found = self._counter.turns(block.place(row))
+                made[row] = made[row] if found is None else found
+        return made
+
+    def _sparse_turns(self, known: Continuity, block: _Block) -> tuple[np.ndarray, float]:
+        """The full turns (n, angles) of each row, and from when on those that are followed are lost."""
+        turns = np.zeros(block.angles.shape, dtype=np.int64)
+        wrapped_from = known.wrapped_from
+        others, steady = self._columns_of(self._others), self._columns_of(self._steady_variables)
+        if len(others):
+            turns[:, others], wrapped_from = self._counted(known, block, others)
+        if self._steady is not None:
+            turns[:, steady] = known.turns[steady] + np.cumsum(self._advanced(known, block, steady), axis=0)
+        return turns, wrapped_from
+
+    @property
+    def _steady_variables(self) -> list[Recorded]:
+        return [] if self._steady is None else self._steady.variables
+
+    def _advanced(self, known: Continuity, block: _Block, columns: np.ndarray) -> np.ndarray:
+        """The full turns (n, columns) from row to row of angles that advance steadily."""
+        assert self._steady is not None
+        made = np.zeros((len(block.times), len(columns)), dtype=np.int64)
+        for row in range(len(block.times)):
+            latest = block.place(row - 1) if row else _latest(known)
+            if latest is None:
+                continue
+            before, here = _of(latest, columns), _of(block.place(row), columns)
+            found = self._steady.turns(before, here, block.sizes[row, columns])
+            if found is None and self._way is not None:
+                self._way.begin(before)
+                found = self._way.turns(here)
+            if found is None:
+                found = -np.rint((here.angles - before.angles) / (2 * np.pi)).astype(np.int64)
+            made[row] = found
+        return made
+
+    def _counted(self, known: Continuity, block: _Block, columns: np.ndarray) -> tuple[np.ndarray, float]:
+        """The full turns (n, columns) of the motion from sample to sample; none once they are lost, and from
+        when on they are.
+        """
+        turns = np.zeros((len(block.times), len(columns)), dtype=np.int64)
+        latest, before, wrapped_from = _latest(known), known.turns[columns], known.wrapped_from
+        for row, time in enumerate(block.times.tolist()):
+            if not math.isnan(wrapped_from):
+                break
+            made: np.ndarray | None = None
+            here = block.place(row)
+            if self._counter is not None and latest is not None:
+                self._counter.begin(_of(latest, columns))
+                made = self._counter.turns(_of(here, columns))
+            elif self._counter is not None and latest is None:  # the first sample
+                made = np.zeros(len(columns), dtype=np.int64)
+            if made is None:
+                wrapped_from = time
+                break
+            before = turns[row] = before + made
+            latest = here
+        return turns, wrapped_from
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Samples in float64, internal units.
+
+    Attributes:
+        angles: (n, angles) without turns; sizes: of their sines and cosines, likewise.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    angles: np.ndarray
+    sizes: np.ndarray
+
+    def place(self, row: int) -> Place:
+        """One of them."""
+        return Place(float(self.times[row]), self.states[row], self.angles[row])
+
+
+def _of(place: Place, columns: np.ndarray) -> Place:
+    """With some of its angles."""
+    return replace(place, angles=place.angles[columns])
+
+
+def _latest(known: Continuity) -> Place | None:
+    """The latest sample; None without one."""
+    if known.last_state is None or known.last_angles is None:
+        return None
+    return Place(known.last_time, known.last_state, known.last_angles)

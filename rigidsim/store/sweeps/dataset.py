@@ -1,0 +1,232 @@
+"""All members of a sweep as one labelled dataset, put together from its tiles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigidsim.scene.sweeps.sweep import Axis, Sweep
+from rigidsim.scene.sweeps.values import nearest_double
+from rigidsim.store import atomic
+from rigidsim.store.hdf5_sink import sink
+from rigidsim.store.netcdf_file import NetcdfFile, write_box, write_rows, writing
+from rigidsim.store.seal import seal
+from rigidsim.store.sweeps.gathered import Described, Gathered, TileReader
+from rigidsim.store.sweeps.sources import Sources, items_of, plain
+from rigidsim.store.variables import LABELS
+
+_GZIP = 4
+_BOX_NUMBERS = 1 << 22  # numbers of a variable that are gathered at once: 32 MB
+_CHUNK_NUMBERS = 1 << 17
+_SAMPLES = "sample"
+
+RESERVED = {
+    *LABELS,
+    *("time", "sample", "member", "status", "steps", "warnings", "time_reached", "drift_bound"),
+    *(
+        "attitude_error",
+        "position_error",
+        "failed",
+        "failed_member",
+        "failed_reason",
+        "lyapunov",
+        "megno",
+        "fli",
+        "line",
+    ),
+}
+"""Names that an axis can't have."""
+SUFFIXES = ("_final", "_min", "_max", "_mean", "_largest", "_time", "_times", "_count", "_first", "_lo")
+"""Of names of what is kept."""
+
+
+def write_dataset(
+    path: Path,
+    sweep: Sweep,
+    sources: Sources,
+    reader: TileReader,
+    found: Gathered,
+    attributes: Mapping[str, Any],
+) -> str:
+    """Write the dataset in one step for whoever looks; returns the digest of the file.
+
+    Raises:
+        OSError: it can't be written.
+    """
+    with atomic.replacing(path) as temporary:
+        with sink(temporary) as target, writing(target) as file:
+            file.attributes(attributes)
+            beside = _coordinates(file, sweep)
+            created = _declared(file, sweep, found, beside)
+            for name, (target_variable, described) in created.items():
+                item = _item(sources, described.variable.item)
+                for first, shape, flat in boxes(sweep.shape, math.prod(described.extra)):
+                    values = _values(name, described, item, sources, reader, flat)
+                    box = values.reshape(*shape, *described.extra)
+                    write_box(target_variable, (*first, *(0 for _ in described.extra)), box)
+            _write_reasons(file, found.reasons)
+        return seal(temporary)[1]
+
+
+def _item(sources: Sources, name: str) -> str:
+    return next(item for item in sources.found if plain(item) == name)
+
+
+def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
+    """Write the axes; returns the names of coordinates that aren't dimensions."""
+    beside = []
+    for dim, size in zip(sweep.dims, sweep.shape, strict=True):
+        file.dimension(dim, size)
+    for axis in sweep.axes:
+        dim = axis.name if sweep.product else sweep.dims[0]
+        labels: dict[str, Any] = {"long_name": axis.key, "units": axis.unit, "swept_key": axis.key}
+        if not axis.numeric:
+            texts = [_bare(axis.values.text(i)) for i in range(axis.values.count)]
+            del labels["units"]
+            file.texts(axis.name, dim, texts, labels)
+            beside += [] if dim == axis.name else [axis.name]
+            continue
+        numbers = label_numbers(axis)
+        name = axis.name
+        dims: tuple[str, ...] = (dim,)
+        if axis.values.components:
+            name = f"{axis.name}_value" if sweep.product else axis.name
+            file.dimension(f"{axis.name}_component", axis.values.components)
+            dims = (dim, f"{axis.name}_component")
+        if dims != (name,):
+            beside.append(name)
+        write_rows(file.variable(name, dims, labels), 0, numbers)
+    return " ".join(beside)
+
+
+def label_numbers(axis: Axis) -> np.ndarray:
+    """The values of an axis as doubles, (count,) or (count, components); their texts are exact."""
+    rows = [[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)]
+    table = np.array(rows)
+    return table if axis.values.components else table[:, 0]
+
+
+def _bare(text: str) -> str:
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
+
+
+def _declared(
+    file: NetcdfFile, sweep: Sweep, found: Gathered, beside: str
+) -> dict[str, tuple[Any, Described]]:
+    created = {}
+    samples = _SAMPLES
+    if found.times is not None:
+        samples = "time"
+        file.dimension("time", len(found.times))
+        write_rows(
+            file.variable("time", ("time",), {"units": "s", "long_name": "time of the scene"}), 0, found.times
+        )
+    for name, described in sorted(found.variables.items()):
+        if name == "time" and found.times is not None:
+            continue
+        dims = [samples if dim == _SAMPLES else dim for dim in described.variable.dims]
+        for dim, size in zip(dims, described.extra, strict=True):
+            if dim in LABELS:
+                if dim not in created:
+                    file_labels(file, dim)
+            else:
+                file.dimension(dim, size)
+        attributes = {k: v for k, v in described.variable.attributes.items() if v is not None}
+        if beside:
+            attributes["coordinates"] = beside
+        chunk = chunk_shape(sweep.shape, described.extra)
+        small = math.prod(sweep.shape) * math.prod(described.extra) < 512
+        variable = file.table(
+            name, (*sweep.dims, *dims), attributes,
+            chunk=None if small else chunk, gzip=None if small else _GZIP, whole=described.whole,
+        )  # fmt: skip
+        created[name] = (variable, described)
+    return created
+
+
+def file_labels(file: NetcdfFile, dim: str) -> None:
+    """Write the labels of a dimension, once."""
+    if not file.has(dim):
+        file.labels(dim, LABELS[dim], {"long_name": dim.replace("_", " ")})
+
+
+def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]:
+    """Whole trailing dimensions, and as much of the one before them as makes a megabyte."""
+    left = max(1, _CHUNK_NUMBERS // max(1, math.prod(extra)))
+    chunk = []
+    for size in reversed(members):
+        taken = max(1, min(size, left))
+        chunk.append(taken)
+        left = max(1, left // taken) if taken == size else 1
+    return (*reversed(chunk), *(max(1, n) for n in extra))
+
+
+def boxes(
+    members: Sequence[int], extra: int, numbers: int = _BOX_NUMBERS
+) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], range]]:
+    """Consecutive members that are a box of their dimensions: first corner, shape, and which they are.
+
+    Args:
+        members: along each of their dimensions.
+        extra: numbers of one member.
+        numbers: of a box, unless a single member has more.
+    """
+    most = max(1, numbers // max(1, extra))
+    axis, within = len(members) - 1, 1
+    while axis > 0 and within * members[axis] <= most:
+        within *= members[axis]
+        axis -= 1
+    step = max(1, min(members[axis], most // within))
+    block = within * members[axis]
+    for number in range(math.prod(members[:axis])):
+        leading = np.unravel_index(number, members[:axis]) if axis else ()
+        for low in range(0, members[axis], step):
+            high = min(low + step, members[axis])
+            first = (*(int(i) for i in leading), low, *(0 for _ in members[axis + 1 :]))
+            shape = (*(1 for _ in leading), high - low, *members[axis + 1 :])
+            begin = number * block + low * within
+            yield first, shape, range(begin, begin + (high - low) * within)
+
+
+def _values(
+    name: str, described: Described, item: str, sources: Sources, reader: TileReader, flat: range
+) -> np.ndarray:
+    source = sources.found[item]
+    part = slice(flat.start, flat.stop)
+    keys = source.generation[part].astype(np.int64) << 32 | source.tile[part]
+    rows = source.row[part]
+    values = np.full(
+        (len(keys), *described.extra), 0 if described.whole else np.nan,
+        dtype=np.int64 if described.whole else np.float64,
+    )  # fmt: skip
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(keys)) + 1, [len(keys)]])
+    for low, high in pairwise(edges):
+        if keys[low] < 0:
+            continue
+        held = reader.tile(int(keys[low]) >> 32, int(keys[low]) & 0xFFFFFFFF).arrays.get(name)
+        if held is not None:
+            values[(slice(low, high), *(slice(0, n) for n in held.shape[1:]))] = held[rows[low:high]]
+    return values
+
+
+def _write_reasons(file: NetcdfFile, reasons: Mapping[int, str]) -> None:
+    if not reasons:
+        return
+    members = sorted(reasons)
+    file.dimension("failed", len(members))
+    numbers = file.table(
+        "failed_member", ("failed",), {"long_name": "which members didn't end well, the last axis fastest"},
+        chunk=None, gzip=None, whole=True,
+    )  # fmt: skip
+    write_box(numbers, (0,), np.array(members, dtype=np.int64))
+    file.texts("failed_reason", "failed", [reasons[m] for m in members], {"long_name": "why"})
+
+
+def kept_items(sweep: Sweep) -> tuple[str, ...]:
+    """For messages and attributes."""
+    return tuple(plain(item) for item in items_of(sweep))

@@ -1,0 +1,176 @@
+"""The folder of a sweep: ``config.toml``, ``tiles/``, ``dataset.h5``, ``summary.json``."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import secrets
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
+from rigidsim.scene.records import dataclass
+from rigidsim.store import atomic
+from rigidsim.store.sweeps.generation import Generation
+from rigidsim.store.sweeps.tile import Tile, read_tile
+from rigidsim.store.work_folder import WorkFolder
+
+KIND = "sweep"
+_GENERATION = re.compile(r"g(\d{3})\.json")
+
+
+@dataclass(frozen=True)
+class SweepFolder(WorkFolder):
+    """Paths of one sweep, and what lies there."""
+
+    kept = "the tiles that are complete stay"
+    resumed = "computes the others"
+    seen_by = fcntl.LOCK_EX
+
+    @property
+    def tiles(self) -> Path:
+        """Generations and their tiles."""
+        return self.path / "tiles"
+
+    @property
+    def is_sweep(self) -> bool:
+        """Whether one lies here."""
+        return self.tiles.is_dir() or self.read_summary().get("kind") == KIND
+
+    def read_summary(self) -> dict[str, Any]:
+        """What ``summary.json`` says; empty without one."""
+        try:
+            content = json.loads(self.summary.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+    def generations(self) -> list[Generation]:
+        """All of them, the oldest first.
+
+        Raises:
+            RunFolderError: one is damaged.
+        """
+        if not self.tiles.is_dir():
+            return []
+        found = [(path, _GENERATION.fullmatch(path.name)) for path in sorted(self.tiles.iterdir())]
+        return [Generation.read(path, int(match[1])) for path, match in found if match]
+
+    def add(self, generation: Generation, *, exclusive: bool = False) -> Generation:
+        """Write a generation, whose tiles may be computed from now on.
+
+        Args:
+            exclusive: others may write the same one at the same time; the first counts.
+
+        Returns:
+            The one that is there.
+        """
+        self.tiles.mkdir(parents=True, exist_ok=True)
+        path = self.tiles / f"g{generation.number:03d}.json"
+        if exclusive:
+            mine = self.tiles / f".{path.name}.{secrets.token_hex(8)}.{os.getpid()}.partial"
+            mine.write_text(generation.as_text(), encoding="utf-8")
+            try:
+                os.link(mine, path)
+            except FileExistsError:
+                return Generation.read(path, generation.number)
+            finally:
+                mine.unlink(missing_ok=True)
+        else:
+            atomic.write_bytes(path, generation.as_text().encode())
+        atomic.write_bytes(self.config, generation.config.encode())
+        return generation
+
+    def tile(self, generation: Generation, tile: int) -> Path:
+        """Where a tile lies."""
+        return self.tiles / f"g{generation.number:03d}-{tile:07d}.h5"
+
+    def present(self, generation: Generation) -> np.ndarray:
+        """Which tiles of a generation are there, (tiles,) bool."""
+        there = np.zeros(generation.tiles, dtype=bool)
+        pattern = re.compile(rf"g{generation.number:03d}-(\d{{7}})\.h5")
+        if self.tiles.is_dir():
+            for entry in os.scandir(self.tiles):
+                match = pattern.fullmatch(entry.name)
+                if match and int(match[1]) < len(there):
+                    there[int(match[1])] = True
+        return there
+
+    def read(self, generation: Generation, tile: int) -> Tile:
+        """A tile, checked.
+
+        Raises:
+            RunFolderError: damaged, or not what belongs there.
+        """
+        path = self.tile(generation, tile)
+        found = read_tile(path, generation.config_sha256)
+        if not np.array_equal(found.members, generation.members_of(tile)):
+            raise RunFolderError(f"{path}: holds other members than belong there; remove it, and {RESUME} "
+                                 "computes it again")  # fmt: skip
+        return found
+
+    def save(self, generation: Generation, tile: int, image: bytes) -> None:
+        """Write a tile; on return it is saved."""
+        atomic.write_bytes(self.tile(generation, tile), image)
+
+    def begin(self, *, force: bool) -> None:
+        """Make the folder ready for a sweep.
+
+        Raises:
+            RunFolderError: something else lies there, or it can't be written.
+        """
+        ours = {"config.toml", "tiles", "dataset.h5", "summary.json"}
+        try:
+            self.refuse_a_file()
+            self.path.mkdir(parents=True, exist_ok=True)
+            there = [p for p in self.path.iterdir() if not p.name.startswith(".")]
+            for path in there:
+                if path.is_symlink():
+                    raise RunFolderError(f"{path}: is a symbolic link, which no sweep writes; remove it")
+                if path.name not in ours and not path.name.startswith("figure"):
+                    raise RunFolderError(
+                        f"{self.path}: holds {path.name}, which no sweep writes; choose another {OUT} or name"
+                    )
+            if there and not self.is_sweep and not force:
+                raise RunFolderError(f"{self.path}: holds a run; {FORCE} replaces it, another {OUT} or name "
+                                     "puts the sweep elsewhere")  # fmt: skip
+            if force:
+                for path in (self.summary, self.dataset, self.config):
+                    path.unlink(missing_ok=True)
+                if self.tiles.exists():
+                    shutil.rmtree(self.tiles)
+            self.remove_torn()
+        except OSError as error:
+            raise self.unwritable(error) from None
+
+    def remove_torn(self) -> None:
+        """Delete what killed processes were writing."""
+        for folder in (self.path, self.tiles):
+            for path in folder.glob(".*.partial"):
+                if not _alive(path):
+                    path.unlink(missing_ok=True)
+
+    def write_summary(self, content: dict[str, Any]) -> None:
+        """Write ``summary.json`` atomically."""
+        text = json.dumps({"kind": KIND, **content}, indent=2, allow_nan=False)
+        atomic.write_bytes(self.summary, (text + "\n").encode())
+
+
+def _alive(partial: Path) -> bool:
+    """Whether the process that writes a temporary file is still there (on this machine)."""
+    number = partial.name.split(".")[-2]
+    return number.isdigit() and Path(f"/proc/{number}").exists()
+
+
+def is_sweep(path: str | Path) -> bool:
+    """Whether a sweep lies at a folder, or beside a file."""
+    given = Path(path)
+    try:
+        return SweepFolder(given if given.is_dir() else given.parent).is_sweep
+    except OSError:
+        return False

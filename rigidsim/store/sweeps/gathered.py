@@ -1,0 +1,132 @@
+"""The tiles of a sweep, read once and checked: which variables they hold, of which sizes, at which times."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import RunFolderError
+from rigidsim.scene.records import dataclass
+from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.generation import Generation
+from rigidsim.store.sweeps.sources import ALWAYS, Sources, plain
+from rigidsim.store.sweeps.tile import Tile, TileVariable
+
+_TILES_IN_MEMORY = 96
+
+
+@dataclass
+class Described:
+    """A variable as the tiles have it.
+
+    Attributes:
+        extra: sizes of the dimensions beside the members', the largest of any tile.
+    """
+
+    variable: TileVariable
+    whole: bool
+    extra: tuple[int, ...]
+
+
+@dataclass
+class Gathered:
+    """What the tiles hold, before their numbers are read again.
+
+    Attributes:
+        times: sample times that all members have; None where they differ, or aren't kept.
+        reasons: by member, of those that didn't end well.
+        made: of each tile, see ``Tile``.
+    """
+
+    variables: dict[str, Described] = field(default_factory=dict)
+    times: np.ndarray | None = None
+    reasons: dict[int, str] = field(default_factory=dict)
+    made: list[Mapping[str, Any]] = field(default_factory=list)
+
+
+class TileReader:
+    """Tiles of a folder, the latest in memory."""
+
+    def __init__(self, folder: SweepFolder, generations: Sequence[Generation]) -> None:
+        self._folder = folder
+        self._generations = {generation.number: generation for generation in generations}
+        self._held: OrderedDict[tuple[int, int], Tile] = OrderedDict()
+
+    def tile(self, generation: int, tile: int) -> Tile:
+        """One of them, checked when it is read.
+
+        Raises:
+            RunFolderError: it is damaged.
+        """
+        key = generation, tile
+        if key in self._held:
+            self._held.move_to_end(key)
+            return self._held[key]
+        found = self._folder.read(self._generations[generation], tile)
+        self._held[key] = found
+        if len(self._held) > _TILES_IN_MEMORY:
+            self._held.popitem(last=False)
+        return found
+
+
+def gather(sources: Sources, reader: TileReader) -> Gathered:
+    """Read every tile that is used once.
+
+    Raises:
+        RunFolderError: one is damaged, or two say different things of one variable.
+    """
+    found = Gathered()
+    wanted = {plain(item) for item in sources.found}
+    common: np.ndarray | None = None
+    alike = True
+    always = sources.found[ALWAYS]
+    for generation, number in _tiles(sources):
+        tile = reader.tile(generation, number)
+        found.made.append(tile.made)
+        for name, variable in tile.variables.items():
+            if variable.item not in wanted:
+                continue
+            values = tile.arrays.get(name, np.zeros((len(tile.members), *(0 for _ in variable.dims))))
+            known = found.variables.get(name)
+            if known is None:
+                whole = values.dtype.kind == "i"
+                found.variables[name] = Described(variable, whole, values.shape[1:])
+            elif known.variable.dims != variable.dims:
+                raise RunFolderError(f"tiles {generation} and {number} disagree about {name}")
+            else:
+                known.extra = tuple(map(max, known.extra, values.shape[1:]))
+        if "time" in tile.arrays and alike:
+            common, alike = _common(common, tile.arrays["time"])
+        if tile.reasons:
+            mine = (always.generation == generation) & (always.tile == number)
+            for member in np.flatnonzero(mine):
+                why = tile.reasons.get(int(always.row[member]))
+                if why is not None:
+                    found.reasons[int(member)] = why
+    found.times = common if alike else None
+    return found
+
+
+def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | None, bool]:
+    """The longest row of times, and whether all others begin it."""
+    counts = (~np.isnan(rows)).sum(axis=1)
+    longest = rows[int(np.argmax(counts)), : int(counts.max())]
+    if known is None or len(longest) > len(known):
+        known, longest = longest, known if known is not None else longest
+    width = min(rows.shape[1], len(known))
+    agree = np.isnan(rows[:, :width]) | (rows[:, :width] == known[:width])
+    return known, bool(agree.all()) and np.array_equal(known[: len(longest)], longest)
+
+
+def _tiles(sources: Sources) -> list[tuple[int, int]]:
+    """All tiles that something lies in."""
+    found: set[tuple[int, int]] = set()
+    for source in sources.found.values():
+        there = ~source.missing
+        keys = source.generation[there].astype(np.int64) << 32 | source.tile[there]
+        found |= {(int(key) >> 32, int(key) & 0xFFFFFFFF) for key in np.unique(keys)}
+    return sorted(found)

@@ -1,0 +1,126 @@
+"""A sweep on disk: its dataset, read lazily, and what is known of it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidsim.errors import RESUME, RunFolderError
+from rigidsim.scene.records import dataclass
+from rigidsim.store.seal import check_whole
+from rigidsim.store.sweeps.folder import SweepFolder
+
+if TYPE_CHECKING:
+    import xarray
+
+_RECENT = 20  # tiles by which the rate is told
+
+
+@dataclass(frozen=True, repr=False)
+class SavedSweep:
+    """A sweep, finished or not.
+
+    Attributes:
+        folder: its files.
+        summary: what is known of it; of an unfinished one from its tiles.
+    """
+
+    folder: SweepFolder
+    summary: dict[str, Any]
+
+    @property
+    def place(self) -> str:
+        """Its folder."""
+        return str(self.folder.path)
+
+    @property
+    def status(self) -> str:
+        """ "finished", "running", "interrupted" ..."""
+        return str(self.summary["status"])
+
+    @property
+    def finished(self) -> bool:
+        """Whether all members are there."""
+        return self.status == "finished"
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """All members, read lazily.
+
+        Raises:
+            RunFolderError: the sweep isn't finished, or its dataset is damaged.
+        """
+        import xarray
+
+        from rigidsim.store.xarray_reader import NetcdfBackend
+
+        if not self.folder.dataset.exists():
+            raise RunFolderError(f"{self.place}: has no dataset.h5 yet; {RESUME} completes it")
+        _, digest = check_whole(self.folder.dataset)
+        expected = self.summary.get("dataset_sha256")
+        if expected not in (None, digest):
+            raise RunFolderError(
+                f"{self.folder.dataset}: isn't the dataset that summary.json beside it was written for"
+            )
+        return xarray.open_dataset(self.folder.dataset, engine=NetcdfBackend, chunks=None)
+
+    def __repr__(self) -> str:
+        return f"<Sweep {self.summary.get('name', '')!r} ({self.place}): {self.status}>"
+
+
+def open_sweep(path: str | Path) -> SavedSweep:
+    """Open the folder of a sweep, or the dataset in it, finished or not.
+
+    Raises:
+        RunFolderError: there is none.
+    """
+    given = Path(path)
+    folder = SweepFolder(given if given.is_dir() else given.parent)
+    if not folder.is_sweep:
+        raise RunFolderError(f"{path}: no sweep here; give the folder of one (runs/NAME)")
+    return SavedSweep(folder, so_far(folder))
+
+
+def so_far(folder: SweepFolder) -> dict[str, Any]:
+    """The summary; of a sweep that isn't finished what its tiles tell."""
+    summary = folder.read_summary()
+    generations = folder.generations()
+    if not generations:
+        return summary
+    latest = generations[-1]
+    present = folder.present(latest)
+    ended = summary.get("config_sha256") == latest.config_sha256
+    if summary and ended and bool(present.all()):
+        return summary
+    busy = folder.at_work
+    done = int(sum(len(latest.members_of(int(t))) for t in np.flatnonzero(present)))
+    status = "running" if busy else ("interrupted" if not ended else summary.get("status", "interrupted"))
+    words = "a process is at work on it" if busy else "the tiles that are complete are kept"
+    rate = _rate(folder, latest.number, latest.length) if busy else None
+    left = latest.members - done
+    return {
+        "kind": "sweep",
+        "name": folder.path.name,
+        "status": status,
+        "message": f"{done:,} of {latest.members:,} members to be run are done; {words}",
+        "exit_code": 0 if busy else 130,
+        "members": latest.members,
+        "members_done": done,
+        "tiles": latest.tiles,
+        "tiles_done": int(present.sum()),
+        "members_per_second": rate,
+        "seconds_left": left / rate if rate else None,
+        "config_sha256": latest.config_sha256,
+    }
+
+
+def _rate(folder: SweepFolder, generation: int, length: int) -> float | None:
+    """Members a second, from when the latest tiles were written."""
+    times = sorted(path.stat().st_mtime for path in folder.tiles.glob(f"g{generation:03d}-*.h5"))[-_RECENT:]
+    if len(times) < 2:
+        return None
+    span = max(time.time(), times[-1]) - times[0]
+    return length * (len(times) - 1) / span if span > 0 else None

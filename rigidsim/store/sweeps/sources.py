@@ -1,0 +1,135 @@
+"""Which tile holds what of which member, over all generations of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import field
+
+import numpy as np
+
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.generation import Generation, Work, ranges_of
+
+ALWAYS = "always"
+"""The item of what is kept of every member."""
+_NOWHERE = -1
+
+
+def items_of(sweep: Sweep) -> tuple[str, ...]:
+    """What is kept of a sweep's members, each as it is known by: how many events are kept is part of it."""
+    counted = {name: f"{name}:{sweep.table.most_events}" for name in ("events", "section")}
+    return tuple(counted.get(name, name) for name in sweep.table.keep)
+
+
+def plain(item: str) -> str:
+    """As ``[sweep] keep`` calls it."""
+    return item.partition(":")[0]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where an item lies of each member, (members,): a tile of a generation, and the place in it; -1 where it
+    lies nowhere.
+    """
+
+    generation: np.ndarray
+    tile: np.ndarray
+    row: np.ndarray
+
+    @classmethod
+    def nowhere(cls, count: int) -> Source:
+        """Of no member."""
+        return cls(
+            np.full(count, _NOWHERE, dtype=np.int16),
+            np.full(count, _NOWHERE, dtype=np.int32),
+            np.full(count, _NOWHERE, dtype=np.int32),
+        )
+
+    @property
+    def missing(self) -> np.ndarray:
+        """Of which members it lies nowhere."""
+        return self.generation == _NOWHERE
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Where what is kept of a sweep's members lies, by item; ``ALWAYS`` with them."""
+
+    found: dict[str, Source] = field(default_factory=dict)
+
+    def works(self) -> tuple[Work, ...]:
+        """What is still to be computed: members of which the same is missing go together."""
+        items = list(self.found)
+        if not items:
+            return ()
+        pattern = sum(
+            (source.missing.astype(np.int64) << bit for bit, source in enumerate(self.found.values())),
+            start=np.zeros(len(next(iter(self.found.values())).tile), dtype=np.int64),
+        )
+        works = []
+        for value in sorted(set(np.unique(pattern).tolist()) - {0}, reverse=True):
+            keep = tuple(item for bit, item in enumerate(items) if value >> bit & 1 and item != ALWAYS)
+            works.append(Work(keep, ranges_of(np.flatnonzero(pattern == value))))
+        return tuple(works)
+
+
+def sources_of(sweep: Sweep, folder: SweepFolder, generations: Sequence[tuple[Generation, Sweep]]) -> Sources:
+    """Where everything lies that a sweep asks for; the oldest that there is of each.
+
+    Args:
+        generations: of the folder, with the sweeps that their configs describe.
+    """
+    found = {item: Source.nowhere(sweep.count) for item in (ALWAYS, *items_of(sweep))}
+    for generation, then in generations:
+        old = positions(sweep, then)
+        present = folder.present(generation)
+        before = 0
+        for work, count in zip(generation.works, generation.tile_counts, strict=True):
+            places = work.places(old)
+            tiles = np.where(places >= 0, before + places // generation.length, 0)
+            there = (places >= 0) & present[tiles] if len(present) else np.zeros(len(old), dtype=bool)
+            for item, source in found.items():
+                if item == ALWAYS or item in work.keep:
+                    new = there & source.missing
+                    source.generation[new] = generation.number
+                    source.tile[new] = tiles[new]
+                    source.row[new] = places[new] % generation.length
+            before += count
+    return Sources(found)
+
+
+def positions(sweep: Sweep, then: Sweep) -> np.ndarray:
+    """Of each member of a sweep, which member of another it is; -1 where it is none."""
+    if _same_axes(sweep, then):
+        return np.arange(sweep.count)
+    keys, old_keys = [axis.key for axis in sweep.axes], [axis.key for axis in then.axes]
+    if sorted(keys) != sorted(old_keys):
+        return np.full(sweep.count, _NOWHERE)
+    order = [old_keys.index(key) for key in keys]  # of the other's axes, as this one's stand
+    if sweep.product and then.product:
+        strides = np.array([int(np.prod(then.shape[i + 1 :])) for i in range(len(then.axes))], dtype=np.int64)
+        flat = np.zeros(sweep.shape, dtype=np.int64)
+        absent = np.zeros(sweep.shape, dtype=bool)
+        for place, number in enumerate(order):
+            known = {then.axes[number].values.text(i): i for i in range(then.axes[number].values.count)}
+            values = sweep.axes[place].values
+            index = np.array([known.get(values.text(i), _NOWHERE) for i in range(values.count)])
+            index = index.reshape([-1 if i == place else 1 for i in range(len(keys))])
+            absent |= index == _NOWHERE
+            flat += np.where(index == _NOWHERE, 0, index) * strides[number]
+        return np.where(absent, _NOWHERE, flat).reshape(-1)
+    known_members: dict[tuple[str, ...], int] = {}
+    for member in range(then.count):
+        texts = then.texts(member)
+        known_members.setdefault(tuple(texts[number] for number in order), member)
+    return np.array([known_members.get(sweep.texts(m), _NOWHERE) for m in range(sweep.count)], dtype=np.int64)
+
+
+def _same_axes(sweep: Sweep, then: Sweep) -> bool:
+    return (
+        sweep.table.axes == then.table.axes
+        and list(sweep.table.axes) == list(then.table.axes)
+        and (sweep.table.mode, sweep.table.seed) == (then.table.mode, then.table.seed)
+    )

@@ -1,0 +1,259 @@
+"""Members of a tile in batches: families that share their equations, and what is left to run one by one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rigidsim.accuracy.estimates.member_estimate import MemberErrors, MemberEstimates
+from rigidsim.errors import ConfigError
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.kept import Kept, KeptVariable, Points, Series, kept_events, kept_of_series
+from rigidsim.session.members import (
+    ENDED_WELL,
+    OUTCOMES,
+    MemberResults,
+    Outcome,
+    failed,
+    plain_variables,
+    status_variable,
+    warning_bits,
+    warnings_variable,
+)
+from rigidsim.session.variables import dataset_variables
+from rigidsim.solve.batch.family import Families, Family, batchable
+from rigidsim.solve.batch.members import AxisNumbers, Members
+from rigidsim.solve.batch.run import BatchBlock, BatchRun
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.status import Status
+from rigidsim.store.summary_parts import WarningCode
+from rigidsim.store.variables import Variable
+
+_ONE_BY_ONE = ("frequencies",)
+"""What is kept of single runs alone."""
+
+
+@dataclass
+class Batched:
+    """What a batch made of a tile's members.
+
+    Attributes:
+        results: of those that it ran, or that no run accepts.
+        members: their places in the tile.
+        left: places of those that are to be run one by one.
+        why: these are, of the first of them; empty where none is.
+        estimating: seconds of CPU that estimates of errors took.
+    """
+
+    results: list[MemberResults]
+    members: list[np.ndarray]
+    left: list[int]
+    why: str
+    estimating: float = 0.0
+
+
+def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
+    """Code of the reason that no member of a sweep runs in a batch; empty where some may."""
+    for item in _ONE_BY_ONE:
+        if item in keep:
+            return item
+    if not sweep.table.batch:
+        return "asked"
+    if sweep.base.config.limits.wall_time is not None:
+        return "wall_time"
+    reason = batchable(sweep.base, [])
+    return "" if reason is None else reason.name.lower()
+
+
+class BatchTiles:
+    """The families of a sweep, traced and compiled once in a process.
+
+    Args:
+        hidden: what is recorded for indicators alone.
+    """
+
+    def __init__(self, sweep: Sweep, hidden: Sequence[str]) -> None:
+        self._sweep = sweep
+        self._hidden = hidden
+        self._axes = AxisNumbers(sweep)
+        self._known: list[Family] = []
+        self._runs: dict[int, tuple[BatchRun, list[Variable]]] = {}
+        self._estimates: dict[int, MemberEstimates] = {}
+
+    def run(self, members: Sequence[int], keep: Sequence[str]) -> Batched:
+        """Run as many members as can be run together."""
+        families = Families(Members.of(self._sweep, members, self._axes))
+        families.known = self._known
+        found = families.sort()
+        done = Batched([], [], sorted(found.alone), "")
+        if found.alone:
+            done.why = found.alone[done.left[0]].name.lower()
+        for place, error in found.refused.items():
+            reason = "; ".join(str(problem) for problem in error.problems)
+            done.results.append(failed(Outcome.REFUSED, reason))
+            done.members.append(np.array([place]))
+        for family, numbers in found.groups:
+            run, variables = self._run_of(family, int(members[int(numbers.members[0])]))
+            for block in run.blocks(numbers):
+                before = time.process_time()
+                errors = self._estimate_of(family, run).of(numbers, block) if self._estimated else None
+                done.estimating += time.process_time() - before
+                self._take(block, errors, variables, keep, done)
+        done.left.sort()
+        return done
+
+    def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], bool]:
+        """Of some members those that no run accepts; nothing is integrated.
+
+        Args:
+            most: of them, after which no more are looked for.
+
+        Returns:
+            What is wrong with each, and whether any member at all shares its equations with others: of those
+            that don't nothing is known.
+        """
+        families = Families(Members.of(self._sweep, members, self._axes), most)
+        families.known = self._known
+        found = families.sort()
+        return {int(members[place]): error for place, error in found.refused.items()}, bool(found.groups)
+
+    def _run_of(self, family: Family, member: int) -> tuple[BatchRun, list[Variable]]:
+        if id(family) not in self._runs:
+            experiment: Experiment = self._sweep.worked_out(member)
+            variables = [v for v in dataset_variables(prepare(experiment)) if "units" in v.attributes]
+            self._runs[id(family)] = BatchRun(family), variables
+        return self._runs[id(family)]
+
+    @property
+    def _estimated(self) -> bool:
+        return self._sweep.base.config.output.estimate
+
+    def _estimate_of(self, family: Family, run: BatchRun) -> MemberEstimates:
+        if id(family) not in self._estimates:
+            self._estimates[id(family)] = MemberEstimates(family, run.width)
+        return self._estimates[id(family)]
+
+    def _take(
+        self,
+        block: BatchBlock,
+        errors: MemberErrors | None,
+        variables: Sequence[Variable],
+        keep: Sequence[str],
+        done: Batched,
+    ) -> None:
+        gave_up = np.array([status is None for status in block.status], dtype=bool)
+        kept = _kept(block, variables, keep, self._sweep.table.most_events, self._hidden)
+        statuses = block.status.copy()
+        statuses[gave_up] = Status.NON_FINITE
+        kept["status"] = status_variable(_outcome_codes(statuses))
+        drifts = [np.abs(values) for values in block.drifts.values()]
+        nothing = np.zeros(len(gave_up))
+        worst = np.max([np.nanmax(d, axis=0, initial=0) for d in drifts], axis=0) if drifts else nothing
+        over = worst > block.drift_bound
+        warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
+        if errors is not None:
+            gone = WarningCode.RATES_UNCERTAIN if errors.attitude is None else WarningCode.ATTITUDE_UNCERTAIN
+            warned[gone] = errors.uncertain
+        bits = [np.where(found, warning_bits([code.value]), 0) for code, found in warned.items()]
+        kept["warnings"] = warnings_variable(np.bitwise_or.reduce(bits))
+        rows = np.maximum(block.reached - 1, 0)
+        reached = np.where(block.reached > 0, block.times[rows], np.nan)
+        kept |= plain_variables(
+            steps=block.steps,
+            reached=reached,
+            bound=block.drift_bound,
+            attitude_error=None if errors is None else errors.attitude,
+            position_error=None if errors is None else errors.position,
+        )
+        chosen = np.flatnonzero(~gave_up)
+        done.left += block.members[gave_up].tolist()
+        if len(chosen) < len(statuses):
+            done.why = done.why or "gave_up"
+            kept, statuses = rows_of(kept, chosen), statuses[chosen]
+        badly = ~np.isin(kept["status"].values, [OUTCOMES.index(name) for name in ENDED_WELL])
+        reasons = {place: statuses[place].message for place in np.flatnonzero(badly).tolist()}
+        if len(chosen):
+            engines = {f"batch of {block.width}": len(chosen)}
+            done.results.append(MemberResults(kept, reasons, engines))
+            done.members.append(block.members[chosen])
+
+
+def _lost(block: BatchBlock) -> np.ndarray:
+    """Members of which a recorded variable isn't defined past a sample at which it is, (members,)."""
+    found = np.zeros(len(block.members), dtype=bool)
+    for values in block.values.values():
+        bad = np.asarray(np.isnan(values).reshape(*values.shape[:2], -1).any(axis=2))
+        if bad.any():
+            taken = np.arange(len(bad))[:, None] < block.reached
+            known = np.logical_or.accumulate(~bad & taken, axis=0)
+            found |= (bad & taken & known).any(axis=0)
+    return found
+
+
+def _outcome_codes(statuses: np.ndarray) -> np.ndarray:
+    codes = np.zeros(len(statuses), dtype=np.int64)
+    for status in Status:
+        if status.value in OUTCOMES:
+            codes[statuses == status] = OUTCOMES.index(status.value)
+    return codes
+
+
+def rows_of(kept: Kept, rows: np.ndarray) -> Kept:
+    """What was kept of some of the members, in the order given."""
+    return {name: KeptVariable(v.dims, v.values[rows], v.attributes, v.item) for name, v in kept.items()}
+
+
+def in_order(parts: Sequence[MemberResults], members: Sequence[np.ndarray]) -> MemberResults:
+    """Groups of a tile's members as one, each at its place.
+
+    Args:
+        members: places of each group's members.
+    """
+    places = np.concatenate(members)
+    whole = MemberResults.together(parts)
+    order = np.argsort(places, kind="stable")
+    reasons = {int(places[row]): why for row, why in whole.reasons.items()}
+    return replace(whole, kept=rows_of(whole.kept, order), reasons=reasons)
+
+
+def _kept(
+    block: BatchBlock,
+    variables: Sequence[Variable],
+    keep: Sequence[str],
+    most_events: int,
+    hidden: Sequence[str],
+) -> Kept:
+    series, recorded = [], {}
+    for variable in variables:
+        if variable.name in block.values:
+            values = np.moveaxis(block.values[variable.name], 0, 1)
+            recorded[variable.name] = variable
+        elif variable.name in block.drifts:
+            values = block.drifts[variable.name].T[:, :, None]
+        else:
+            continue
+        series.append(Series(variable, [values]))
+    kept = kept_of_series(series, block.times, block.reached, keep, hidden)
+    recorded = {name: variable for name, variable in recorded.items() if name not in hidden}
+    for event in block.events:
+        edges = np.searchsorted(event.member, np.arange(len(block.members) + 1))
+        times = [event.time[a:b] for a, b in pairwise(edges)]
+        points: Points = {
+            name: (recorded[name], [values[a:b] for a, b in pairwise(edges)])
+            for name, values in event.values.items()
+            if name in recorded
+        }
+        if not event.values:
+            empty = [np.zeros((0, max(1, int(np.prod(v.shape))))) for v in recorded.values()]
+            points = {
+                name: (variable, [nothing] * len(block.members))
+                for (name, variable), nothing in zip(recorded.items(), empty, strict=True)
+            }
+        kept |= kept_events(event.name, times, most_events, points, keep)
+    return kept

@@ -1,0 +1,126 @@
+"""Tiles computed by the workers of a Dask cluster; their files come back here and are saved here.
+
+The workers need rigidsim and nothing of this machine's disk. Only a few tiles for each of their threads are
+out at any time, so that neither the scheduler nor this process ever holds many.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rigidsim.errors import RigidsimError, StoppedError
+from rigidsim.store.sweeps.generation import Generation
+from rigidsim.workflows.sweeps.members import tile_image
+from rigidsim.workflows.sweeps.ways import task
+
+_AHEAD = 2  # tiles for each thread
+_MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
+_LOOK_SECONDS = 5
+_TELL_SECONDS = 0.2
+_ALONE_SECONDS = 120  # without any worker, after which nobody waits any more
+
+
+class Cluster:
+    """A Dask scheduler's workers.
+
+    Args:
+        address: of the scheduler, such as ``tcp://10.0.0.1:8786``.
+        patience: seconds in which it must answer.
+    """
+
+    def __init__(self, address: str, patience: float = 20.0) -> None:
+        self._address, self._patience = address, patience
+
+    def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
+        """See ``Way``.
+
+        Raises:
+            RigidsimError: Dask isn't installed, or no scheduler answers.
+            StoppedError: workers die again and again at the same tile, or the scheduler went.
+        """
+        distributed = _distributed()
+        try:
+            client = distributed.Client(self._address, timeout=self._patience, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise RigidsimError(
+                f"--scheduler {self._address}: no Dask scheduler answers ({error or type(error).__name__}); "
+                "start one with: dask scheduler"
+            ) from None
+        with client:
+            try:
+                yield from self._stream(distributed, client, generation, list(reversed(tiles)))
+            except (OSError, RuntimeError) as error:  # what Dask raises of a connection that is gone
+                if client.status == "running":
+                    raise
+                raise StoppedError(
+                    f"--scheduler {self._address}: the scheduler is gone; start it again, with its workers, "
+                    "and give the command again; the tiles that are complete are kept"
+                ) from error
+
+    def _stream(
+        self, distributed: Any, client: Any, generation: Generation, waiting: list[int]
+    ) -> Iterator[tuple[int, bytes]]:
+        deaths: Counter[int] = Counter()
+        running: dict[Any, int] = {}
+        alone_since: float | None = None
+        while waiting or running:
+            threads = sum(client.nthreads().values())
+            alone_since = None if threads else (alone_since or time.monotonic())
+            if alone_since is not None and time.monotonic() - alone_since > _ALONE_SECONDS:
+                raise StoppedError(
+                    f"--scheduler {self._address}: no worker is left there; start some with: dask worker "
+                    f"{self._address}, and give the command again; the tiles that are complete are kept"
+                )
+            ahead = _AHEAD * max(1, threads)
+            while waiting and len(running) < ahead:
+                tile = waiting.pop()
+                future = client.submit(tile_image, *task(generation, tile), pure=False, retries=2)
+                running[future] = tile
+            done = _first_done(distributed, client, list(running))
+            if done is None:
+                continue
+            future, tile = done, running.pop(done)
+            try:
+                image = future.result()
+            except distributed.KilledWorker:
+                deaths[tile] += 1
+                if deaths[tile] >= _MOST_DEATHS:
+                    members = generation.members_of(tile)
+                    raise StoppedError(
+                        f"workers died again and again while members {members[0]} to {members[-1]} were in "
+                        "work; give workers more memory, or take a smaller [sweep] tile"
+                    ) from None
+                waiting.append(tile)
+                continue
+            except distributed.CancelledError:  # the scheduler lost it with the worker that had it
+                waiting.append(tile)
+                continue
+            yield tile, image
+
+
+def _first_done(distributed: Any, client: Any, futures: list[Any]) -> Any:
+    """One that ended; None where none does within some seconds."""
+    try:
+        with client.as_current():
+            found = distributed.wait(futures, timeout=_LOOK_SECONDS, return_when="FIRST_COMPLETED")
+    except TimeoutError:
+        return None
+    except distributed.CancelledError:  # one of them was lost with the worker that had it
+        lost = next((future for future in futures if future.status == "cancelled"), None)
+        if lost is None:  # it isn't told yet which
+            time.sleep(_TELL_SECONDS)
+        return lost
+    return next(iter(found.done), None)
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise RigidsimError(
+            "--scheduler needs Dask, which isn't installed; pip install 'rigidsim[cluster]'"
+        ) from None
+    return distributed

@@ -1,0 +1,164 @@
+"""Members of a sweep, computed tile by tile: in a batch where that is possible, else one by one."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem, RigidsimError
+from rigidsim.model.tangents import GROWTH
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.kept import Kept, KeptVariable
+from rigidsim.session.members import MemberResults, run_alone
+from rigidsim.solve.problem import prepare
+from rigidsim.store import provenance
+from rigidsim.store.memory import MemoryRun
+from rigidsim.store.sweeps.sources import plain
+from rigidsim.store.sweeps.tile import Tile, TileVariable
+from rigidsim.workflows.analyse import analyse
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.run import run
+from rigidsim.workflows.sweeps.batch import Batched, BatchTiles, in_order, why_alone
+
+_LINES = 5  # of each signal's spectrum
+
+
+@lru_cache(maxsize=4)
+def sweep_of(config: str) -> Sweep:
+    """The sweep of a config's text, worked out once in a process."""
+    return recording(Sweep.of(parse(config, source="the sweep's config")))
+
+
+INDICATORS = ("megno", "fli", "lyapunov")
+"""What is kept of how a tangent vector grew, which is recorded for it."""
+
+
+def recording(sweep: Sweep) -> Sweep:
+    """A sweep whose members record what is to be kept of them.
+
+    Raises:
+        ConfigError: the base experiment can't be run, so that nobody knows what it records.
+    """
+    output = sweep.base.config.output
+    if not set(sweep.table.keep) & set(INDICATORS) or GROWTH in (output.record or ()):
+        return sweep
+    try:
+        recorded = output.record or [v.name for v in prepare(sweep.worked_out(0)).system.recorded]
+    except ConfigError as error:
+        raise sweep.blamed(0, error) from None
+    names = ", ".join(f'"{name}"' for name in [*recorded, GROWTH])
+    return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]))
+
+
+def hidden_of(sweep: Sweep) -> tuple[str, ...]:
+    """What is recorded for indicators alone."""
+    asked = sweep.experiment.config.output.record
+    return () if asked is not None and GROWTH in asked else (GROWTH,)
+
+
+def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> bytes:
+    """Run some members; returns the sealed file of their tile.
+
+    Args:
+        config: of the sweep.
+        keep: items to be kept, as of ``items_of``.
+
+    Raises:
+        KeyboardInterrupt: it was interrupted.
+    """
+    began, cpu = time.perf_counter(), time.process_time()
+    sweep = sweep_of(config)
+    results = run_members(sweep, members, [plain(item) for item in keep])
+    made = {
+        "engines": dict(results.engines),
+        "why_alone": results.why_alone,
+        "estimate_cpu_seconds": results.estimating,
+        "wall_seconds": time.perf_counter() - began,
+        "cpu_seconds": time.process_time() - cpu,
+        "finished_at": provenance.now(),
+        "cpu_model": provenance.cpu_model(),
+        **{f"version_{name}": version for name, version in provenance.versions().items()},
+    }
+    return Tile(
+        sweep.experiment.sha256,
+        np.array(members, dtype=np.int64),
+        {name: variable.values for name, variable in results.kept.items()},
+        {name: TileVariable(v.dims, v.attributes, v.item) for name, v in results.kept.items()},
+        results.reasons,
+        made,
+    ).image()
+
+
+def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> MemberResults:
+    """Run some members of a sweep, and keep what is asked for of each."""
+    events = [event.name for event in sweep.base.config.events]
+    most = sweep.table.most_events
+    more = frequencies_of if "frequencies" in keep else None
+    hidden = hidden_of(sweep)
+    done = Batched([], [], list(range(len(members))), why_alone(sweep, keep))
+    if not done.why:
+        done = batches_of(sweep.experiment.text).run(members, keep)
+    for place in done.left:
+        member = partial(_run_alone, sweep, members[place])
+        done.results.append(run_alone(member, keep, most, events, more, hidden))
+        done.members.append(np.array([place]))
+    whole = in_order(done.results, done.members)
+    return replace(whole, why_alone=done.why, estimating=done.estimating)
+
+
+@lru_cache(maxsize=4)
+def batches_of(config: str) -> BatchTiles:
+    """The families of a config's sweep, traced once in a process."""
+    sweep = sweep_of(config)
+    return BatchTiles(sweep, hidden_of(sweep))
+
+
+def single_member(experiment: Experiment, member: int) -> Experiment:
+    """A member of a config's ``[sweep]`` as a run of its own, named after the sweep and its number.
+
+    Raises:
+        ConfigError: there is no such sweep or member, or it can't be run.
+    """
+    sweep = Sweep.of(experiment)
+    if not 0 <= member < sweep.count:
+        what = f"given {member}; its members are 0 to {sweep.count - 1}, the last axis runs fastest"
+        raise ConfigError(Problem("--member", what), experiment.source)
+    name = f"{experiment.config.name}_{member}"
+    return sweep.experiment_of(member).having([f'name="{name}"'])
+
+
+def alone(sweep: Sweep, member: int) -> Experiment:
+    """A member as it is run by itself."""
+    return sweep.experiment_of(member)
+
+
+def _run_alone(sweep: Sweep, member: int) -> MemoryRun:
+    return run(alone(sweep, member), out=None)
+
+
+def frequencies_of(result: MemoryRun) -> Kept:
+    """The strongest lines of each signal, and its secular rate; nothing where it can't be analysed."""
+    try:
+        found = analyse(result, lines=_LINES)
+    except RigidsimError:
+        return {}
+    kept: Kept = {}
+    for signal in found.signals:
+        name = re.sub(r"\W+", "_", signal.name).strip("_")
+        for what, units in (("frequency", "rad/s"), ("amplitude", signal.units)):
+            table = np.full((1, _LINES), np.nan)
+            values = [float(getattr(line, what)) for line in signal.lines[:_LINES]]
+            table[0, : len(values)] = values
+            labels: dict[str, Any] = {"units": units, "long_name": f"{what} of the lines of {signal.name}"}
+            kept[f"{name}_{what}"] = KeptVariable(("line",), table, labels, "frequencies")
+        rate = np.array([np.nan if signal.rate is None else float(signal.rate)])
+        labels = {"units": f"{signal.units}/s", "long_name": f"secular rate of {signal.name}"}
+        kept[f"{name}_rate"] = KeptVariable((), rate, labels, "frequencies")
+    return kept

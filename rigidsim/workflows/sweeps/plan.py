@@ -1,0 +1,125 @@
+"""What a sweep will cost, and how many of its members are a tile."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.variables import dataset_variables
+from rigidsim.solve.batch.lanes import recommended_width
+from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.workflows.plan import plan
+from rigidsim.workflows.sweeps.batch import why_alone
+from rigidsim.workflows.sweeps.check import QUICK, check_sweep
+from rigidsim.workflows.sweeps.members import alone, batches_of, recording
+
+_SECONDS_OF_A_TILE = 10.0
+_LARGEST_TILE = 8192
+_FEW = 64
+_TILES_OF_FEW = 16
+_LARGEST_TILE_BYTES = 64e6
+_BUILD_SECONDS = 0.2  # equations compiled anew for each member that runs by itself
+_BATCH_SECONDS = 2e-5  # what is done for a member of a batch beside its integration
+_TRIED = 64
+_ESTIMATED = 2.5  # a member of a batch with its estimated errors, over one without
+
+
+def tile_length(sweep: Sweep) -> int:
+    """Members that are computed and saved at once: some seconds of work."""
+    if sweep.table.tile is not None:
+        return sweep.table.tile
+    if sweep.count <= _FEW:
+        return max(1, -(-sweep.count // _TILES_OF_FEW))
+    made = plan(alone(sweep, 0), pilot_seconds=0.05)
+    return _length(sweep, _member_seconds(sweep, made), bytes_of_member(sweep, prepare(sweep.worked_out(0))))
+
+
+def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
+    predicted = made["predicted"]
+    seconds = float(predicted["integration_seconds"] + predicted["recording_seconds"])
+    if not _side_by_side(sweep):
+        return seconds + _BUILD_SECONDS
+    each = _ESTIMATED if sweep.base.config.output.estimate else 1.0
+    # half of what lanes could gain
+    return each * seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS
+
+
+def _side_by_side(sweep: Sweep) -> bool:
+    """Whether members run in batches, as far as some of them tell."""
+    if why_alone(sweep, sweep.table.keep):
+        return False
+    some = range(0, sweep.count, -(-sweep.count // _TRIED))
+    _, shared = batches_of(sweep.experiment.text).refused(some)
+    return shared
+
+
+def _length(sweep: Sweep, seconds: float, size: float) -> int:
+    """Of tiles whose members take so many seconds and bytes each."""
+    most = min(_SECONDS_OF_A_TILE / seconds, _LARGEST_TILE_BYTES / size)
+    length = 8
+    while length < _LARGEST_TILE and 2 * length <= most and 32 * length < sweep.count:
+        length *= 2
+    return length
+
+
+def bytes_of_member(sweep: Sweep, prepared: InitialValueProblem) -> float:
+    """What the dataset holds of a member, before it is compressed."""
+    keep = sweep.table.keep
+    variables = [v for v in dataset_variables(prepared) if v.name != "time"]
+    recorded = [v for v in variables if "drift_of" not in v.attributes]
+    numbers = 6.0 + 2 * (len(variables) - len(recorded))
+    for variable in recorded:
+        components = math.prod(variable.shape)
+        numbers += components * (
+            ("final" in keep) * variable.parts + 4 * ("extremes" in keep) + ("means" in keep)
+        )
+    if "series" in keep:
+        row = sum(v.parts * math.prod(v.shape) for v in variables)
+        numbers += prepared.clock.count * row
+    points = len(prepared.system.crossings) * sweep.table.most_events
+    numbers += points * ("events" in keep)
+    numbers += points * ("section" in keep) * sum(math.prod(v.shape) for v in recorded)
+    return 8 * numbers
+
+
+def plan_sweep(sweep: Sweep) -> dict[str, Any]:
+    """Explain and predict a sweep; integrates for about half a second and writes nothing.
+
+    Raises:
+        ConfigError: a member can't be run.
+    """
+    sweep = recording(sweep)
+    first = check_sweep(sweep, every=sweep.count <= QUICK)
+    made = plan(alone(sweep, 0))
+    seconds, size = _member_seconds(sweep, made), bytes_of_member(sweep, first)
+    length = sweep.table.tile
+    if length is None:
+        length = tile_length(sweep) if sweep.count <= _FEW else _length(sweep, seconds, size)
+    return {
+        "kind": "sweep",
+        "name": sweep.experiment.config.name,
+        "members": sweep.count,
+        "mode": sweep.table.mode,
+        "axes": [
+            {
+                "name": axis.name,
+                "key": axis.key,
+                "unit": axis.unit if axis.numeric else None,
+                "count": axis.values.count,
+                "first": axis.values.text(0),
+                "last": axis.values.text(axis.values.count - 1),
+            }
+            for axis in sweep.axes
+        ],
+        "keep": list(sweep.table.keep),
+        "tile": length,
+        "tiles": -(-sweep.count // length),
+        "member": made,
+        "predicted": {
+            "seconds_per_member": seconds,
+            "total_seconds": seconds * sweep.count,
+            "memory_bytes": made["predicted"]["memory_bytes"],
+            "dataset_bytes": size * sweep.count,
+        },
+    }

@@ -1,0 +1,142 @@
+"""What is told of all members of a sweep together: how they ended, what to know of them, what it took."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
+from rigidsim.store.sweeps.gathered import Gathered, TileReader
+from rigidsim.store.sweeps.sources import ALWAYS, Sources
+
+_NOT_ESTIMATED = (
+    "errors of the attitude aren't estimated of {:,} members, which an earlier version ran in batches (their "
+    "attitude_error is nan): rigidsim run CONFIG --member N estimates one, --force runs all of them again"
+)
+_ERRORS = {"attitude": "rad", "position": "m"}
+"""What is estimated of members, and its units."""
+
+
+@dataclass
+class _Counted:
+    """What is told of all members together."""
+
+    outcomes: np.ndarray
+    warned: np.ndarray
+    steps: int
+    unestimated: int
+    worst: dict[str, float]
+    errors: dict[str, dict[str, Any]]
+
+
+def summary_of(
+    wanted: Sweep, sources: Sources, reader: TileReader, found: Gathered, wall: float, cpu: float
+) -> dict[str, Any]:
+    """What ``summary.json`` says of a sweep that is complete.
+
+    Args:
+        wall, cpu: seconds of this process.
+    """
+    counted = _count(sources, reader)
+    outcomes = {OUTCOMES[i]: int(n) for i, n in enumerate(counted.outcomes) if n}
+    failing = wanted.count - sum(outcomes.get(status, 0) for status in ENDED_WELL)
+    warned = {WARNINGS[i]: int(n) for i, n in enumerate(counted.warned) if n}
+    warnings = {code: f"{number:,} members are warned of: {code}" for code, number in warned.items()}
+    if failing:
+        said = f"{failing:,} members didn't end well; failed_member and failed_reason say which"
+        warnings = {"members_failed": said, **warnings}
+    if counted.unestimated:
+        warnings["attitude_not_estimated"] = _NOT_ESTIMATED.format(counted.unestimated)
+    engines: dict[str, int] = {}
+    for made in found.made:
+        for engine, number in made["engines"].items():
+            engines[engine] = engines.get(engine, 0) + number
+    kinds = [
+        {k: v for k, v in made.items() if k.startswith(("version_", "cpu_model"))} for made in found.made
+    ]
+    differing = sorted({k for kind in kinds for k, v in kind.items() if v != kinds[0].get(k)})
+    mixed = ", ".join(differing) or None
+    if mixed:
+        said = f"tiles were computed with different {mixed}: members may differ in their last bits"
+        warnings["mixed_provenance"] = said
+    return {
+        "name": wanted.experiment.config.name,
+        "description": wanted.experiment.config.description,
+        "status": "finished",
+        "message": f"all {wanted.count:,} members were run",
+        "exit_code": 0,
+        "members": wanted.count,
+        "shape": dict(zip(wanted.dims, wanted.shape, strict=True)),
+        "axes": {axis.name: axis.key for axis in wanted.axes},
+        "keep": list(wanted.table.keep),
+        "outcomes": outcomes,
+        "warned": warned,
+        "warnings": list(warnings.values()),
+        "warning_codes": list(warnings),
+        "engines": engines,
+        "why_alone": next((made["why_alone"] for made in found.made if made.get("why_alone")), None),
+        "cost": {
+            "steps": counted.steps,
+            "cpu_seconds": sum(made["cpu_seconds"] for made in found.made),
+            "wall_seconds_of_tiles": sum(made["wall_seconds"] for made in found.made),
+            "tiles": len(found.made),
+            "estimate_cpu_seconds": sum(made.get("estimate_cpu_seconds", 0.0) for made in found.made),
+            "session_wall_seconds": wall,
+            "session_cpu_seconds": cpu,
+        },
+        "largest_drifts": counted.worst,
+        "estimated_errors": counted.errors,
+        "config_sha256": wanted.experiment.sha256,
+        "provenance": kinds[0] if kinds else {},
+        "mixed_provenance": mixed,
+    }
+
+
+def _count(sources: Sources, reader: TileReader) -> _Counted:
+    outcomes, warned = np.zeros(len(OUTCOMES), dtype=np.int64), np.zeros(len(WARNINGS), dtype=np.int64)
+    steps = unestimated = 0
+    worst: dict[str, float] = {}
+    estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
+    always = sources.found[ALWAYS]
+    keys = always.generation.astype(np.int64) << 32 | always.tile
+    order = np.argsort(keys, kind="stable")
+    edges = np.flatnonzero(np.diff(keys[order])) + 1
+    for group in np.split(order, edges):
+        key = int(keys[group[0]])
+        tile = reader.tile(key >> 32, key & 0xFFFFFFFF)
+        rows = always.row[group]
+        ended = tile.arrays["status"][rows]
+        outcomes += np.bincount(ended, minlength=len(OUTCOMES))
+        if tile.made.get("unestimated"):
+            well = np.isin(ended, [OUTCOMES.index(status) for status in ENDED_WELL])
+            unestimated += int((well & np.isnan(tile.arrays["attitude_error"][rows])).sum())
+        bits = tile.arrays["warnings"][rows]
+        warned += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
+        steps += int(tile.arrays["steps"][rows].sum())
+        for name, found in estimated.items():
+            if f"{name}_error" in tile.arrays:
+                values = tile.arrays[f"{name}_error"][rows]
+                found.append(values[~np.isnan(values)])
+        for name, values in tile.arrays.items():
+            if name.endswith("_drift_largest"):
+                largest = np.nanmax(values[rows], initial=0.0)
+                drift = name.removesuffix("_largest")
+                worst[drift] = max(worst.get(drift, 0.0), float(largest))
+    errors = {name: _told(np.concatenate(found), _ERRORS[name]) for name, found in estimated.items() if found}
+    told = {name: error for name, error in errors.items() if error["members"]}
+    return _Counted(outcomes, warned, steps, unestimated, worst, told)
+
+
+def _told(errors: np.ndarray, units: str) -> dict[str, Any]:
+    """Of the estimated errors of all members that have one."""
+    if not len(errors):
+        return {"members": 0}
+    return {
+        "members": len(errors),
+        "median": float(np.median(errors)),
+        "largest": float(errors.max()),
+        "units": units,
+    }

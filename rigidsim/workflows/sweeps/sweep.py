@@ -1,0 +1,296 @@
+"""Running a sweep: tiles of members until all are there, then the dataset; resumable whatever ends it."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.overrides import apply_overrides
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.toml_text import parse_toml
+from rigidsim.store.sweeps.dataset import write_dataset
+from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.gathered import TileReader, gather
+from rigidsim.store.sweeps.generation import Generation
+from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.store.sweeps.sources import sources_of
+from rigidsim.store.variables import SCHEMA_VERSION
+from rigidsim.workflows.read import Given, as_experiment
+from rigidsim.workflows.sweeps.check import check_sweep
+from rigidsim.workflows.sweeps.members import recording, sweep_of
+from rigidsim.workflows.sweeps.plan import tile_length
+from rigidsim.workflows.sweeps.summary import summary_of
+from rigidsim.workflows.sweeps.ways import OneProcess, Way
+
+
+class SweepObserver:
+    """Is told how a sweep goes. Does nothing by itself."""
+
+    def checking(self, sweep: Sweep) -> None:
+        """Members are about to be worked out, before anything runs."""
+
+    def started(self, folder: Path, members: int, done: int) -> None:
+        """So many members are to be run, of which so many are there already."""
+
+    def progressed(self, done: int) -> None:
+        """So many members are there."""
+
+    def completing(self) -> None:
+        """All are there; the dataset is being written."""
+
+    def nothing_left(self) -> None:
+        """The sweep was complete before."""
+
+
+def sweep(
+    experiment: Given,
+    *,
+    changes: dict[str, Any] | None = None,
+    out: str | Path = "runs",
+    force: bool = False,
+    workers: int = 1,
+    scheduler: str | None = None,
+    tiles: tuple[int, int] | None = None,
+    observer: SweepObserver | None = None,
+) -> SavedSweep:
+    """Run every member of a config's ``[sweep]``, and save them as one dataset in ``out/<name>/``.
+
+    A folder that holds a part of the same sweep is completed; where axes are longer or more is kept than
+    before, only what is new is computed.
+
+    Args:
+        experiment: from ``load`` or ``Experiment.from_dict``, the path of a config, or a dictionary.
+        changes: values to replace, as of ``Experiment.replace``.
+        force: replace whatever run or sweep lies there.
+        workers: processes on this machine.
+        scheduler: address of a Dask scheduler whose workers run the members; needs ``rigidsim[cluster]``.
+        tiles: first and stop of a share of the tiles, for one of several processes that share the folder.
+        observer: is told how it goes.
+
+    Raises:
+        ConfigError: no sweep, or one of its members can't be run; nothing was written.
+        RunFolderError: the folder is in use, holds something else, or can't be written.
+    """
+    given = as_experiment(experiment, changes)
+    return run_sweep(
+        recording(Sweep.of(given)),
+        SweepFolder(Path(out) / given.config.name),
+        force=force,
+        way=_way(workers, scheduler),
+        share=tiles,
+        observer=observer or SweepObserver(),
+    )
+
+
+_CALL = re.compile(r"\s*(linspace|logspace|step)\s*\((.*)\)\s*")
+
+
+def scanned(experiment: Experiment, scan: Sequence[str]) -> Experiment:
+    """An experiment with axes given beside it.
+
+    Args:
+        scan: ``KEY=SPEC`` texts: a TOML array of values, ``linspace(from, to, count)``, ``logspace(..)``,
+            ``step(from, step, count)``, or a TOML table as ``[sweep] axes`` has it.
+
+    Raises:
+        ConfigError: one can't be read.
+    """
+    settings = []
+    for text in scan:
+        key, equals, spec = text.partition("=")
+        if not equals or not key.strip() or not spec.strip():
+            what = "write KEY=SPEC, such as time.end=[1, 2, 4] or body.mass=linspace(0, 1, 11)"
+            raise ConfigError(Problem(f"--sweep {text[:60]}", what))
+        call = _CALL.fullmatch(spec)
+        if call is not None:
+            spec = f"{{{call[1]} = [{call[2]}]}}"
+        elif spec.strip().startswith("["):
+            spec = f"{{values = {spec.strip()}}}"
+        settings.append(f'sweep.axes."{key.strip()}"={spec.strip()}')
+    return experiment.having(settings)
+
+
+def resume_sweep(
+    path: str | Path, *, workers: int = 1, scheduler: str | None = None, observer: SweepObserver | None = None
+) -> SavedSweep:
+    """Complete a sweep that was interrupted or killed.
+
+    Raises:
+        RunFolderError: no sweep there, or it can't be written.
+    """
+    folder = open_sweep(path).folder
+    generations = folder.generations()
+    if not generations:
+        return open_sweep(path)
+    return run_sweep(
+        sweep_of(generations[-1].config), folder, way=_way(workers, scheduler),
+        observer=observer or SweepObserver(),
+    )  # fmt: skip
+
+
+def _way(workers: int, scheduler: str | None) -> Way:
+    if scheduler is not None:
+        from rigidsim.workflows.sweeps.cluster import Cluster
+
+        return Cluster(scheduler)
+    if workers > 1:
+        from rigidsim.workflows.sweeps.workers import Workers
+
+        return Workers(workers)
+    return OneProcess()
+
+
+def run_sweep(
+    wanted: Sweep,
+    folder: SweepFolder,
+    *,
+    way: Way,
+    observer: SweepObserver,
+    force: bool = False,
+    share: tuple[int, int] | None = None,
+) -> SavedSweep:
+    """See ``sweep``."""
+    if share is not None and force:
+        raise RunFolderError(f"{FORCE} is for a sweep as a whole, and its tiles are computed by others, too")
+    observer.checking(wanted)
+    complete = _complete(wanted, folder) and not force
+    if not complete:
+        check_sweep(wanted, every=not _known(wanted, folder))
+    began, cpu = time.perf_counter(), time.process_time()
+    with folder.locked(shared=share is not None):
+        if complete:
+            observer.nothing_left()
+            return open_sweep(folder.path)
+        if share is None:
+            folder.begin(force=force)
+        _refuse_other(wanted, folder)
+        generation = _generation(wanted, folder, exclusive=share is not None)
+        interrupted = _run_tiles(folder, generation, way, share, observer)
+        all_there = bool(folder.present(generation).all())
+    if interrupted is not None:
+        raise interrupted
+    if not all_there:
+        return open_sweep(folder.path)
+    try:
+        with folder.locked():
+            observer.completing()
+            return _completed(wanted, folder, time.perf_counter() - began, time.process_time() - cpu)
+    except RunFolderError:
+        if share is not None and folder.at_work:  # others complete it
+            return open_sweep(folder.path)
+        raise
+
+
+def _complete(wanted: Sweep, folder: SweepFolder) -> bool:
+    summary = folder.read_summary()
+    return (
+        summary.get("status") == "finished"
+        and summary.get("config_sha256") == wanted.experiment.sha256
+        and folder.dataset.exists()
+    )
+
+
+def _known(wanted: Sweep, folder: SweepFolder) -> bool:
+    """Whether it was begun before, which it is after all its members were checked."""
+    return any(g.config_sha256 == wanted.experiment.sha256 for g in folder.generations()[-1:])
+
+
+def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
+    """A folder whose sweep has other members altogether is left alone."""
+    for generation in folder.generations()[-1:]:
+        then = sweep_of(generation.config)
+        if identity(then) != identity(wanted):
+            raise RunFolderError(
+                f"{folder.path}: holds a sweep of another experiment or of other keys; {FORCE} replaces it, "
+                f"another {OUT} or name puts this one elsewhere"
+            )
+
+
+def identity(sweep: Sweep) -> str:
+    """What members share: the config without what is swept, and without what no number depends on."""
+    tables = parse_toml(sweep.experiment.text, sweep.experiment.source)
+    alone = not tables.get("sweep", {}).get("batch", True)
+    for key in ("name", "description", "sweep"):
+        tables.pop(key, None)
+    for key in ("timeline", "timeline_rows"):
+        tables.get("output", {}).pop(key, None)
+    if not tables.get("output", True):
+        del tables["output"]
+    keys = sorted(axis.key for axis in sweep.axes)
+    apply_overrides(tables, [f'{key}="swept"' for key in keys])
+    return json.dumps([keys, tables, *(["alone"] if alone else [])], sort_keys=True, default=str)
+
+
+def _generation(wanted: Sweep, folder: SweepFolder, *, exclusive: bool) -> Generation:
+    """The one that is to be worked on: the latest where it is of this config, else a new one."""
+    generations = folder.generations()
+    if generations and generations[-1].config_sha256 == wanted.experiment.sha256:
+        return generations[-1]
+    sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
+    works = sources.works()
+    number = generations[-1].number + 1 if generations else 0
+    made = Generation(number, wanted.experiment.text, tile_length(wanted), works)
+    return folder.add(made, exclusive=exclusive)
+
+
+def _run_tiles(
+    folder: SweepFolder,
+    generation: Generation,
+    way: Way,
+    share: tuple[int, int] | None,
+    observer: SweepObserver,
+) -> KeyboardInterrupt | None:
+    """Compute the tiles that are missing; returns what interrupted it."""
+    present = folder.present(generation)
+    first, stop = (0, generation.tiles) if share is None else share
+    ours = range(max(first, 0), min(stop, generation.tiles))
+    missing = [tile for tile in ours if not present[tile]]
+    members = sum(len(generation.members_of(tile)) for tile in ours) if share else generation.members
+    done = members - sum(len(generation.members_of(tile)) for tile in missing)
+    observer.started(folder.path, members, done)
+    try:
+        for tile, image in way.images(generation, missing):
+            folder.save(generation, tile, image)
+            done += len(generation.members_of(tile))
+            observer.progressed(done)
+    except KeyboardInterrupt as interruption:
+        return interruption
+    return None
+
+
+def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> SavedSweep:
+    """The dataset and the summary, from tiles that are all there."""
+    generations = folder.generations()
+    sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
+    reader = TileReader(folder, generations)
+    found = gather(sources, reader)
+    summary = summary_of(wanted, sources, reader, found, wall, cpu)
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": wanted.experiment.config.name,
+        "comment": wanted.experiment.config.description,
+        "source": "rigidsim",
+        "kind": "sweep",
+        "schema_version": SCHEMA_VERSION,
+        "status": "finished",
+        "config": wanted.experiment.text,
+        "config_sha256": wanted.experiment.sha256,
+        "config_given": wanted.experiment.given,
+        "config_set": "\n".join(wanted.experiment.settings),
+        "keep": " ".join(wanted.table.keep),
+        "members": wanted.count,
+        "engines": json.dumps(summary["engines"]),
+        "warnings": "\n".join(summary["warnings"]),
+        "mixed_provenance": summary["mixed_provenance"] or "",
+        **summary["provenance"],
+    }
+    digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
+    summary["dataset_sha256"] = digest
+    folder.write_summary(summary)
+    return SavedSweep(folder, {"kind": "sweep", **summary})

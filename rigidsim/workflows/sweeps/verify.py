@@ -1,0 +1,133 @@
+"""Is a sweep what its config gives, bit for bit? Some members, drawn at random, run again and compared."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidsim.errors import RESUME, ConfigError, Problem, RunFolderError
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.kept import Kept
+from rigidsim.store import provenance
+from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.workflows.sweeps.members import run_members, sweep_of
+from rigidsim.workflows.verify import Difference, Verdict
+
+if TYPE_CHECKING:
+    import xarray
+
+MEMBERS = 100
+"""Run again where nobody says how many."""
+_HELD = 64e6  # bytes of a variable that are read at once; of larger ones the members are read one by one
+
+
+def verify_sweep(
+    path: str | Path, *, members: int = MEMBERS, seed: int | None = None, together: int | None = None
+) -> Verdict:
+    """Run some members of a sweep again, beside other neighbours than before, and compare all that was kept.
+
+    Args:
+        path: folder of a finished sweep.
+        members: how many, at most all of them.
+        seed: of the draw; another each time by default.
+        together: that are run at once; all by default. No bit depends on it.
+
+    Returns:
+        As of ``verify``; its samples are members.
+
+    Raises:
+        ConfigError: less than one member is asked for.
+        RunFolderError: no sweep there, one that isn't finished, or whose files are damaged.
+    """
+    if members < 1:
+        raise ConfigError(Problem("--members", f"given {members}; one or more are allowed"))
+    saved = open_sweep(path)
+    if not saved.finished:
+        raise RunFolderError(f"{saved.place}: is {saved.status}; {RESUME} completes it")
+    with saved.dataset as dataset:
+        sweep = sweep_of(str(dataset.attrs["config"]))
+        problems = _problems(saved, dataset, sweep)
+        chosen = sorted(random.Random(seed).sample(range(sweep.count), min(members, sweep.count)))
+        differing: dict[str, None] = {}
+        first: Difference | None = None
+        held: dict[str, np.ndarray] = {}
+        step = len(chosen) if together is None else together
+        for begin in range(0, len(chosen), step):
+            some = chosen[begin : begin + step]
+            again = run_members(sweep, some, sweep.table.keep).kept
+            for name, place, there, here in _differences(dataset, sweep, some, again, held):
+                differing[name] = None
+                if first is None or some[place] < first.sample:
+                    first = Difference(name, some[place], there, here)
+    changed = _environment(saved.summary.get("provenance", {}))
+    if saved.summary.get("mixed_provenance"):
+        changed.append(f"the sweep itself was computed with different {saved.summary['mixed_provenance']}")
+    identical = not problems and not differing
+    return Verdict(saved.place, identical, problems, first, sorted(differing), changed, len(chosen))
+
+
+def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[str]:
+    """What dataset and summary say of themselves that isn't so."""
+    problems = []
+    if dataset.attrs.get("config_sha256") != sweep.experiment.sha256:
+        problems.append(f"{saved.folder.dataset}: embeds another config than its config_sha256 says")
+    if saved.summary.get("members") != sweep.count:
+        problems.append(f"{saved.place}: the summary tells of {saved.summary.get('members')} members, "
+                        f"the config of {sweep.count}")  # fmt: skip
+    if saved.summary.get("dataset_sha256") is None:
+        problems.append(f"{saved.place}: the summary doesn't say which dataset it was written for")
+    return problems
+
+
+def _differences(
+    dataset: xarray.Dataset, sweep: Sweep, members: Sequence[int], again: Kept, held: dict[str, np.ndarray]
+) -> list[tuple[str, int, float, float]]:
+    """Of each variable the first of some members in which any bit differs: its place, both numbers.
+
+    Args:
+        held: variables that were read before.
+    """
+    found = []
+    for name, variable in sorted(again.items()):
+        here = np.asarray(variable.values, dtype=variable.values.dtype)
+        if name not in dataset:
+            found.append((name, 0, float("nan"), float(here.reshape(-1)[0])))
+            continue
+        there = _saved(dataset, name, sweep, members, held)
+        there = there[(slice(None), *(slice(0, size) for size in here.shape[1:]))].astype(here.dtype)
+        rows = (len(members), -1)
+        one, other = (np.ascontiguousarray(x).view(np.int64).reshape(rows) for x in (there, here))
+        unequal = one != other
+        if unequal.any():
+            place, column = (int(i) for i in np.argwhere(unequal)[0])
+            mine, theirs = (float(x.reshape(rows)[place, column]) for x in (there, here))
+            found.append((name, place, mine, theirs))
+    return found
+
+
+def _saved(
+    dataset: xarray.Dataset, name: str, sweep: Sweep, members: Sequence[int], held: dict[str, np.ndarray]
+) -> np.ndarray:
+    """Values of members, (members, ...)."""
+    variable = dataset[name]
+    if variable.dims[: len(sweep.dims)] != sweep.dims:  # the times that all have
+        return np.broadcast_to(variable.values, (len(members), *variable.shape))
+    if name not in held and variable.nbytes <= _HELD:
+        held[name] = variable.values.reshape(sweep.count, *variable.shape[len(sweep.dims) :])
+    if name in held:
+        return np.asarray(held[name][list(members)])
+    places = np.unravel_index(np.asarray(members), sweep.shape)
+    rows = zip(*(place.tolist() for place in places), strict=True)
+    return np.stack([variable.isel(dict(zip(sweep.dims, row, strict=True))).values for row in rows])
+
+
+def _environment(then: dict[str, Any]) -> list[str]:
+    """Versions and the processor, where they aren't those of the sweep."""
+    now = {f"version_{name}": version for name, version in provenance.versions().items()}
+    now["cpu_model"] = provenance.cpu_model()
+    changed = {name: value for name, value in now.items() if then.get(name) not in (None, value)}
+    return [f"{name} {then[name]} -> {value}" for name, value in changed.items()]
