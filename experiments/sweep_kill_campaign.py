@@ -231,15 +231,16 @@ def local_cluster() -> Iterator[Any]:
 
 def _kill_cluster_workers(tally: Tally, draw: random.Random, cluster: Any, child: Any, pause: float) -> bool:
     """Up to three deaths while a sweep runs; whether there was any. The sweep has to get over them."""
-    killed = 0
+    killed: set[int] = set()
     for _ in range(draw.randint(1, 3)):
-        pids = [nanny.pid for nanny in cluster.workers.values() if nanny.pid]
+        pids = [nanny.pid for nanny in cluster.workers.values() if nanny.pid and nanny.pid not in killed]
         if child.poll() is None and pids:
             with suppress(ProcessLookupError):
-                os.kill(draw.choice(pids), signal.SIGKILL)
-                killed += 1
+                chosen = draw.choice(pids)
+                os.kill(chosen, signal.SIGKILL)
+                killed.add(chosen)  # its nanny may not have noticed when the next is drawn
         time.sleep(draw.random() * pause)
-    tally.counts["deaths of a scheduler's workers"] += killed
+    tally.counts["deaths of a scheduler's workers"] += len(killed)
     return bool(killed)
 
 

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from support import config
 
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import RigidsimError, StoppedError
+from rigidsim.scene.sweep import Sweep
+from rigidsim.store.sweep_folder import SweepFolder
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.cluster import Cluster
-from rigidsim.workflows.sweeps.sweep import SweepObserver, sweep
+from rigidsim.workflows.sweeps.sweep import SweepObserver, run_sweep, sweep
 
 distributed = pytest.importorskip("distributed")
 
@@ -55,6 +62,59 @@ def test_a_cluster_makes_the_same_dataset_though_a_worker_dies(tmp_path: Path) -
         found = sweep(parse(CONFIG), out=tmp_path / "a", scheduler=cluster.scheduler_address, observer=killer)
     assert found.finished
     assert killer.killed
+    alone = sweep(parse(CONFIG), out=tmp_path / "b")
+    for name in ("angular_velocity_final", "energy_drift_largest", "steps", "status"):
+        np.testing.assert_array_equal(found.dataset[name].values, alone.dataset[name].values)
+
+
+@contextmanager
+def worker_without_nanny(address: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A worker that nobody starts again."""
+    command = [
+        sys.executable,
+        "-m",
+        "dask",
+        "worker",
+        address,
+        "--no-nanny",
+        "--nthreads",
+        "1",
+        "--no-dashboard",
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.slow  # a scheduler, and two workers that import everything
+def test_a_worker_that_dies_before_its_tile_is_fetched_does_not_hang_the_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = distributed.wait
+    dying: list[subprocess.Popen[bytes]] = []
+
+    def then_killed(*args: Any, **options: Any) -> Any:
+        found = ended(*args, **options)
+        if found.done and dying:
+            dying.pop().kill()
+        return found
+
+    monkeypatch.setattr(distributed, "wait", then_killed)
+    wanted, folder = Sweep.of(parse(CONFIG)), SweepFolder(tmp_path / "a" / "cluster")
+    with distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as cluster:
+        way = Cluster(cluster.scheduler_address, alone=1)
+        with worker_without_nanny(cluster.scheduler_address) as worker:
+            cluster.wait_for_workers(1)
+            dying.append(worker)
+            with pytest.raises(StoppedError, match="no worker is left there"):
+                run_sweep(wanted, folder, way=way, observer=SweepObserver())
+        with worker_without_nanny(cluster.scheduler_address):
+            cluster.wait_for_workers(1)
+            found = run_sweep(wanted, folder, way=way, observer=SweepObserver())
+    assert found.finished
     alone = sweep(parse(CONFIG), out=tmp_path / "b")
     for name in ("angular_velocity_final", "energy_drift_largest", "steps", "status"):
         np.testing.assert_array_equal(found.dataset[name].values, alone.dataset[name].values)

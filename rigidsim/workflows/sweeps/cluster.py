@@ -2,6 +2,10 @@
 
 The workers need rigidsim and nothing of this machine's disk. Only a few tiles for each of their threads are
 out at any time, so that neither the scheduler nor this process ever holds many.
+
+A tile that is done lies on the worker that computed it until it is fetched. Where that worker dies first, the
+tile is computed again, and whoever fetches it waits meanwhile, for ever where no worker is left. So a thread
+fetches, and this one goes on looking whether there are workers.
 """
 
 from __future__ import annotations
@@ -9,6 +13,9 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from concurrent.futures import wait as wait_for
+from threading import Thread
 from typing import Any
 
 from rigidsim.errors import RigidsimError, StoppedError
@@ -20,7 +27,6 @@ _AHEAD = 2  # tiles for each thread
 _MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
 _LOOK_SECONDS = 5
 _TELL_SECONDS = 0.2
-_ALONE_SECONDS = 120  # without any worker, after which nobody waits any more
 
 
 class Cluster:
@@ -29,10 +35,11 @@ class Cluster:
     Args:
         address: of the scheduler, such as ``tcp://10.0.0.1:8786``.
         patience: seconds in which it must answer.
+        alone: seconds without any worker after which nobody waits any more.
     """
 
-    def __init__(self, address: str, patience: float = 20.0) -> None:
-        self._address, self._patience = address, patience
+    def __init__(self, address: str, patience: float = 20.0, alone: float = 120.0) -> None:
+        self._address, self._patience, self._alone = address, patience, alone
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
         """See ``Way``.
@@ -63,18 +70,11 @@ class Cluster:
     def _stream(
         self, distributed: Any, client: Any, generation: Generation, waiting: list[int]
     ) -> Iterator[tuple[int, bytes]]:
+        workers = _Workers(client, self._address, self._alone)
         deaths: Counter[int] = Counter()
         running: dict[Any, int] = {}
-        alone_since: float | None = None
         while waiting or running:
-            threads = sum(client.nthreads().values())
-            alone_since = None if threads else (alone_since or time.monotonic())
-            if alone_since is not None and time.monotonic() - alone_since > _ALONE_SECONDS:
-                raise StoppedError(
-                    f"--scheduler {self._address}: no worker is left there; start some with: dask worker "
-                    f"{self._address}, and give the command again; the tiles that are complete are kept"
-                )
-            ahead = _AHEAD * max(1, threads)
+            ahead = _AHEAD * max(1, workers.threads())
             while waiting and len(running) < ahead:
                 tile = waiting.pop()
                 future = client.submit(tile_image, *task(generation, tile), pure=False, retries=2)
@@ -84,7 +84,7 @@ class Cluster:
                 continue
             future, tile = done, running.pop(done)
             try:
-                image = future.result()
+                image = _fetched(future, workers)
             except distributed.KilledWorker:
                 deaths[tile] += 1
                 if deaths[tile] >= _MOST_DEATHS:
@@ -99,6 +99,58 @@ class Cluster:
                 waiting.append(tile)
                 continue
             yield tile, image
+
+
+class _Workers:
+    """Those of a scheduler, and since when there is none.
+
+    Args:
+        alone: seconds that this may last.
+    """
+
+    def __init__(self, client: Any, address: str, alone: float) -> None:
+        self._client, self._address, self._alone = client, address, alone
+        self._since: float | None = None
+
+    def threads(self) -> int:
+        """How many they have together.
+
+        Raises:
+            StoppedError: there has been no worker for too long.
+        """
+        threads = sum(self._client.nthreads().values())
+        if threads:
+            self._since = None
+            return threads
+        now = time.monotonic()
+        if self._since is None:
+            self._since = now
+        if now - self._since > self._alone:
+            raise StoppedError(
+                f"--scheduler {self._address}: no worker is left there; start some with: dask worker "
+                f"{self._address}, and give the command again; the tiles that are complete are kept"
+            )
+        return 0
+
+
+def _fetched(future: Any, workers: _Workers) -> bytes:
+    """A tile that was done, which may have gone since with its worker: then it is computed again.
+
+    Raises:
+        StoppedError: there has been no worker for too long.
+    """
+    fetched: Future[bytes] = Future()
+
+    def fetch() -> None:
+        try:
+            fetched.set_result(future.result())
+        except BaseException as error:  # for whoever waits
+            fetched.set_exception(error)
+
+    Thread(target=fetch, name="rigidsim fetch", daemon=True).start()  # ends with the client at the latest
+    while not wait_for([fetched], timeout=_LOOK_SECONDS).done:
+        workers.threads()
+    return fetched.result()
 
 
 def _first_done(distributed: Any, client: Any, futures: list[Any]) -> Any:
