@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigidsim.scene.sweep import Sweep
 from support import config
 
 from rigidsim.errors import RigidsimError, StoppedError
-from rigidsim.scene.sweep import Sweep
-from rigidsim.store.sweep_folder import SweepFolder
+from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.cluster import Cluster
 from rigidsim.workflows.sweeps.sweep import SweepObserver, run_sweep, sweep
