@@ -16,7 +16,6 @@ from rigidsim.model.equations import (
 from rigidsim.model.formulations import BUILDERS, AttitudeStates, euler_states
 from rigidsim.model.frames.orbital import orbital_states
 from rigidsim.model.kinematics import in_common_unit
-from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.needs import work_is_needed
@@ -123,8 +122,8 @@ def _attitude(
         return euler_states(scene, rates, sequence)
     if plan.paired:
         (load,) = plan.loads
-        assert isinstance(load, GravityGradient)
-        return paired_states(scene, rates, load, plan.scaling, number)
+        assert load.gradient_source is not None
+        return paired_states(scene, rates, load.gradient_source, plan.scaling, number)
     if plan.frame_orbit is not None:
         unit = scene.context.ldexp(scene.context.one, plan.scaling.time)
         return orbital_states(scene, rates, plan.frame_orbit, plan.orbit_tags[plan.frame_orbit], unit, number)

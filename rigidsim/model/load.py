@@ -11,6 +11,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, TablePlane
 from rigidsim.model.rotations import Symbolic
@@ -40,6 +41,8 @@ class Load(SceneLoad):
             Jacobi's constant.
         masses_beside: whether its source is one of the point masses that move beside the body.
         has_source: whether the direction to its source is known: nadir, roll and libration count from it.
+        gradient_source: of a load that is the gravity gradient of a distant body and nothing else; None for
+            all others.
         attracting_point: centre of its force (mpf, m, space axes), where that always points to one.
         without_plane: why its source has an orbit, but no ``plane`` that is known.
     """
@@ -54,6 +57,7 @@ class Load(SceneLoad):
     corotating_orbit: KeplerOrbit | None = None
     has_source: bool = False
     masses_beside: bool = False
+    gradient_source: GradientSource | None = None
     attracting_point: Vector | None = None
     without_plane: str = ""
 

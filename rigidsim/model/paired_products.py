@@ -30,9 +30,9 @@ import heyoka as hy
 from rigidsim.model import rotations
 from rigidsim.model.formulations import AttitudeStates, OrbitalFrame
 from rigidsim.model.frames.orbital import in_space, relative_attitude
+from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load
-from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling
@@ -63,14 +63,15 @@ def pairs_products(
     Args:
         orbit: in whose frame the attitude is carried; None where that is space.
     """
-    if orbit is None or len(loads) != 1 or not isinstance(loads[0], GravityGradient):
+    source = loads[0].gradient_source if len(loads) == 1 else None
+    if orbit is None or source is None:
         return False
     if not _loose(scene.config.integrator) or scene.events or scene.config.output.lyapunov:
         return False
     diagonal = all(numbers.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j)
     if not diagonal or any(unit != 1 for unit in numbers.rate_units) or scene.free_flight:
         return False
-    s, n = _strength(scene, loads[0].gravitational_parameter, orbit, scaling)
+    s, n = _strength(scene, source.gravitational_parameter, orbit, scaling)
     return bool(s >= _LEAST and n < _ALIKE * s and s < _ALIKE * n)
 
 
@@ -125,7 +126,7 @@ def paired_rates(m: Kinematics) -> list[Symbolic]:
 def paired_states(
     scene: Scene,
     rates: list[Symbolic],
-    load: GravityGradient,
+    source: GradientSource,
     scaling: Scaling,
     number: Rounder,
 ) -> AttitudeStates:
@@ -133,11 +134,12 @@ def paired_states(
     follows from the time: it is recorded and acts on nothing, so that what is lost of n t isn't felt.
 
     Args:
+        source: of the only load, on an orbit.
         rates: angular velocity, body axes, 1 / unit of time; they are states.
     """
-    assert load.orbit is not None
-    orbit, context = load.orbit, scene.context
-    s, n = _strength(scene, load.gravitational_parameter, orbit, scaling)
+    assert source.orbit is not None
+    orbit, context = source.orbit, scene.context
+    s, n = _strength(scene, source.gravitational_parameter, orbit, scaling)
     u, first, second = _sums(rates)
     f = list(hy.make_vars(*NAMES[3:]))
     squared = number(n * n)

@@ -5,16 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rigidsim.errors import ConfigError
-from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.scene.model_table import FULL, REDUCED
 from rigidsim.scene.records import dataclass
+from rigidsim.session.tuning import AdviceLimits
 from rigidsim.solve.problem import InitialValueProblem, prepare
-
-LONG = 1_000_000
-"""Steps from which on it is looked at: the windows in which both models are compared have some 2e4, 2e5 at
-most."""
-NEAR = 1e-5
-"""rad: the farthest that axes may be for a model to be advised, two seconds of arc."""
 
 
 @dataclass(frozen=True)
@@ -33,21 +27,22 @@ class CheaperModel:
 
 
 def cheaper_model(
-    prepared: InitialValueProblem, steps: int, go_on: Callable[[], bool]
+    prepared: InitialValueProblem, steps: int, limits: AdviceLimits, go_on: Callable[[], bool]
 ) -> CheaperModel | None:
     """The most averaged model that keeps the axes, measured over the beginning of the span.
 
     Args:
         steps: that the run took.
+        limits: of runs that are looked at, and of models that are advised.
         go_on: asked again and again; False ends it.
 
     Returns:
         None where none does, the run is short, or something is recorded that needs every rotation.
     """
     config = prepared.scene.config
-    loads = [*prepared.scene.loads, *prepared.python_loads]
-    suited = bool(loads) and all(isinstance(load, GravityGradient) for load in loads)
-    if steps < LONG or not suited or config.model.level != FULL or config.output.record is None:
+    loads = prepared.system.plan.loads
+    suited = bool(loads) and all(load.gradient_source is not None for load in loads)
+    if steps < limits.steps or not suited or config.model.level != FULL or config.output.record is None:
         return None
     from rigidsim.accuracy.models.modelling import measure_modelling
 
@@ -60,7 +55,7 @@ def cheaper_model(
             continue
         if found is None:
             return None
-        if found.worst <= NEAR:
+        if found.worst <= limits.apart:
             beside = found.windows[0]
             return CheaperModel(level, found.worst, beside.reduced_steps / beside.steps)
     return None

@@ -12,6 +12,7 @@ from rigidsim.accuracy.estimates.growth import UNCERTAIN
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.scene.records import dataclass
 from rigidsim.session.statistics import SampleStatistics
+from rigidsim.session.tuning import AdviceLimits
 from rigidsim.session.understood import time_words
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
@@ -88,11 +89,11 @@ class Diagnostics:
 
         return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
 
-    def compared(self, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
-        """With the averaged model that would have done, arguments as of ``estimated``."""
+    def compared(self, limits: AdviceLimits, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
+        """With the averaged model that would have done, arguments as of ``cheaper_model``."""
         from rigidsim.session.cheaper_model import cheaper_model
 
-        return replace(self, cheaper=cheaper_model(self.prepared, self.progress.steps, go_on))
+        return replace(self, cheaper=cheaper_model(self.prepared, self.progress.steps, limits, go_on))
 
     def cautions(self) -> list[Caution]:
         """Reasons not to trust the result; empty for a sound run."""

@@ -36,7 +36,7 @@ class Session:
         remarks: for the summary, on how the session began.
         mixed: what changed in versions or machine since the run began; empty where nothing did.
         effort, phases: what the run has cost, all its sessions and this one; choosing and certifying count.
-        tuning: how often it looks up and saves.
+        tuning: how often it looks up and saves, and when it looks for a cheaper model.
     """
 
     observer: Observer
@@ -117,7 +117,7 @@ class Session:
                         corrected.waypoints,
                         lambda: not interruption.requested,
                     )
-                    found = found.compared(lambda: not interruption.requested)
+                    found = found.compared(self.tuning.advice, lambda: not interruption.requested)
                 clock.next("estimate")
                 if prepared.system.plan.average is not None and progress.status is Status.FINISHED:
                     self.observer.phase("modelling")

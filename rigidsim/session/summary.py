@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words
@@ -245,7 +244,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
 
 
 def _tables(found: Diagnostics) -> dict[str, TableErrors]:
-    orbits = [load.table for load in found.prepared.scene.loads if isinstance(load, GravityGradient)]
+    orbits = [load.table for load in found.prepared.system.plan.loads]
     return {
         orbit.name: TableErrors(
             direction=orbit.error.direction, distance=orbit.error.distance, expected=orbit.error.expected

@@ -77,7 +77,7 @@ def run(
         observer: is told how it goes.
         progress: whether a bar shows how it goes; None: in notebooks.
         loads: loads of one's own, beside those of the config, which alone can't reproduce the run then.
-        tuning: how often to look up and save; no bit depends on it.
+        tuning: how often to look up and save, and when to look for a cheaper model; no bit depends on it.
 
     Returns:
         The run; its ``status`` tells how it ended, which need not be "finished".

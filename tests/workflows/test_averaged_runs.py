@@ -11,6 +11,7 @@ from support import config, run_text
 import rigidsim
 from rigidsim.accuracy.models.level import choose_level
 from rigidsim.errors import ConfigError
+from rigidsim.session.tuning import AdviceLimits, Tuning
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"
@@ -253,18 +254,14 @@ def test_datasets_keep_the_modelling_error() -> None:
     assert "modelling_error" not in run_text(text("orbit_averaged")).dataset.attrs
 
 
-def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(
-    full: rigidsim.Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(full: rigidsim.Run) -> None:
     """What is promised is kept: the model advised is as near, at that part of the steps."""
     from rigidsim.cli.screens.verdicts import advice_line
-    from rigidsim.session import cheaper_model
 
-    assert full.summary["cost"]["steps"] < cheaper_model.LONG
+    assert full.summary["cost"]["steps"] < AdviceLimits().steps
     assert run_text(text("full"), estimate=True).summary["advice"] == []
-    monkeypatch.setattr(cheaper_model, "LONG", 1000)
-    monkeypatch.setattr(cheaper_model, "NEAR", 1e-4)
-    told = run_text(text("full"), estimate=True)
+    near = Tuning(advice=AdviceLimits(steps=1000, apart=1e-4))
+    told = run_text(text("full"), estimate=True, tuning=near)
     (advice,) = told.summary["advice"]
     assert (advice["code"], advice["level"]) == ("averaged", "orbit_averaged")
     line = advice_line(told.outcome.advice[0])
@@ -273,5 +270,5 @@ def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(
     better = run_text(text(advice["level"], short_period=True))
     assert apart(full, better, "momentum_axis") <= advice["then"] <= 1e-4
     assert better.summary["cost"]["steps"] <= 1.1 * advice["share"] * full.summary["cost"]["steps"]
-    monkeypatch.setattr(cheaper_model, "NEAR", 1e-9)
-    assert run_text(text("full"), estimate=True).summary["advice"] == []
+    nearer = Tuning(advice=AdviceLimits(steps=1000, apart=1e-9))
+    assert run_text(text("full"), estimate=True, tuning=nearer).summary["advice"] == []

@@ -20,7 +20,6 @@ from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.load import Load
-from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.scene import Scene
 
@@ -52,7 +51,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "no torque acts, so that the direction of the angular momentum rests"
     elif max(scene.body.principal_moments) == min(scene.body.principal_moments):
         against = "no gradient has a torque on a body whose moments are all the same"
-    elif strange := [load.title for load in loads if not isinstance(load, GravityGradient)]:
+    elif strange := [load.title for load in loads if load.gradient_source is None]:
         against = f"{strange[0]} is no gravity gradient of a source with elements, a place or an ephemeris"
     elif all(w == 0 for w in scene.angular_velocity):
         against = "the body starts at rest"
@@ -71,8 +70,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     elif config.output.lyapunov:
         against = "[output] lyapunov is of the full motion: set it to false"
     elif level == ORBIT_AVERAGED:
-        series = [load for load in loads if isinstance(load, GravityGradient) and load.ephemeris]
-        if series:
+        sources = [load.gradient_source for load in loads]
+        if any(source is not None and source.ephemeris for source in sources):
             against = "the source of an ephemeris has no elements to average over"
             raise _refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
     if against is not None:

@@ -27,7 +27,6 @@ from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
 from rigidsim.model.load import Load
-from rigidsim.model.loads.gravity_gradient import GravityGradient
 from rigidsim.model.orbits.table_states import Carried
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
@@ -143,11 +142,10 @@ def average_of(scene: Scene, loads: Sequence[Load]) -> Average:
         ConfigError: an average that doesn't apply, with the reason and what to do.
     """
     refuse_scene(scene, loads)
-    gradients = [load for load in loads if isinstance(load, GravityGradient)]
     context, body, table = scene.context, scene.body, scene.config.model
     matrix = attitude.rotation_matrix(scene.quaternion)
     momentum = apply(body.inertia, scene.angular_velocity)
-    sources = sources_of(scene, gradients)
+    sources = sources_of(scene, loads)
     try:
         motion = free_motion(context, body, momentum)
         spectrum = body_spectrum(motion)

@@ -16,8 +16,8 @@ from rigidsim.model.averaged.orbit_terms import (
     turned,
 )
 from rigidsim.model.averaged.spectrum import orbit_harmonics
-from rigidsim.model.loads.gravity_gradient import GravityGradient
-from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE
+from rigidsim.model.gradient_source import GradientSource
+from rigidsim.model.load import Load
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
@@ -36,22 +36,23 @@ class Source:
 
     Attributes:
         number: of its ``[[loads]]``, from 1.
+        of: where it is.
         strength: 3 G M / a^3 (mpf, 1/s^2), a being the semi-major axis, the distance, or the mean one.
     """
 
     number: int
-    load: GravityGradient
+    of: GradientSource
     strength: Any
 
     @property
     def orbit(self) -> KeplerOrbit | None:
         """That it moves on; None for others."""
-        return self.load.orbit
+        return self.of.orbit
 
     @property
     def table(self) -> TabulatedOrbit | None:
         """That its orbit goes by; None for others."""
-        return self.load.table
+        return self.of.table
 
     @property
     def has_elements(self) -> bool:
@@ -61,8 +62,8 @@ class Source:
     @property
     def motion(self) -> float:
         """Mean motion, rad/s; 0 for a source at rest."""
-        if self.load.ephemeris is not None:
-            return 2 * math.pi / (_SERIES[self.load.ephemeris][0] * _DAY)
+        if self.of.ephemeris is not None:
+            return 2 * math.pi / (_SERIES[self.of.ephemeris][0] * _DAY)
         if self.table is not None:
             return float(self.table.mean_motion)
         return 0.0 if self.orbit is None else abs(float(self.orbit.mean_motion))
@@ -70,8 +71,8 @@ class Source:
     @property
     def eccentricity(self) -> float:
         """Of its orbit, the largest; 0 for a source at rest."""
-        if self.load.ephemeris is not None:
-            return _SERIES[self.load.ephemeris][1]
+        if self.of.ephemeris is not None:
+            return _SERIES[self.of.ephemeris][1]
         if self.table is not None:
             return float(self.table.largest_eccentricity)
         return 0.0 if self.orbit is None else float(self.orbit.eccentricity)
@@ -157,9 +158,9 @@ class Source:
 
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
         """(a/r)^3 r r^T (3, 3) at a time; None where only a series tells it."""
-        if self.load.position is not None:
-            length = norm(context, self.load.position)
-            direction = np.array([float(x / length) for x in self.load.position])
+        if self.of.position is not None:
+            length = norm(context, self.of.position)
+            direction = np.array([float(x / length) for x in self.of.position])
             return np.outer(direction, direction)
         if not self.has_elements:
             return None
@@ -173,19 +174,14 @@ class Source:
         return np.outer(direction, direction) * scale / radius**3
 
 
-def sources_of(scene: Scene, loads: Sequence[GravityGradient]) -> list[Source]:
-    """All of a scene, with their strengths."""
+def sources_of(scene: Scene, loads: Sequence[Load]) -> list[Source]:
+    """Those of all gravity gradients of a scene, with their strengths."""
     context, found = scene.context, []
     for number, load in enumerate(loads, start=1):
-        if load.orbit is not None:
-            distance = load.orbit.semi_major_axis
-        elif load.table is not None:
-            distance = load.table.semi_major_axis
-        elif load.position is not None:
-            distance = norm(context, load.position)
-        else:
-            distance = context.mpf(MEAN_DISTANCE[str(load.ephemeris)])
-        found.append(Source(number, load, 3 * load.gravitational_parameter / distance**3))
+        source = load.gradient_source
+        if source is not None:
+            strength = 3 * source.gravitational_parameter / source.distance(context) ** 3
+            found.append(Source(number, source, strength))
     return found
 
 

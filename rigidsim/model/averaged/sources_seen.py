@@ -115,15 +115,15 @@ class SourcesSeen(Mechanics):
 
     def _seen(self, source: Source) -> tuple[list[Symbolic], Symbolic | None]:
         """Unit vector to a source, space axes, and a/r where it varies."""
-        context, load = self.scene.context, source.load
-        if load.position is not None:
-            length = context.sqrt(dot(load.position, load.position))
-            return [as_factor(self.number(x / length)) for x in load.position], None
-        if load.ephemeris is not None:
+        context, of = self.scene.context, source.of
+        if of.position is not None:
+            length = context.sqrt(dot(of.position, of.position))
+            return [as_factor(self.number(x / length)) for x in of.position], None
+        if of.ephemeris is not None:
             time = seconds(self)
-            if load.epoch is not None and load.epoch != J2000:
-                time = time + self.number(ExactNumber(load.epoch.since_j2000()).at(context))
-            place = source_position(load.ephemeris, time)
+            if of.epoch is not None and of.epoch != J2000:
+                time = time + self.number(ExactNumber(of.epoch.since_j2000()).at(context))
+            place = source_position(of.ephemeris, time)
             return place.direction, place.inverse_distance
         if source.table is not None:
             by_table = self.table(source.table)

@@ -10,11 +10,12 @@ from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import gradient_terms, tidal_range
+from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
-from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
+from rigidsim.model.orbits.ephemeris import SourcePosition, source_position
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
@@ -118,6 +119,13 @@ class GravityGradient(Load):
         return shown
 
     @property
+    def gradient_source(self) -> GradientSource:  # type: ignore[override]
+        """Its own."""
+        return GradientSource(
+            self.gravitational_parameter, self.orbit, self.table, self.position, self.ephemeris, self.epoch
+        )
+
+    @property
     def conservative(self) -> bool:  # type: ignore[override]
         """Where the source rests."""
         return self.position is not None
@@ -171,14 +179,12 @@ class GravityGradient(Load):
         context = m.scene.context
         factor = None
         if self.orbit is not None:
-            factor, distance = m.orbit(self.orbit).inverse_distance ** 3, self.orbit.semi_major_axis
+            factor = m.orbit(self.orbit).inverse_distance ** 3
         elif self.table is not None:
-            factor, distance = m.table(self.table).inverse_distance ** 3, self.table.semi_major_axis
+            factor = m.table(self.table).inverse_distance ** 3
         elif self.ephemeris is not None:
             factor = self._source(m).inverse_distance ** 3
-            distance = context.mpf(MEAN_DISTANCE[self.ephemeris])
-        else:
-            distance = norm(context, m.carried(self.position))
+        distance = self.gradient_source.distance(context)
         value = context.ldexp(self.gravitational_parameter / distance**3, 2 * m.scaling.time)
         return value, factor
 
@@ -218,15 +224,12 @@ class GravityGradient(Load):
 
     def amplitude(self, scene: Scene) -> Any:
         """As of ``tidal_range`` at the least distance."""
-        context = scene.context
-        if self.ephemeris is not None:
-            distance = context.mpf(MEAN_DISTANCE[self.ephemeris])
-        elif self.orbit is not None:
+        if self.orbit is not None:
             distance = self.orbit.pericentre
         elif self.table is not None:
             distance = self.table.pericentre
         else:
-            distance = norm(context, self.position or [])
+            distance = self.gradient_source.distance(scene.context)
         return tidal_range(scene, self.gravitational_parameter, distance)
 
     def fastest_rate(self, scene: Scene) -> Any:
