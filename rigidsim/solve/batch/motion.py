@@ -19,7 +19,7 @@ from rigidsim.solve.batch.lane_results import Lanes
 from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
 
-_LARGEST = float(np.exp(LARGEST - SMALL * np.log(2.0)))
+UNFELT = float(np.exp(LARGEST - SMALL * np.log(2.0)))
 """Of a vector's components, up to which no step knows of it."""
 
 
@@ -29,10 +29,13 @@ class BatchMotion:
     Args:
         crossings: its events.
         width: lanes of the integrators.
+        unfelt: largest component of tangent vectors of which one integrator serves both.
     """
 
-    def __init__(self, traced: TracedSystem, crossings: EventExpressions, width: int) -> None:
-        self._traced, self._crossings, self._width = traced, crossings, width
+    def __init__(
+        self, traced: TracedSystem, crossings: EventExpressions, width: int, unfelt: float = UNFELT
+    ) -> None:
+        self._traced, self._crossings, self._width, self._unfelt = traced, crossings, width, unfelt
         self._tangents = len(traced.system.states) > traced.moving
         planar = traced.system.requirements.formulation == "planar"
         self._may_share = self._tangents and planar and not traced.system.crossings
@@ -96,7 +99,7 @@ class BatchMotion:
         motion = replace(along, states=along.states[:, :moving])
         if not _same_bits(plain(tried), motion, tried):
             return plain(everybody), along.states
-        large = ~(np.abs(along.states[:, moving:]) < _LARGEST).all(axis=(0, 1))
+        large = ~(np.abs(along.states[:, moving:]) < self._unfelt).all(axis=(0, 1))
         again = np.flatnonzero(large | ~along.arrived | ~along.finite)
         if len(again):
             motion = replace(motion, states=motion.states.copy())

@@ -13,7 +13,7 @@ from rigidsim.solve.batch.events import EventExpressions
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.lane_results import Lanes
 from rigidsim.solve.batch.lanes import recommended_width
-from rigidsim.solve.batch.motion import BatchMotion
+from rigidsim.solve.batch.motion import UNFELT, BatchMotion
 from rigidsim.solve.batch.outputs import BatchOutputs, Values
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -86,9 +86,10 @@ class BatchRun:
 
     Args:
         width: lanes of the integrator; by default what the processor takes at once.
+        unfelt: of tangent vectors, as of ``BatchMotion``.
     """
 
-    def __init__(self, family: Family, width: int | None = None) -> None:
+    def __init__(self, family: Family, width: int | None = None, unfelt: float = UNFELT) -> None:
         self.family = family
         self.width = width or recommended_width()
         self._traced = family.traced
@@ -96,7 +97,7 @@ class BatchRun:
         self._precision = precision_of("double")
         self._clocks: dict[int, SampleClock] = {}
         self._crossings = EventExpressions(family.traced)
-        self._motion = BatchMotion(family.traced, self._crossings, self.width)
+        self._motion = BatchMotion(family.traced, self._crossings, self.width, unfelt)
         self._outputs = BatchOutputs(family.traced)
 
     def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:

@@ -21,11 +21,13 @@ FLIGHT = config(
 )
 
 
-def blocks_of(sweep: Sweep, members: list[int] | None = None, width: int | None = None) -> list[BatchBlock]:
-    """All members, run."""
+def blocks_of(
+    sweep: Sweep, members: list[int] | None = None, width: int | None = None, **options: float
+) -> list[BatchBlock]:
+    """All members, run with options of ``BatchRun``."""
     found = Families(Members.of(sweep, members)).sort()
     assert not found.alone
-    return [b for family, numbers in found.groups for b in BatchRun(family, width).blocks(numbers)]
+    return [b for family, numbers in found.groups for b in BatchRun(family, width, **options).blocks(numbers)]
 
 
 def by_member(blocks: list[BatchBlock]) -> dict[int, tuple[dict[str, np.ndarray], int, Status | None]]:

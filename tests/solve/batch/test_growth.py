@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from test_batch_families import FREE, ORBIT, PLANAR, TORQUE, swept
 from test_batch_lanes import blocks_of, by_member
 
 import rigidsim
-from rigidsim.solve.batch import motion
 from rigidsim.solve.batch.lanes import BatchEngine, Lanes, recommended_width
 
 RATES = {"initial.angular_velocity[2]": "uniform = [0.3, 2.2], count = 9"}
@@ -21,10 +21,10 @@ def growing(text: str) -> str:
     return text.replace('["angular_velocity", ', '["angular_velocity", "tangent_growth", ')
 
 
-def motions(text: str, axes: dict[str, str]) -> dict[int, Any]:
+def motions(text: str, axes: dict[str, str], **options: float) -> dict[int, Any]:
     """Bits of all that is recorded of members but the growth, which is apart; steps and status."""
     found = {}
-    for member, (values, *rest) in by_member(blocks_of(swept(text, axes))).items():
+    for member, (values, *rest) in by_member(blocks_of(swept(text, axes), **options)).items():
         growth = values.pop("tangent_growth", None)
         found[member] = ({name: table.tobytes() for name, table in values.items()}, rest), growth
     return found
@@ -57,22 +57,26 @@ def test_one_integrator_does_for_both_only_where_it_may(monkeypatch: pytest.Monk
     """Of planar members: those of large vectors are run without, and all where bits differ."""
     taken: list[tuple[int, int]] = []
     plain = BatchEngine.run
+    otherwise = False
 
     def counted(self: BatchEngine, initial: np.ndarray, *arguments: Any) -> Lanes:
         taken.append(initial.shape)
-        return plain(self, initial, *arguments)
+        lanes = plain(self, initial, *arguments)
+        if otherwise and initial.shape == tried:  # as a compiler may round beside other equations
+            return replace(lanes, states=np.nextafter(lanes.states, np.inf))
+        return lanes
 
+    whole, tried = (7, 9), (5, recommended_width())  # angle, spin, an orbit's place, work; the vector's two
     monkeypatch.setattr(BatchEngine, "run", counted)
     usual = motions(growing(PLANAR), RATES)
-    whole, tried = (7, 9), (5, recommended_width())  # angle, spin, an orbit's place, work; the vector's two
     assert taken == [whole, tried]
     taken.clear()
     growth = np.array([g[:, 0] for _, g in usual.values()]).max(axis=1)
-    monkeypatch.setattr(motion, "_LARGEST", np.exp(np.median(growth)) * 2.0**-900)
-    assert motions(growing(PLANAR), RATES).keys() == usual.keys()
+    some = motions(growing(PLANAR), RATES, unfelt=np.exp(np.median(growth)) * 2.0**-900)
+    assert some.keys() == usual.keys()
     assert taken[:2] == [whole, tried]
     assert 0 < taken[2][1] < 9
-    monkeypatch.setattr(motion, "_same_bits", lambda *_: False)
+    otherwise = True
     taken.clear()
     again = motions(growing(PLANAR), RATES)
     assert taken == [whole, tried, (5, 9)]
