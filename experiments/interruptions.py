@@ -140,7 +140,11 @@ class Ending:
     @property
     def prompt(self) -> bool:
         """Whether it kept the promise."""
-        return self.cpu is None or (self.cpu <= PROMISED and self.code == _INTERRUPTED)
+        return self.within(PROMISED)
+
+    def within(self, seconds: float) -> bool:
+        """Whether it was interrupted and ended within so many seconds of CPU time, if it hadn't before."""
+        return self.cpu is None or (self.cpu <= seconds and self.code == _INTERRUPTED)
 
     @property
     def words(self) -> str:

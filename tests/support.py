@@ -128,14 +128,11 @@ def unoptimised_code() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hy, "taylor_adaptive", _unoptimised(hy.taylor_adaptive, most=500))
         patch.setattr(hy, "cfunc", _unoptimised(hy.cfunc, most=2000))
-        patch.setattr(compiled, "_functions", _FUNCTIONS)
-        patch.setattr(compiled, "_engines", _ENGINES)
-        yield
+        with compiled.kept_in(_UNOPTIMISED):
+            yield
 
 
-# in a store of their own: the descriptions don't tell such code from others
-_FUNCTIONS: compiled.Kept[Any] = compiled.Kept(32)
-_ENGINES: compiled.Kept[Any] = compiled.Kept(8)
+_UNOPTIMISED = compiled.CodeStore()
 
 
 def _unoptimised(make: Callable[..., Any], most: int) -> Callable[..., Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 from pathlib import Path
@@ -30,6 +31,35 @@ def test_no_module_is_longer_than_the_page_says() -> None:
     assert f"at most {LONGEST} lines" in PAGE
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
     assert {path: length for path, length in lengths.items() if length > LONGEST} == {}
+
+
+def patched(code: str) -> list[str]:
+    """Private names and constants of others that a module sets: by ``setattr``, by a patch, or plainly."""
+    found: list[str] = []
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+            found += [] if own else [node.attr]
+        elif isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            if re.search(r"(setattr|delattr|patch|patch\.object|patch\.multiple)$", called):
+                found += [x.value for x in node.args[:2] if isinstance(x, ast.Constant) and str(x.value)]
+                found += [keyword.arg or "" for keyword in node.keywords]
+    names = (str(name).rpartition(".")[2] for name in found)
+    return [name for name in names if re.fullmatch(r"_(?!_)\w+|[A-Z][A-Z\d_]*", name)]
+
+
+def test_no_test_and_no_study_patches_what_is_private_or_constant() -> None:
+    """Tunables are arguments: what a test sets is what a user of the module could set as well."""
+    assert patched('m.setattr(charts, "NEAR", 0)\nm.setattr("a.b._c", 0)\nm.setattr(os, "replace", f)') == [
+        "NEAR",
+        "_c",
+    ]
+    assert patched("with mock.patch.multiple(A, _b=0, c=0): motion.LONG = 1\nself._d = 2") == ["_b", "LONG"]
+    folders = [ROOT / name for name in ("tests", "experiments", "docs")]
+    codes = {path: path.read_text(encoding="utf-8") for folder in folders for path in folder.rglob("*.py")}
+    codes.pop(ROOT / "experiments" / "peers" / "rebound_bs.py")  # which fills another library's structure in
+    assert {path: names for path, code in codes.items() if (names := patched(code))} == {}
 
 
 def test_a_run_takes_the_way_that_the_page_tells(tmp_path: Path) -> None:

@@ -42,15 +42,15 @@ def test_links_lead_to_places_of_the_site(pages: Path) -> None:
     assert "](configs/heavy_top_nutating.toml)" in (pages / "gallery.md").read_text(encoding="utf-8")
 
 
-def test_dead_links_are_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    docs = tmp_path / "docs"
-    docs.mkdir()
-    (docs / "page.md").write_text("[gone](nowhere.md), `[code](is.md)` and\n```\n[a fence](is.md)\n```\n")
-    monkeypatch.setattr(staging, "DOCS", docs)
-    monkeypatch.setattr(staging, "ROOT", tmp_path)
-    monkeypatch.setattr(staging, "ELSEWHERE", {})
+def test_dead_links_are_errors(tmp_path: Path) -> None:
+    for page in ("docs/page.md", *staging.ELSEWHERE):
+        (tmp_path / page).parent.mkdir(exist_ok=True)
+        (tmp_path / page).touch()
+    (tmp_path / "docs" / "page.md").write_text(
+        "[gone](nowhere.md), `[code](is.md)` and\n```\n[a fence](is.md)\n```\n"
+    )
     with pytest.raises(staging.DeadLinkError) as raised:
-        staging.gather(tmp_path / "pages")
+        staging.gather(tmp_path / "pages", tmp_path)
     assert str(raised.value) == "docs/page.md: [gone](nowhere.md) leads nowhere"
 
 

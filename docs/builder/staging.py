@@ -14,13 +14,9 @@ import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCS = ROOT / "docs"
-ELSEWHERE = {
-    ROOT / "README.md": "index.md",
-    ROOT / "CHANGELOG.md": "changelog.md",
-    ROOT / "experiments" / "README.md": "experiments/index.md",
-}
+ELSEWHERE = {"CHANGELOG.md": "changelog.md", "experiments/README.md": "experiments/index.md"}
 """Pages outside docs/, by their place in the site."""
+_FIRST = {"README.md": "index.md"}  # links to it lead to docs/index.md, with which the site begins
 _LINK = re.compile(r"(?<!`)(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
 _FENCE = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
 _ENTRY = re.compile(r"^- \[[^\]]+\]\(([\w/.-]+)\)|^- `(reference/[\w.]+\.md)`", re.MULTILINE)
@@ -30,8 +26,11 @@ class DeadLinkError(Exception):
     """A page links what isn't there."""
 
 
-def gather(folder: Path) -> list[Path]:
+def gather(folder: Path, root: Path = ROOT) -> list[Path]:
     """Write all pages, with what they show, into a folder.
+
+    Args:
+        root: of the repository.
 
     Returns:
         The pages, without those that are generated.
@@ -39,28 +38,30 @@ def gather(folder: Path) -> list[Path]:
     Raises:
         DeadLinkError: with all dead links of all pages.
     """
-    pages = {page: place_of(page) for page in [*sources(DOCS), *ELSEWHERE]}
-    pages.pop(ROOT / "README.md", None)  # the site begins with docs/index.md
+    found = [*sources(root / "docs"), *(root / name for name in ELSEWHERE)]
+    pages = {page: str(place_of(page, root)) for page in found}
     dead: list[str] = []
     for page, place in pages.items():
         text = _notebook_text(page) if page.suffix == ".ipynb" else page.read_text(encoding="utf-8")
         target = folder / place
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(_linked(text, page, place, folder, dead), encoding="utf-8")
+        target.write_text(_linked(text, page, folder, root, dead), encoding="utf-8")
     if dead:
         raise DeadLinkError("\n".join(dead))
     return [folder / place for place in pages.values()]
 
 
-def place_of(path: Path) -> str | None:
+def place_of(path: Path, root: Path) -> str | None:
     """Where a file of the repository lies in the site; None for what has no place of its own."""
-    if path in ELSEWHERE:
-        return ELSEWHERE[path]
-    if path.is_relative_to(DOCS):
-        return str(path.relative_to(DOCS).with_suffix(".md" if path.suffix == ".ipynb" else path.suffix))
-    if path.suffix in (".png", ".toml", ".gif"):
-        return str(path.relative_to(ROOT))
-    return None
+    if not path.is_relative_to(root):
+        return None
+    name = path.relative_to(root).as_posix()
+    if name in _FIRST or name in ELSEWHERE:
+        return (_FIRST | ELSEWHERE)[name]
+    if path.is_relative_to(root / "docs"):
+        page = path.relative_to(root / "docs")
+        return str(page.with_suffix(".md" if path.suffix == ".ipynb" else path.suffix))
+    return name if path.suffix in (".png", ".toml", ".gif") else None
 
 
 def add_contents(folder: Path) -> None:
@@ -105,8 +106,9 @@ def _notebook_text(page: Path) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _linked(text: str, page: Path, place: str, folder: Path, dead: list[str]) -> str:
+def _linked(text: str, page: Path, folder: Path, root: Path, dead: list[str]) -> str:
     """The text with its links as they are in the site; code is left as it is."""
+    place = Path(str(place_of(page, root)))
 
     def replaced(found: re.Match[str]) -> str:
         picture, words, target = found.groups()
@@ -115,17 +117,17 @@ def _linked(text: str, page: Path, place: str, folder: Path, dead: list[str]) ->
             return found[0]
         path = Path(os.path.normpath(page.parent / name))
         if not path.exists():
-            dead.append(f"{page.relative_to(ROOT)}: [{words}]({target}) leads nowhere")
+            dead.append(f"{page.relative_to(root)}: [{words}]({target}) leads nowhere")
             return found[0]
-        there = place_of(path)
+        there = place_of(path, root)
         if path.suffix == ".ipynb" and page == path:
-            there = str(path.relative_to(DOCS))
+            there = str(path.relative_to(root / "docs"))
         if there is None or path.is_dir():
             return words if "`" in words else f"`{words}`"
         if path.suffix not in (".md", ".ipynb") or page == path:
             (folder / there).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, folder / there)
-        way = os.path.relpath(there, Path(place).parent)
+        way = os.path.relpath(there, place.parent)
         return f"{picture}[{words}]({way}{hash_}{anchor})"
 
     parts = _FENCE.split(text)

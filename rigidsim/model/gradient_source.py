@@ -7,9 +7,9 @@ from typing import Any
 from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from __future__ import annotations
 import copy
 import pickle
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from threading import Lock
 from typing import Any, Generic, TypeVar
@@ -70,8 +71,27 @@ def limit_disk_cache() -> None:
         hy.llvm_state.set_diskcache_limit(DISK_LIMIT)
 
 
-_functions: Kept[CompiledFunction] = Kept(32)
-_engines: Kept[Integrator] = Kept(8)
+class CodeStore:
+    """Functions and engines that were compiled."""
+
+    def __init__(self) -> None:
+        self.functions: Kept[CompiledFunction] = Kept(32)
+        self.engines: Kept[Integrator] = Kept(8)
+
+
+_stores = [CodeStore()]
+
+
+@contextmanager
+def kept_in(store: CodeStore) -> Iterator[None]:
+    """Take compiled code from this store alone meanwhile, in all threads: for code that is compiled otherwise
+    than its description tells.
+    """
+    _stores.append(store)
+    try:
+        yield
+    finally:
+        _stores.remove(store)
 
 
 def compiled_function(
@@ -79,7 +99,7 @@ def compiled_function(
 ) -> CompiledFunction:
     """As ``heyoka.cfunc``; such functions have no state, and several threads may call the same."""
     expressions, variables = list(expressions), list(variables)
-    return _functions.get(
+    return _stores[-1].functions.get(
         (expressions, variables, sorted(options.items())),
         lambda: hy.cfunc(expressions, variables, **options),
     )
@@ -87,7 +107,7 @@ def compiled_function(
 
 def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> Integrator:
     """As ``heyoka.taylor_adaptive``, without events: an engine of one's own, as if it were newly compiled."""
-    made = _engines.get(
+    made = _stores[-1].engines.get(
         (list(equations), initial, sorted(options.items())),
         lambda: hy.taylor_adaptive(list(equations), initial, **options),
     )

@@ -169,11 +169,12 @@ def test_phases_given_again_add_up() -> None:
 
 
 def test_piped_lines_say_what_is_tried_and_compared_with(capsys: pytest.CaptureFixture[str]) -> None:
-    with LineObserver() as observer:
+    now = [0.0]
+    with LineObserver(lambda: now[0]) as observer:
         observer.choosing("free")
         observer.trying("double, quaternion", 0.0)
         observer.trying("double, quaternion", 0.3)  # too soon for another line
-        observer._latest -= 10
+        now[0] += 10
         observer.trying("double, quaternion", 0.6)
         observer.phase("certify")
         observer.trying("double, quaternion", 0.0)

@@ -642,9 +642,10 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
     prepared = prepare(rigidsim.load(config("a_name_of_more_than_twenty_four_letters", time="end = 1000")))
     screen = io.StringIO()
     console = Console(width=width, file=screen, force_terminal=True, color_system=None)
-    with TerminalObserver(console) as observer:
+    now = [0.0]
+    with TerminalObserver(console, lambda: now[0]) as observer:
         observer.started(prepared, Path("runs/x"))
-        observer._begin -= 3600.0  # an hour ago
+        now[0] += 3600.0
         observer.progressed(Progress(11, steps=7_200_000_000, time=250.0))
         observer._bar.refresh()
         shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n")
@@ -669,16 +670,15 @@ def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[
     from rigidsim.solve.problem import prepare
 
     prepared = prepare(rigidsim.load(config(time="start = 100\nend = 500")))
-    with LineObserver() as observer:
+    now = [0.0]
+    with LineObserver(lambda: now[0]) as observer:
         observer.started(prepared, Path("runs/free"))
         observer.progressed(Progress(11, steps=1, time=100.1))  # too soon for another line
-        observer._begin -= 100.0
-        observer._latest -= 100.0
+        now[0] += 100.0
         observer.progressed(Progress(11, steps=500_000, time=200.0))
         observer.started(prepared, Path("runs/free"))
         observer.resumed(Progress(11, steps=400_000, time=180.0))  # another session
-        observer._begin -= 100.0
-        observer._latest -= 100.0
+        now[0] += 100.0
         observer.progressed(Progress(11, steps=500_000, time=220.0))
         observer.phase("timeline")
     assert capsys.readouterr().err.splitlines() == [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import subprocess
 import sys
@@ -87,7 +88,8 @@ def test_a_wrong_expected_value_makes_the_exit_code_1(
     arguments = ["--out", str(tmp_path)]
     assert everything.main(["earth_free_nutation", "free_flight_energy", *arguments]) == 0
     assert "all passed" in capsys.readouterr().out
-    monkeypatch.setattr(earth, "FLATTENING", "0.003273795")  # the eighth digit
+    wrong = functools.partial(earth.study, flattening="0.003273795")  # the eighth digit
+    monkeypatch.setattr(earth, "study", wrong)
     assert common.main(earth.study, earth.NAME, arguments) == 1
     assert "FAILED" in capsys.readouterr().out
     assert everything.main(["earth_free_nutation", *arguments]) == 1

@@ -5,19 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import heyoka as hy
 import pytest
 from support import config, run_text, same_bits
 
 import rigidsim
-from rigidsim.model.system import System
 from rigidsim.solve.building import building, give_up, interruptible, take_up
-from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.turns.count import TurnCounter
-from rigidsim.solve.turns.followed import FollowedSystem
+from rigidsim.solve.compiled import compiled_engine
 
 PLAIN = "estimate = false"
 AWAKE = 60.0  # seconds that nobody waits for
@@ -67,17 +64,17 @@ def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pyt
     text = config(time="end = 60\nsamples = 241", integrator='formulation = "euler_angles"', output=PLAIN)
     whole = run_text(text, out=tmp_path / "whole")
     assert whole.summary["chart_changes"]["count"] > 0
-    compiled: Callable[[Stepper, System], Any] = Stepper._compiled
-    never = threading.Event()
+    never, charts = threading.Event(), []
 
-    def interrupted(self: Stepper, system: System) -> Any:
-        if system is self.system.partner:
+    def interrupted(equations: Any, *given: Any, **options: Any) -> Any:
+        charts.append(equations)
+        if len(charts) == 2:
             os.kill(os.getpid(), signal.SIGINT)
             never.wait(AWAKE)
-        return compiled(self, system)
+        return compiled_engine(equations, *given, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Stepper, "_compiled", interrupted)
+        patch.setattr("rigidsim.solve.stepper.compiled_engine", interrupted)
         run = run_text(text, out=tmp_path / "cut")
     never.set()
     assert run.status == "interrupted"
@@ -92,12 +89,12 @@ def test_ctrl_c_while_what_counts_turns_is_compiled(tmp_path: Path, monkeypatch:
     assert abs(whole.dataset["euler_angles"].values).max() > 100  # turns are counted
     never = threading.Event()
 
-    def interrupted(self: TurnCounter) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
         os.kill(os.getpid(), signal.SIGINT)
         never.wait(AWAKE)
 
     with monkeypatch.context() as patch:
-        patch.setattr(TurnCounter, "_build", interrupted)
+        patch.setattr("rigidsim.solve.turns.count.compiled_function", interrupted)
         run = run_text(text, out=tmp_path / "cut")
     never.set()
     assert run.status == "interrupted"
@@ -110,13 +107,14 @@ def test_charts_that_turns_are_counted_in_are_compiled_beside_the_main_thread(
 ) -> None:
     """A signal would wait for two charts of Euler angles in code of their own."""
     where: list[bool] = []
-    compiled = FollowedSystem._compiled
+    cfunc = hy.cfunc
 
-    def noted(self: FollowedSystem, twin: System) -> Any:
-        where.append(threading.current_thread() is threading.main_thread())
-        return compiled(self, twin)
+    def noted(expressions: Any, *given: Any, **options: Any) -> Any:
+        if len(expressions) == len(["wx", "wy", "wz", "qw", "qx", "qy", "qz"]):
+            where.append(threading.current_thread() is threading.main_thread())
+        return cfunc(expressions, *given, **options)
 
-    monkeypatch.setattr(FollowedSystem, "_compiled", noted)
+    monkeypatch.setattr(hy, "cfunc", noted)
     run_text(
         config(
             time="end = 60\nsamples = 3",
@@ -125,4 +123,4 @@ def test_charts_that_turns_are_counted_in_are_compiled_beside_the_main_thread(
         ),
         out=tmp_path,
     )
-    assert where == [False]
+    assert where == [False, False]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
@@ -20,9 +21,17 @@ _WIDE = 100  # columns from which simulated time has room
 
 
 class TerminalObserver(Observer):
-    """Draws one line: a bar, steps per second and time left; simulated time too where there is room."""
+    """Draws one line: a bar, steps per second and time left; simulated time too where there is room.
 
-    def __init__(self, console: Console | None = None) -> None:
+    Args:
+        console: that it draws on; stderr by default.
+        clock: tells the time, seconds.
+    """
+
+    def __init__(
+        self, console: Console | None = None, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self._clock = clock
         self._bar = Bar(
             TextColumn("[bold]{task.fields[title]}", markup=True),
             BarColumn(bar_width=None),
@@ -32,7 +41,7 @@ class TerminalObserver(Observer):
             expand=True,
         )
         self._task: TaskID | None = None
-        self._begin = time.perf_counter()
+        self._begin = self._clock()
 
     def __enter__(self) -> TerminalObserver:
         self._bar.start()
@@ -43,7 +52,7 @@ class TerminalObserver(Observer):
 
     def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
         """See ``Observer``."""
-        self._begin = time.perf_counter()
+        self._begin = self._clock()
         last = float(prepared.scene.samples.last) - float(prepared.scene.start)
         self._start = float(prepared.scene.start)
         self._last = last
@@ -63,7 +72,7 @@ class TerminalObserver(Observer):
         if self._task is None:
             return
         fraction = self._fraction(progress)
-        rate, to_go = self._pace.words(time.perf_counter() - self._begin, progress.steps, fraction)
+        rate, to_go = self._pace.words(self._clock() - self._begin, progress.steps, fraction)
         said = f"{100 * fraction:5.1f} %  {rate:>6} steps/s  {to_go}"
         if self._bar.console.width >= _WIDE:
             said += f"  t = {self._words.short(progress.time)}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,10 +22,15 @@ _LINE_EVERY = 5.0  # seconds between plain lines
 
 
 class LineObserver(Observer):
-    """One plain line every few seconds."""
+    """One plain line every few seconds.
 
-    def __init__(self) -> None:
-        self._begin = self._latest = time.perf_counter()
+    Args:
+        clock: tells the time, seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
+        self._begin = self._latest = clock()
         self._name = ""
         self._tried, self._verb = "", "trying"
 
@@ -36,7 +42,7 @@ class LineObserver(Observer):
 
     def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
         """See ``Observer``."""
-        self._begin = self._latest = time.perf_counter()
+        self._begin = self._latest = self._clock()
         self._name = prepared.scene.name
         self._start = float(prepared.scene.start)
         self._last = float(prepared.scene.samples.last) - self._start
@@ -53,7 +59,7 @@ class LineObserver(Observer):
 
     def progressed(self, progress: Progress) -> None:
         """See ``Observer``."""
-        now = time.perf_counter()
+        now = self._clock()
         if now - self._latest < _LINE_EVERY:
             return
         self._latest = now
@@ -84,7 +90,7 @@ class LineObserver(Observer):
 
     def trying(self, title: str, fraction: float) -> None:
         """See ``Observer``."""
-        now = time.perf_counter()
+        now = self._clock()
         if title != self._tried:
             self._tried, self._latest = title, now
             self._say(f"{self._verb} {title}")
