@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigidsim.scene.sweep import Sweep
 from support import config
 
 from rigidsim.errors import RigidsimError, StoppedError
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.cluster import Cluster
