@@ -33,7 +33,7 @@ from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
-from rigidsim.solve.trail import Trail
+from rigidsim.solve.trail import SampleTrail
 
 SHORT = 1.0
 """Seconds of an integration, below which what counts is milliseconds."""
@@ -141,7 +141,7 @@ def scenes(*, full: bool = False) -> dict[str, str]:
 class _Watched(SampleReceiver):
     """What a run keeps of its samples for the estimate."""
 
-    def __init__(self, trail: Trail) -> None:
+    def __init__(self, trail: SampleTrail) -> None:
         self.trail = trail
 
     def take(self, block: SampleBlock) -> None:
@@ -153,7 +153,7 @@ def measure(name: str, text: str) -> Measured:
     prepared = prepare(rigidsim.parse(text))
     started = time.process_time()
     parts = assemble(prepared)
-    watched = _Watched(Trail(prepared.precision))
+    watched = _Watched(SampleTrail(prepared.precision))
     loop = sampler(prepared, parts, watched)
     built = time.process_time()
     progress = loop.run()

@@ -14,7 +14,7 @@ from experiments.random_scenes import RandomScene
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.cost import cost
 from rigidsim.accuracy.error_law import closed_form_if_any
-from rigidsim.accuracy.reference import Kind
+from rigidsim.accuracy.reference import ReferenceKind
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import Trial, Trials, trial_scene
 from rigidsim.scene.config import Experiment
@@ -30,7 +30,7 @@ _TOLERANCES: dict[str, tuple[float | None, ...]] = {
 
 
 def truth_setting(
-    experiment: Experiment, setting: Setting, scene: RandomScene, against: Kind | None = None
+    experiment: Experiment, setting: Setting, scene: RandomScene, against: ReferenceKind | None = None
 ) -> Setting:
     """Twelve digits and more beyond the accuracy, ten beyond the run's own tolerance (which is far below the
     accuracy where the motion lets errors grow), and another precision or method than the certificate's.
@@ -41,7 +41,7 @@ def truth_setting(
     """
     digits = max(60, int(setting.bits * 0.302) + 40)  # and more than the run has
     closed = Setting(digits, method="closed_form")
-    if against is not Kind.CLOSED_FORM or scene.radians > _LONG:
+    if against is not ReferenceKind.CLOSED_FORM or scene.radians > _LONG:
         if closed_form_if_any(trial_scene(experiment, Setting()))[0] is not None:
             return closed
     elif scene.accuracy >= _TIGHT:

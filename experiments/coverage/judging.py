@@ -20,7 +20,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.status import Status
-from rigidsim.solve.trail import Trail
+from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import WarningCode
 
 MOST_STEPS = 100_000
@@ -79,7 +79,7 @@ class _Kept(SampleReceiver):
     def __init__(self, prepared: InitialValueProblem, evaluator: object) -> None:
         self._prepared, self._evaluator = prepared, evaluator
         self.statistics = SampleStatistics()
-        self.trail = Trail(prepared.precision)
+        self.trail = SampleTrail(prepared.precision)
         self.parts: dict[str, list[list[np.ndarray]]] = {}
 
     def take(self, block: SampleBlock) -> None:

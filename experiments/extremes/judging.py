@@ -26,7 +26,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
-from rigidsim.solve.trail import Trail
+from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import WarningCode
 
 FACTOR = 3.0
@@ -77,7 +77,7 @@ class _Samples(SampleReceiver):
     def __init__(self, prepared: InitialValueProblem, evaluator: Any, name: str) -> None:
         self._prepared, self._evaluator, self._name = prepared, evaluator, name
         self.statistics = SampleStatistics()
-        self.trail = Trail(prepared.precision)
+        self.trail = SampleTrail(prepared.precision)
         self.times: list[Any] = []
         self.rows: list[list[Any]] = []
 

@@ -20,8 +20,16 @@ from rigidsim.accuracy.comparison import (
     parts_of,
     rows_to_compare,
 )
-from rigidsim.accuracy.motion import Motion, motion_of
-from rigidsim.accuracy.reference import INCOMPARABLE, STANDARD, Kind, Policy, Reference, own_error, references
+from rigidsim.accuracy.motion import KnownMotion, motion_of
+from rigidsim.accuracy.reference import (
+    INCOMPARABLE,
+    STANDARD,
+    Policy,
+    Reference,
+    ReferenceKind,
+    own_error,
+    references,
+)
 from rigidsim.accuracy.setting import Setting, setting_of
 from rigidsim.accuracy.trial import Told, Trials, try_setting
 from rigidsim.model.load import Load
@@ -98,7 +106,7 @@ def certify(
     accuracy: float,
     accuracy_position: float | None = None,
     loads: Sequence[Load] = (),
-    known: Motion | None = None,
+    known: KnownMotion | None = None,
     told: Told | None = None,
     policy: Policy = STANDARD,
 ) -> Certificate | None:
@@ -142,7 +150,7 @@ class _Compared:
         own: that reference's own error, at most, rad.
     """
 
-    def __init__(self, dataset: xarray.Dataset, trials: Trials, motion: Motion, policy: Policy) -> None:
+    def __init__(self, dataset: xarray.Dataset, trials: Trials, motion: KnownMotion, policy: Policy) -> None:
         self.setting = setting_of(trials.experiment)
         self._trials, self._motion, self._policy = trials, motion, policy
         self._count = dataset.sizes["time"]
@@ -167,9 +175,9 @@ class _Compared:
     def against(self, reference: Reference) -> Certificate | None:
         """The certificate that a reference gives; None where it can't be had."""
         policy = self._policy
-        rows = self._rows[policy.wide_times if reference.kind is Kind.CLOSED_FORM else policy.times]
+        rows = self._rows[policy.wide_times if reference.kind is ReferenceKind.CLOSED_FORM else policy.times]
         safety = policy.safety if len(rows) == self._count else policy.picked_safety
-        if reference.kind is Kind.PEER:
+        if reference.kind is ReferenceKind.PEER:
             safety = policy.peer_safety
         places = [self._place[row] for row in rows]
         times = [self._times[place] for place in places]
@@ -201,7 +209,7 @@ class _Compared:
         """What a path may be wrong by, by its distance from the reference's: errors of the two are as those
         of a step are, but for scatter.
         """
-        if reference.kind is Kind.CLOSED_FORM:
+        if reference.kind is ReferenceKind.CLOSED_FORM:
             return safety * apart
         policy, own = self._policy, reference.setting
         share = own.level * policy.scatter_of(own, self._motion.steps) / self.setting.level

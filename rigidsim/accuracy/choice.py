@@ -17,7 +17,7 @@ from dataclasses import replace
 from rigidsim.accuracy.asked import leaves_choice, wanted
 from rigidsim.accuracy.cost import MEASURED, cost
 from rigidsim.accuracy.forecast import Forecasts
-from rigidsim.accuracy.motion import Motion
+from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon, setting_of
 from rigidsim.accuracy.trial import Told
 from rigidsim.errors import ConfigError, Problem
@@ -33,7 +33,7 @@ _LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100
 
 
 @dataclass(frozen=True)
-class Margins:
+class ChoiceMargins:
     """Between what is forecast and what was asked for.
 
     With the defaults 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice
@@ -52,7 +52,7 @@ class Margins:
     progress: float = 0.2
 
 
-MARGINS = Margins()
+MARGINS = ChoiceMargins()
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Choice:
     forecast: float
     steps: int
     why: str
-    known: Motion
+    known: KnownMotion
 
 
 def chosen(
@@ -113,7 +113,7 @@ def choose(
     loads: Sequence[Load] = (),
     beyond: Setting | None = None,
     told: Told | None = None,
-    margins: Margins = MARGINS,
+    margins: ChoiceMargins = MARGINS,
 ) -> Choice:
     """The cheapest setting whose forecast keeps an accuracy, within what the config leaves open.
 
@@ -164,7 +164,7 @@ def _first(forecasts: Forecasts, candidates: list[Setting], most: float, hope: f
     return None
 
 
-def _candidates(experiment: Experiment, motion: Motion) -> list[Setting]:
+def _candidates(experiment: Experiment, motion: KnownMotion) -> list[Setting]:
     """All that the config leaves open."""
     integrator = experiment.config.integrator
     given = integrator.model_fields_set

@@ -82,7 +82,7 @@ def run_pilot(
 
 
 @dataclass(frozen=True)
-class Motion:
+class KnownMotion:
     """What is known of a motion before its long run.
 
     Attributes:
@@ -115,14 +115,14 @@ class Motion:
 
 def motion_of(
     experiment: Experiment, *, loads: Sequence[Load] = (), pilot_steps: int = PILOT_STEPS
-) -> Motion:
+) -> KnownMotion:
     """Look at the beginning of a motion (some tens of milliseconds)."""
     scene = trial_scene(experiment, Setting())
     prepared = compactly(prepare_scene(experiment, scene, loads=loads))
     clock, precision = prepared.clock, prepared.precision
     begin, end = float(clock.start), float(clock.at(clock.count - 1))
     pilot = run_pilot(stepper_of(prepared.system, precision, None, clock.start), clock, steps=pilot_steps)
-    return Motion(
+    return KnownMotion(
         steps=pilot.whole,
         rate=float(prepared.system.rate_bound),
         seconds=float(scene.samples.last - scene.start),

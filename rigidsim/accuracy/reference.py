@@ -16,7 +16,7 @@ from enum import Enum
 
 import numpy as np
 
-from rigidsim.accuracy.motion import Motion
+from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.records import dataclass
@@ -80,7 +80,7 @@ class Policy:
 STANDARD = Policy()
 
 
-class Kind(Enum):
+class ReferenceKind(Enum):
     """What a reference is."""
 
     CLOSED_FORM = "closed form"
@@ -93,14 +93,14 @@ class Reference:
     """What a solution may be held against."""
 
     setting: Setting
-    kind: Kind = Kind.FINER
+    kind: ReferenceKind = ReferenceKind.FINER
 
     @property
     def how(self) -> str:
         """For the summary."""
-        if self.kind is Kind.CLOSED_FORM:
+        if self.kind is ReferenceKind.CLOSED_FORM:
             return f"against the closed form, {self.setting.precision}"
-        if self.kind is Kind.PEER:
+        if self.kind is ReferenceKind.PEER:
             return f"against {self.setting.title}, which is independent but no more accurate"
         return f"against {self.setting.title}"
 
@@ -109,7 +109,7 @@ class Reference:
 
 
 def references(
-    setting: Setting, motion: Motion, accuracy: float, policy: Policy = STANDARD
+    setting: Setting, motion: KnownMotion, accuracy: float, policy: Policy = STANDARD
 ) -> list[Reference]:
     """Those of a whole run, from cheap to costly.
 
@@ -134,7 +134,7 @@ def references(
     else:
         other = "rotation_matrix" if setting.formulation == "quaternion" else "quaternion"
         peer = replace(setting, formulation=other, tolerance=None, method="taylor")
-        costly.append(Reference(peer, Kind.PEER))
+        costly.append(Reference(peer, ReferenceKind.PEER))
     finer = [stepped_reference(p, motion, motion.steps, policy) for p in stepped]
     return [
         *(Reference(_only_as_good(s, setting, motion, accuracy, policy)) for s in finer),
@@ -150,11 +150,11 @@ def digits_beyond(precision: str | int) -> int:
 def closed_form_beyond(precision: str | int) -> Reference:
     """The closed form with more digits than a precision; it costs the same at any horizon."""
     digits = "quadruple" if working_bits(precision) <= 64 else digits_beyond(precision)
-    return Reference(Setting(digits, method="closed_form"), Kind.CLOSED_FORM)
+    return Reference(Setting(digits, method="closed_form"), ReferenceKind.CLOSED_FORM)
 
 
 def stepped_reference(
-    precision: str | int, motion: Motion, steps: float, policy: Policy, formulation: str = "quaternion"
+    precision: str | int, motion: KnownMotion, steps: float, policy: Policy, formulation: str = "quaternion"
 ) -> Setting:
     """An integration at a precision's epsilon. Invariants are projected where that is right: with more digits
     than 64 bits rounding doesn't matter, nor does it over a short way in double precision.
@@ -167,7 +167,7 @@ def stepped_reference(
 
 
 def _only_as_good(
-    reference: Setting, setting: Setting, motion: Motion, accuracy: float, policy: Policy
+    reference: Setting, setting: Setting, motion: KnownMotion, accuracy: float, policy: Policy
 ) -> Setting:
     """A reference with many digits needs less than all."""
     if reference.bits <= 64:
@@ -180,7 +180,7 @@ def _only_as_good(
 
 def closed_form_to(digits: int) -> Reference:
     """The closed form, whatever it is to judge: for many settings at once."""
-    return Reference(Setting(digits, method="closed_form"), Kind.CLOSED_FORM)
+    return Reference(Setting(digits, method="closed_form"), ReferenceKind.CLOSED_FORM)
 
 
 def best_and_second(precision: str | int) -> tuple[Setting, Setting]:
@@ -233,7 +233,7 @@ def own_error(
     reference: Reference,
     setting: Setting,
     difference: float,
-    motion: Motion,
+    motion: KnownMotion,
     distance: Callable[[Setting], float],
     policy: Policy,
 ) -> float:
@@ -246,7 +246,7 @@ def own_error(
         difference: of the run from the reference, largest.
         distance: of the reference from another setting's solution, largest; inf where there is none.
     """
-    if reference.kind is Kind.CLOSED_FORM:
+    if reference.kind is ReferenceKind.CLOSED_FORM:
         return 0.0  # dozens of digits more than the run
     own = reference.setting
     level = own.level * policy.scatter_of(own, motion.steps)

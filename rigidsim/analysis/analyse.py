@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from rigidsim.analysis.decomposition import Found, amplitude_spectrum, decompose
+from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, decompose
 from rigidsim.analysis.labels import Known, label, reversed_label, settled
-from rigidsim.analysis.result import Analysis, Line, SignalAnalysis
-from rigidsim.analysis.signals import Clock, Signal, clock_of, signals_of
+from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
+from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.records import dataclass
 
@@ -26,13 +26,13 @@ class _Raw:
     """A signal before its lines have names, with frequencies in rad/s."""
 
     signal: Signal
-    found: Found
+    found: Decomposition
     frequencies: tuple[Any, ...]
     errors: tuple[float, ...]
     spectrum: tuple[Any, Any]
     bits: int
 
-    def finest(self, line: Line) -> float:
+    def finest(self, line: SpectralLine) -> float:
         """Of a line's frequency: its error as it was found, rad/s."""
         distance = [abs(abs(float(f)) - abs(float(line.observed))) for f in self.frequencies]
         return self.errors[distance.index(min(distance))]
@@ -97,7 +97,7 @@ def analyse_dataset(
     )
 
 
-def _raw(signal: Signal, clock: Clock, lines: int, floor: float, order: int | None) -> _Raw:
+def _raw(signal: Signal, clock: EquidistantTimes, lines: int, floor: float, order: int | None) -> _Raw:
     samples = signal.samples(clock)
     found = decompose(samples, lines, signal.degree, floor, order)
     per_sample = 2 * clock.context.pi / clock.spacing
@@ -117,7 +117,7 @@ def _raw(signal: Signal, clock: Clock, lines: int, floor: float, order: int | No
     )
 
 
-def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: Clock) -> list[Known]:
+def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: EquidistantTimes) -> list[Known]:
     """The equinox goes back with the precession that was measured, where it was and isn't known already."""
     names = list(known)
     if not known or any(k.name == "precession" for k in known):
@@ -130,13 +130,13 @@ def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: Clock)
     return names
 
 
-def _rate(raw: _Raw, clock: Clock) -> tuple[Any, float]:
+def _rate(raw: _Raw, clock: EquidistantTimes) -> tuple[Any, float]:
     slope = raw.found.sum.polynomial[1].real
     per_second = 2 / clock.length
     return slope * per_second, raw.found.polynomial_errors[1] * float(per_second)
 
 
-def _named(raw: _Raw, clock: Clock, known: Sequence[Known]) -> SignalAnalysis:
+def _named(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known]) -> SignalAnalysis:
     found, signal = raw.found, raw.signal
     lines = [
         _line(raw, clock, known, n)
@@ -165,7 +165,7 @@ def _named(raw: _Raw, clock: Clock, known: Sequence[Known]) -> SignalAnalysis:
     )
 
 
-def _line(raw: _Raw, clock: Clock, known: Sequence[Known], n: int) -> Line:
+def _line(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], n: int) -> SpectralLine:
     context = clock.context
     observed, error = raw.frequencies[n], raw.errors[n]
     amplitude = raw.found.sum.amplitudes[n]
@@ -202,7 +202,7 @@ def _line(raw: _Raw, clock: Clock, known: Sequence[Known], n: int) -> Line:
             error = max(error, abs(mismatch))  # a blend of lines that are too close to be told apart
     size = abs(complex(amplitude))
     amplitude_error = raw.found.amplitude_errors[n]
-    return Line(
+    return SpectralLine(
         frequency=frequency,
         observed=observed,
         frequency_error=error,
@@ -221,7 +221,9 @@ def _wrapped(context: Any, angle: Any) -> Any:
     return -angle if angle + context.pi < 1e-6 else angle
 
 
-def _notes(raw: _Raw, clock: Clock, known: Sequence[Known], lines: Sequence[Line]) -> list[str]:
+def _notes(
+    raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], lines: Sequence[SpectralLine]
+) -> list[str]:
     notes = []
     length = float(clock.length)
     if raw.found.close:

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigidsim.analysis.exponentials import Reals, Sum
-from rigidsim.analysis.refinement import Samples, error_growth, mirrored, refined, remainder
+from rigidsim.analysis.refinement import SignalSamples, error_growth, mirrored, refined, remainder
 from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
 from rigidsim.scene.records import dataclass
 
@@ -32,7 +32,7 @@ _HIGHEST_ORDER = 10
 
 
 @dataclass(frozen=True)
-class Found:
+class Decomposition:
     """What a signal consists of; complex lines of real signals come with their mirror images.
 
     Attributes:
@@ -59,7 +59,9 @@ class Found:
     exhausted: bool
 
 
-def decompose(samples: Samples, lines: int, degree: int, floor: float, order: int | None = None) -> Found:
+def decompose(
+    samples: SignalSamples, lines: int, degree: int, floor: float, order: int | None = None
+) -> Decomposition:
     """Find the strongest lines and a polynomial.
 
     Args:
@@ -127,7 +129,7 @@ def _merged(total: Sum, real: bool) -> int | None:
 class _Search:
     """One line after the other, the strongest first, all refined after each."""
 
-    def __init__(self, samples: Samples, degree: int, order: int) -> None:
+    def __init__(self, samples: SignalSamples, degree: int, order: int) -> None:
         self.samples, self.order = samples, order
         context = samples.context
         self.total = Sum(context, samples.count, (context.mpc(0),) * (degree + 1), (), ())
@@ -201,7 +203,7 @@ class _Search:
         self.total = refined(self.samples, self.total, self.order, steps=_STEPS)
 
 
-def _judged(samples: Samples, total: Sum, order: int, search: _Search) -> Found:
+def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> Decomposition:
     """With errors from what is left."""
     left = remainder(samples, total)
     found = spectrum(left, order, real=samples.real)
@@ -228,7 +230,7 @@ def _judged(samples: Samples, total: Sum, order: int, search: _Search) -> Found:
         amplitude_errors.append(math.hypot(level, finest * strength))
     level = beside(0.0)
     polynomial_errors = [level * growth[m] * spread**m / second**m for m in range(powers)]
-    return Found(
+    return Decomposition(
         total,
         order,
         tuple(frequency_errors),
@@ -241,7 +243,7 @@ def _judged(samples: Samples, total: Sum, order: int, search: _Search) -> Found:
     )
 
 
-def amplitude_spectrum(samples: Samples, found: Found, points: int) -> tuple[Reals, Reals]:
+def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int) -> tuple[Reals, Reals]:
     """Frequencies (turns per sample) and sizes of the signal's spectrum without its secular part, for a
     picture: of neighbours the largest, so that no line is lost. Of a real signal the amplitude of the cosine.
     """

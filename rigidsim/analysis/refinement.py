@@ -19,7 +19,7 @@ _MOST_STEPS = 25
 
 
 @dataclass(frozen=True)
-class Samples:
+class SignalSamples:
     """Equidistant samples of a signal, from sample numbers.
 
     Attributes:
@@ -55,7 +55,7 @@ def mirrored(total: Sum, real: bool) -> Sum:
     )
 
 
-def remainder(samples: Samples, total: Sum) -> Complexes:
+def remainder(samples: SignalSamples, total: Sum) -> Complexes:
     """What is left of a signal, in double precision."""
     whole = mirrored(total, samples.real)
     left = whole.left_of(samples.parts, samples.bits)
@@ -64,7 +64,7 @@ def remainder(samples: Samples, total: Sum) -> Complexes:
     return np.asarray(left.real + 0j if samples.real else left, dtype=np.complex128)
 
 
-def refined(samples: Samples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
+def refined(samples: SignalSamples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
     """Newton's method from where a sum is, as long as it gains."""
     if not total.frequencies and not total.polynomial:
         return total
@@ -80,7 +80,7 @@ def refined(samples: Samples, total: Sum, order: int, steps: int = _MOST_STEPS) 
     return total
 
 
-def _step(samples: Samples, total: Sum, left: Complexes, order: int) -> tuple[float, Sum, float]:
+def _step(samples: SignalSamples, total: Sum, left: Complexes, order: int) -> tuple[float, Sum, float]:
     """The largest change of an amplitude, the sum after the step, and the step's size over the signal's."""
     context, count = total.context, total.count
     whole = mirrored(total, samples.real)

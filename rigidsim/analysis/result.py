@@ -22,7 +22,7 @@ TURN = 2 * np.pi
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """One line: of a real signal A cos(w t + phase), of a complex one A exp(i (w t + phase)).
 
     Attributes:
@@ -84,7 +84,7 @@ class SignalAnalysis:
     value_error: float
     rate: Any
     rate_error: float
-    lines: tuple[Line, ...]
+    lines: tuple[SpectralLine, ...]
     order: int
     bits: int
     left: float

@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.analysis.decomposition import Samples
+from rigidsim.analysis.refinement import SignalSamples
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.records import dataclass
 from rigidsim.store.variables import parts_in
@@ -43,7 +43,7 @@ FIRST = (
 
 
 @dataclass(frozen=True)
-class Clock:
+class EquidistantTimes:
     """Equidistant times.
 
     Attributes:
@@ -76,7 +76,7 @@ class Clock:
         return float(math.pi / self.spacing)
 
 
-def clock_of(dataset: xarray.Dataset) -> Clock:
+def clock_of(dataset: xarray.Dataset) -> EquidistantTimes:
     """The times of a dataset.
 
     Raises:
@@ -102,7 +102,7 @@ def clock_of(dataset: xarray.Dataset) -> Clock:
     spacing = (last - first) / (count - 1)
     _refuse_uneven(parts[0], float(first), float(spacing))
     late = _late(parts[0], first, spacing) if len(parts) == 1 else None
-    return Clock(first, spacing, count, bits, context, late)
+    return EquidistantTimes(first, spacing, count, bits, context, late)
 
 
 def _late(times: Reals, first: Any, spacing: Any) -> Reals:
@@ -164,7 +164,7 @@ class Signal:
     dataset: xarray.Dataset
     components: tuple[dict[str, Any], ...]
 
-    def samples(self, clock: Clock) -> Samples:
+    def samples(self, clock: EquidistantTimes) -> SignalSamples:
         """All values.
 
         Raises:
@@ -183,7 +183,9 @@ class Signal:
                 f"{self.name}: not all samples are finite; analyse needs a part without gaps, for instance "
                 "dataset.isel(time=slice(0, 1000))"
             )
-        return Samples(tuple(parts), self.real, bits_of(self.dataset, len(parts)), clock.context, clock.late)
+        return SignalSamples(
+            tuple(parts), self.real, bits_of(self.dataset, len(parts)), clock.context, clock.late
+        )
 
     @property
     def in_body(self) -> bool:

@@ -13,11 +13,11 @@ from pathlib import Path
 
 from rigidsim.formats import ccsds
 from rigidsim.formats.naming import labels
-from rigidsim.formats.registry import Format, Source
+from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table
 
 
-def write_aem(table: Table, path: Path, source: Source) -> None:
+def write_aem(table: Table, path: Path, source: TableSource) -> None:
     """Write the attitude of one run.
 
     Args:

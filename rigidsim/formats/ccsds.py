@@ -17,8 +17,8 @@ import numpy as np
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.decimals import decimals
 from rigidsim.formats.naming import Labels
-from rigidsim.formats.registry import Source
-from rigidsim.formats.tables import Column, Table
+from rigidsim.formats.registry import TableSource
+from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.epochs import DIGITS, Epoch
 
 LONGEST_LINE = 254
@@ -58,7 +58,7 @@ def _keyword(name: str, value: str) -> str:
 def opening(
     message: str,
     table: Table,
-    source: Source,
+    source: TableSource,
     labels: Labels,
     frames: Sequence[tuple[str, str]],
     *ending: str,
@@ -104,7 +104,7 @@ def _comments(lines: Sequence[str]) -> list[str]:
     return [f"COMMENT {line[: LONGEST_LINE - 8]}" for line in plain]
 
 
-def columns_of(table: Table, variable: str, labels: Sequence[str], message: str) -> list[Column]:
+def columns_of(table: Table, variable: str, labels: Sequence[str], message: str) -> list[TableColumn]:
     """The columns of a variable.
 
     Raises:
@@ -138,7 +138,7 @@ def _span(table: Table, epoch: Epoch, bits: int) -> tuple[str, str]:
 
 def data_lines(
     table: Table,
-    columns: Sequence[Column],
+    columns: Sequence[TableColumn],
     epoch: Epoch,
     bits: int,
     shown: Callable[[list[Decimal]], list[Decimal]],

@@ -15,13 +15,13 @@ import numpy as np
 
 from rigidsim.formats.decimals import texts
 from rigidsim.formats.naming import named_epoch
-from rigidsim.formats.registry import Format, Source
-from rigidsim.formats.tables import Column, Table
+from rigidsim.formats.registry import Format, TableSource
+from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.epochs import DIGITS, Epoch
 from rigidsim.scene.records import dataclass
 
 
-def write_csv(table: Table, path: Path, source: Source) -> None:
+def write_csv(table: Table, path: Path, source: TableSource) -> None:
     """Write one table.
 
     Args:
@@ -57,7 +57,7 @@ def write_csv(table: Table, path: Path, source: Source) -> None:
             file.writelines(",".join(row) + "\n" for row in zip(*shown, strict=True))
 
 
-def _shown(column: Column, parts: list[np.ndarray], source: Source) -> list[str]:
+def _shown(column: TableColumn, parts: list[np.ndarray], source: TableSource) -> list[str]:
     """One column's numbers, or its texts in quotes."""
     if column.kind == "U":
         return [f'"{_on_one_line(text).replace(chr(34), chr(34) * 2)}"' for text in parts[0]]
@@ -65,7 +65,7 @@ def _shown(column: Column, parts: list[np.ndarray], source: Source) -> list[str]
 
 
 @dataclass(frozen=True)
-class _Dates:
+class _DateColumns:
     """Dates of a table's rows.
 
     Attributes:
@@ -73,21 +73,21 @@ class _Dates:
     """
 
     epoch: Epoch
-    times: Column
+    times: TableColumn
 
     def text(self, seconds: str) -> str:
         """Of a time of the scene, s."""
         return self.epoch.after(Decimal(seconds)).calendar()
 
 
-def _dates(table: Table, source: Source) -> _Dates | None:
+def _dates(table: Table, source: TableSource) -> _DateColumns | None:
     """Where time 0 is known and the calendar reaches from the first row to the last."""
     if not table.dated:
         return None
     times = next((c for c in table.columns if re.fullmatch(r"(.*_)?time", c.variable)), None)
     if times is None or not table.rows or not (source.naming.epoch or source.attributes.get("epoch")):
         return None
-    found = _Dates(named_epoch(source.naming, source.attributes), times)
+    found = _DateColumns(named_epoch(source.naming, source.attributes), times)
     try:
         for row in (0, -1):
             found.text(repr(float(table.dataset[times.variable][row])))

@@ -16,7 +16,7 @@ import numpy as np
 import xarray
 
 from rigidsim.formats.angles import converted
-from rigidsim.formats.tables import BLOCK_NUMBERS, Column, Table, columns_of
+from rigidsim.formats.tables import BLOCK_NUMBERS, Table, TableColumn, columns_of
 from rigidsim.look.angle_units import AngleUnit
 from rigidsim.scene.records import dataclass
 from rigidsim.store.sweeps.dataset import boxes
@@ -40,7 +40,7 @@ class MemberTable(Table):
     """
 
     members: tuple[str, ...] = ()
-    values: tuple[Column, ...] = ()
+    values: tuple[TableColumn, ...] = ()
     reasons: dict[int, str] = field(default_factory=dict)
     block_numbers: int = BLOCK_NUMBERS
 
@@ -76,7 +76,7 @@ class MemberTable(Table):
         return False
 
     def blocks(
-        self, columns: Sequence[Column] | None = None, rows: int = 0
+        self, columns: Sequence[TableColumn] | None = None, rows: int = 0
     ) -> Iterator[list[list[np.ndarray]]]:
         """See ``Table.blocks``; how many rows a block has follows from the number of columns."""
         wanted = self.columns if columns is None else columns
@@ -90,7 +90,7 @@ class MemberTable(Table):
                     here[self.dim] = slice(steps.start, steps.stop)
                 yield self._block(wanted, _Block(self.dataset.isel(here), flat, steps))
 
-    def _block(self, wanted: Sequence[Column], block: _Block) -> list[list[np.ndarray]]:
+    def _block(self, wanted: Sequence[TableColumn], block: _Block) -> list[list[np.ndarray]]:
         """The parts of some columns; rows of a long table without any number are left out."""
         if self.dim == MEMBER:
             return [self._parts(column, block) for column in wanted]
@@ -98,7 +98,7 @@ class MemberTable(Table):
         kept = np.any([~np.isnan(values) for values in numbers], axis=0)
         return [[part[kept] for part in self._parts(column, block)] for column in wanted]
 
-    def _parts(self, column: Column, block: _Block) -> list[np.ndarray]:
+    def _parts(self, column: TableColumn, block: _Block) -> list[np.ndarray]:
         """The parts of one column, (rows of the block,) each."""
         if column.name == MEMBER:
             return [np.repeat(np.arange(block.members.start, block.members.stop), len(block.steps))]
@@ -159,7 +159,7 @@ def member_tables(
     axes = [str(name) for name, variable in dataset.variables.items() if "swept_key" in variable.attrs]
     axes.sort(key=lambda name: next((i for i, dim in enumerate(members) if name in (dim, f"{dim}_value")), 0))
     labels = [c for name in axes for c in columns_of(dataset, name, angle_unit, members)]
-    kept: dict[str, list[Column]] = {MEMBER: []}
+    kept: dict[str, list[TableColumn]] = {MEMBER: []}
     names = [str(name) for name, found in dataset.data_vars.items() if set(members) <= set(found.dims)]
     names.sort(key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name))
     for name in names:
@@ -190,6 +190,6 @@ def _is_long(dim: str, members: Sequence[str]) -> bool:
     return dim not in members and (dim in _LONG or dim.endswith("_occurrence"))
 
 
-def _made(name: str, kind: str, long_name: str) -> Column:
+def _made(name: str, kind: str, long_name: str) -> TableColumn:
     """A column that is no variable of the dataset."""
-    return Column(name, "", (), (name,), {"units": "1", "long_name": long_name}, kind)
+    return TableColumn(name, "", (), (name,), {"units": "1", "long_name": long_name}, kind)

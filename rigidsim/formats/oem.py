@@ -7,13 +7,13 @@ from pathlib import Path
 
 from rigidsim.formats import ccsds
 from rigidsim.formats.naming import labels
-from rigidsim.formats.registry import Format, Source
+from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table
 
 _KILO = -3  # metres to kilometres, exactly, as a shift of the decimal point
 
 
-def write_oem(table: Table, path: Path, source: Source) -> None:
+def write_oem(table: Table, path: Path, source: TableSource) -> None:
     """Write the flight of one run, km and km/s.
 
     Args:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigidsim.formats.registry import Format, Source
+from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import BLOCK_ROWS, Table
 
 
-def write_parquet(table: Table, path: Path, source: Source) -> None:
+def write_parquet(table: Table, path: Path, source: TableSource) -> None:
     """Write one table; ``pyarrow`` must be there.
 
     Args:

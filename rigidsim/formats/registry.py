@@ -17,7 +17,7 @@ from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)
-class Source:
+class TableSource:
     """The run, or the sweep, that a table is of.
 
     Attributes:
@@ -47,7 +47,7 @@ class Format:
         folder: what such a folder is called, and a file by which one is known; None: it is a file.
     """
 
-    write: Callable[[Table, Path, Source], None]
+    write: Callable[[Table, Path, TableSource], None]
     package: str = ""
     angles: bool = False
     side_tables: bool = False

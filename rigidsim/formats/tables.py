@@ -25,7 +25,7 @@ BLOCK_NUMBERS = 1 << 21  # 16 MB
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """One component of a variable.
 
     Attributes:
@@ -95,7 +95,7 @@ class Table:
     """
 
     dim: str
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     dataset: xarray.Dataset
     bits: int = 53
 
@@ -119,12 +119,12 @@ class Table:
         """What its rows are, for the comment at a file's top."""
         return f"{self.rows} rows along {self.dim}"
 
-    def column(self, name: str) -> Column | None:
+    def column(self, name: str) -> TableColumn | None:
         """By name; None where there is none."""
         return next((column for column in self.columns if column.name == name), None)
 
     def blocks(
-        self, columns: Sequence[Column] | None = None, rows: int = BLOCK_ROWS
+        self, columns: Sequence[TableColumn] | None = None, rows: int = BLOCK_ROWS
     ) -> Iterator[list[list[np.ndarray]]]:
         """Parts of each column, block by block: ``block[column][part]`` has shape (at most ``rows``,)."""
         wanted = self.columns if columns is None else columns
@@ -134,7 +134,7 @@ class Table:
             read = {name: self.dataset[name].isel(here).values for name in names}
             yield [self._values(column, read) for column in wanted]
 
-    def _values(self, column: Column, read: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+    def _values(self, column: TableColumn, read: Mapping[str, np.ndarray]) -> list[np.ndarray]:
         """The parts of one column."""
         parts = [_column(read[part], column.index) for part in column.parts]
         unit = column.angle_unit
@@ -157,7 +157,7 @@ def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits
     variables = dataset.variables
     names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind in "fM"]
     names.sort(key=lambda name: (name != "time", name not in dataset.coords))
-    columns: dict[str, list[Column]] = {}
+    columns: dict[str, list[TableColumn]] = {}
     for name in names:
         columns.setdefault(str(variables[name].dims[0]), []).extend(columns_of(dataset, name, angle_unit))
     return [Table(dim, tuple(found), dataset, bits) for dim, found in columns.items() if found]
@@ -165,7 +165,7 @@ def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits
 
 def columns_of(
     dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None = None, rows: Sequence[str] = ()
-) -> list[Column]:
+) -> list[TableColumn]:
     """The columns of a variable, one for each component; none for a residual, which its value's columns hold.
 
     Args:
@@ -186,5 +186,5 @@ def columns_of(
     found = []
     for index in product(*(range(len(names)) for names in labels)):
         suffix = "".join(f"_{names[i]}" for names, i in zip(labels, index, strict=True))
-        found.append(Column(name, suffix, index, parts, dict(variable.attrs), kind, unit))
+        found.append(TableColumn(name, suffix, index, parts, dict(variable.attrs), kind, unit))
     return found

@@ -10,7 +10,7 @@ import xarray
 
 from rigidsim.formats.angles import RADIAN, converted
 from rigidsim.formats.member_tables import MemberTable
-from rigidsim.formats.registry import Format, Source
+from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table
 from rigidsim.look.angle_units import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
@@ -21,7 +21,7 @@ BLOCK_ROWS = 8 * CHUNK_ROWS
 _SLAB_BLOCKS = 8  # 128 MB at once: each is an append
 
 
-def write_zarr(table: Table, path: Path, source: Source) -> None:
+def write_zarr(table: Table, path: Path, source: TableSource) -> None:
     """Write a store, a folder that doesn't exist yet, block by block along time, or a sweep's first axis.
 
     Args:
@@ -55,7 +55,7 @@ def write_zarr(table: Table, path: Path, source: Source) -> None:
     last.to_zarr(path, mode="a", zarr_format=2, consolidated=True)
 
 
-def _plain(dataset: xarray.Dataset, source: Source) -> xarray.Dataset:
+def _plain(dataset: xarray.Dataset, source: TableSource) -> xarray.Dataset:
     """In memory, with angles in the unit that is asked for, without the HDF5 file's own encodings."""
     loaded = dataset.load().copy()
     if source.angle_unit is not None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene import rotations
-from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Line, Outline, Revolved
+from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Outline, Revolved, StraightPiece
 from rigidsim.scene.bodies.shapes import SHAPES
 from rigidsim.scene.records import dataclass
 
@@ -230,7 +230,7 @@ def _box(a: float, b: float, c: float) -> Mesh:
     return _soup(np.array(corners), np.array(normals), np.array(colors))
 
 
-def revolved(pieces: Sequence[Line | Arc], *, middle: float = 0.0) -> Mesh:
+def revolved(pieces: Sequence[StraightPiece | Arc], *, middle: float = 0.0) -> Mesh:
     """Mesh of a solid of revolution about z from its outline, metres; its colours change at z = `middle`."""
     profile, normals = zip(*map(_profile, pieces), strict=True)
     return _revolve(np.concatenate(profile), np.concatenate(normals), middle=middle)
@@ -268,9 +268,9 @@ def _revolve(profile: Array, normals: Array, segments: int = SEGMENTS, *, middle
     return _soup(corners, split(*quads(normals)), colors)
 
 
-def _profile(piece: Line | Arc, rings: int = MINOR_SEGMENTS) -> tuple[Array, Array]:
+def _profile(piece: StraightPiece | Arc, rings: int = MINOR_SEGMENTS) -> tuple[Array, Array]:
     """Straight pieces of an outline, and the normals at their ends, as ``_revolve`` takes them."""
-    if isinstance(piece, Line):  # in two, for its two colours
+    if isinstance(piece, StraightPiece):  # in two, for its two colours
         nodes = np.linspace(piece.start, piece.stop, 3)
         along = nodes[-1] - nodes[0]
         normals = np.tile([along[1], -along[0]] / np.hypot(*along), (3, 1))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.solids import MINOR_SEGMENTS, Mesh, ball, revolved
-from rigidsim.scene.bodies.outlines import Line
+from rigidsim.scene.bodies.outlines import StraightPiece
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]
@@ -25,12 +25,12 @@ def spinning_top(radius: float, height: float, whole: float) -> Mesh:
     """
     stem, rim = 0.09 * radius, 0.13 * radius
     pieces = (
-        Line((0.0, 0.0), (0.30 * radius, height - 3.2 * rim)),
-        Line((0.30 * radius, height - 3.2 * rim), (radius, height - rim)),
-        Line((radius, height - rim), (radius, height + rim)),
-        Line((radius, height + rim), (stem, height + 3.0 * rim)),
-        Line((stem, height + 3.0 * rim), (stem, whole)),
-        Line((stem, whole), (0.0, whole)),
+        StraightPiece((0.0, 0.0), (0.30 * radius, height - 3.2 * rim)),
+        StraightPiece((0.30 * radius, height - 3.2 * rim), (radius, height - rim)),
+        StraightPiece((radius, height - rim), (radius, height + rim)),
+        StraightPiece((radius, height + rim), (stem, height + 3.0 * rim)),
+        StraightPiece((stem, height + 3.0 * rim), (stem, whole)),
+        StraightPiece((stem, whole), (0.0, whole)),
     )
     return revolved(pieces, middle=height)
 

@@ -16,7 +16,7 @@ from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.paired_products import pairs_products
 from rigidsim.model.parity import refuse_odd_loads
-from rigidsim.model.planar import Plane, asked_plane, gradient_plane
+from rigidsim.model.planar import PlaneOfMotion, asked_plane, gradient_plane
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -54,7 +54,7 @@ class ModelPlan:
     frame_orbit: KeplerOrbit | None
     paired: bool
     surfaces: Surfaces
-    plane: Plane | None = None
+    plane: PlaneOfMotion | None = None
     tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
     average: Average | None = None
 
@@ -171,7 +171,7 @@ def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
 
 def _planar(
     scene: Scene, loads: Sequence[Load], requirements: Requirements
-) -> tuple[Requirements, Plane | None]:
+) -> tuple[Requirements, PlaneOfMotion | None]:
     """Two states where a gravity gradient keeps the body in a plane, or where that is asked."""
     if requirements.formulation == PLANAR:
         return requirements, asked_plane(scene, loads)

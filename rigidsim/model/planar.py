@@ -39,7 +39,7 @@ class NotPlanar(Exception):
 
 
 @dataclass(frozen=True)
-class Plane:
+class PlaneOfMotion:
     """Where a planar motion takes place.
 
     Attributes:
@@ -70,7 +70,7 @@ class PlanarStates:
     initial_spin: Any
 
 
-def plane_of(scene: Scene, loads: Sequence[Load]) -> Plane:
+def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     """The plane that a motion stays in.
 
     Raises:
@@ -93,10 +93,10 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> Plane:
         angle, turned = angle - 2 * context.pi, [-x for x in turned]
     elif angle <= -context.pi:
         angle, turned = angle + 2 * context.pi, [-x for x in turned]
-    return Plane(axis, normal, turned, angle)
+    return PlaneOfMotion(axis, normal, turned, angle)
 
 
-def gradient_plane(scene: Scene, loads: Sequence[Load]) -> Plane | None:
+def gradient_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion | None:
     """The plane of a motion under gravity gradients, where it stays in one; None elsewhere."""
     if not any(load.has_source for load in loads):
         return None
@@ -106,7 +106,7 @@ def gradient_plane(scene: Scene, loads: Sequence[Load]) -> Plane | None:
         return None
 
 
-def asked_plane(scene: Scene, loads: Sequence[Load]) -> Plane:
+def asked_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     """The plane of a motion for which ``formulation = "planar"`` is given.
 
     Raises:
@@ -124,7 +124,7 @@ def asked_plane(scene: Scene, loads: Sequence[Load]) -> Plane:
         ) from None
 
 
-def planar_states(scene: Scene, plane: Plane, time_exponent: int, number: Rounder) -> PlanarStates:
+def planar_states(scene: Scene, plane: PlaneOfMotion, time_exponent: int, number: Rounder) -> PlanarStates:
     """Set the angle and the spin up.
 
     Args:
@@ -158,7 +158,7 @@ def planar_states(scene: Scene, plane: Plane, time_exponent: int, number: Rounde
 
 
 def spin_equation(
-    plane: Plane, numbers: ScaledNumbers, torque: list[Term], number: Rounder, context: Any
+    plane: PlaneOfMotion, numbers: ScaledNumbers, torque: list[Term], number: Rounder, context: Any
 ) -> Symbolic:
     """I_k spin' = torque . k.
 

@@ -17,7 +17,7 @@ from rigidsim.session.understood import time_words
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.trail import Trail, Waypoints
+from rigidsim.solve.trail import SampleTrail, Waypoints
 from rigidsim.store.summary_parts import Caution, WarningCode
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Diagnostics:
 
     def estimated(
         self,
-        trail: Trail | None = None,
+        trail: SampleTrail | None = None,
         stepper: Stepper | None = None,
         waypoints: Waypoints | None = None,
         go_on: Callable[[], bool] = lambda: True,
@@ -83,7 +83,7 @@ class Diagnostics:
         )
         return replace(self, estimate=found)
 
-    def modelled(self, trail: Trail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
+    def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
         """With the error of a reduced model, arguments as of ``estimated``."""
         from rigidsim.accuracy.models.modelling import measure_modelling
 

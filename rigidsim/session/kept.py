@@ -41,7 +41,7 @@ Kept = dict[str, KeptVariable]
 
 
 @dataclass(frozen=True)
-class Series:
+class MemberSeries:
     """The samples of some members.
 
     Attributes:
@@ -63,7 +63,7 @@ class Series:
 
 
 def kept_of_series(
-    series: Sequence[Series],
+    series: Sequence[MemberSeries],
     times: np.ndarray,
     lengths: np.ndarray,
     keep: Collection[str],
@@ -99,7 +99,7 @@ def kept_of_series(
     return found
 
 
-def _indicators(one: Series, times: np.ndarray, keep: Collection[str]) -> Kept:
+def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> Kept:
     """Of chaos, from the growth of a tangent vector."""
     since = times if times.ndim == 1 else times.T
     told = indicators(since, one.parts[0][:, :, 0].T)
@@ -124,7 +124,7 @@ def _last(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     return np.where((lengths > 0)[:, None], last, np.nan)
 
 
-def _final(one: Series, lengths: np.ndarray) -> Kept:
+def _final(one: MemberSeries, lengths: np.ndarray) -> Kept:
     variable = one.variable
     name = f"{variable.name}_final"
     found = {}
@@ -141,7 +141,7 @@ def _final(one: Series, lengths: np.ndarray) -> Kept:
     return found
 
 
-def _extremes(one: Series, times: np.ndarray) -> Kept:
+def _extremes(one: MemberSeries, times: np.ndarray) -> Kept:
     variable, values = one.variable, one.parts[0]
     found = {}
     units = variable.attributes.get("units", "1")
@@ -163,7 +163,7 @@ def _extremes(one: Series, times: np.ndarray) -> Kept:
     return found
 
 
-def _means(one: Series) -> Kept:
+def _means(one: MemberSeries) -> Kept:
     variable = one.variable
     present = ~np.isnan(one.parts[0])
     count = np.maximum(present.sum(axis=1), 1)
@@ -177,7 +177,7 @@ def _means(one: Series) -> Kept:
     return {f"{variable.name}_mean": KeptVariable(variable.dims, one.shaped(mean), attributes, "means")}
 
 
-def _drifts(one: Series, lengths: np.ndarray) -> Kept:
+def _drifts(one: MemberSeries, lengths: np.ndarray) -> Kept:
     values = one.parts[0]
     size = np.abs(values[:, :, 0])
     largest = np.where(lengths > 0, np.max(np.where(np.isnan(size), 0, size), axis=1, initial=0), np.nan)
@@ -194,7 +194,7 @@ def _drifts(one: Series, lengths: np.ndarray) -> Kept:
     }
 
 
-def _series(series: Sequence[Series], times: np.ndarray) -> Kept:
+def _series(series: Sequence[MemberSeries], times: np.ndarray) -> Kept:
     found: Kept = {}
     for one in series:
         for part, values in enumerate(one.parts):

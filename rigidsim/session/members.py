@@ -11,7 +11,15 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.records import dataclass
-from rigidsim.session.kept import ALWAYS, Kept, KeptVariable, Series, joined, kept_events, kept_of_series
+from rigidsim.session.kept import (
+    ALWAYS,
+    Kept,
+    KeptVariable,
+    MemberSeries,
+    joined,
+    kept_events,
+    kept_of_series,
+)
 from rigidsim.solve.status import Status
 from rigidsim.store.collected import JoinedBlocks
 from rigidsim.store.memory import MemoryRun
@@ -209,7 +217,7 @@ def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: Collection[str]
             np.asarray(part, dtype=np.float64).reshape(1, -1, max(1, int(np.prod(variable.shape))))
             for part in joined_blocks[variable.name]
         ]
-        series.append(Series(variable, parts))
+        series.append(MemberSeries(variable, parts))
     times = np.asarray(joined_blocks["time"][0], dtype=np.float64).reshape(-1)
     return kept_of_series(series, times, np.array([len(times)]), keep, hidden)
 

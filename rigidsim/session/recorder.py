@@ -20,7 +20,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import put_back_by_invariant
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
-from rigidsim.solve.trail import Trail
+from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.memory import MemoryWriter
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.segments import SegmentWriter
@@ -62,7 +62,7 @@ class Recorder(SampleReceiver):
         guard = prepared.scene.config.limits.max_drift
         self._max_drift = None if guard is None else float(guard)
         self.statistics = SampleStatistics()
-        self.trail = Trail(prepared.precision)
+        self.trail = SampleTrail(prepared.precision)
         output, count = prepared.scene.config.output, prepared.clock.count
         shown = output.timeline and isinstance(writer, SegmentWriter)
         self.kept = _kept_rows(count, output.timeline_rows) if shown else None

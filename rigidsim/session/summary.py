@@ -30,7 +30,7 @@ from rigidsim.store.summary_parts import (
     ChartChanges,
     Cost,
     EventTimes,
-    Invariant,
+    InvariantDrift,
     Lyapunov,
     Modelling,
     ModellingWindow,
@@ -193,12 +193,12 @@ def chart_changes(prepared: InitialValueProblem, corrected: CorrectedStepper) ->
     )
 
 
-def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[str, Invariant]:
+def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[str, InvariantDrift]:
     statistics, table = found.statistics, {}
     held = not unused_variables(found.prepared, found.progress.steps)
     for invariant in found.prepared.system.invariants:
         name, values = invariant.name, initial[invariant.name]
-        table[name] = Invariant(
+        table[name] = InvariantDrift(
             initial=values[0] if len(values) == 1 else tuple(values),
             units=invariant.units,
             scale=float(invariant.scale),

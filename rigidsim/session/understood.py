@@ -11,13 +11,13 @@ from rigidsim.scene.scene import Scene
 from rigidsim.scene.suspicions import suspicious_angles, suspicious_end, unreachable_events
 from rigidsim.store.summary_fields import Three
 from rigidsim.store.summary_parts import Caution, WarningCode
-from rigidsim.store.understood import Body, Span, Start
+from rigidsim.store.understood import Span, Start, UnderstoodBody
 
 
-def body_of(scene: Scene) -> Body:
+def body_of(scene: Scene) -> UnderstoodBody:
     """The body, rounded to doubles."""
     body = scene.body
-    return Body(
+    return UnderstoodBody(
         source=body.source,
         principal_moments=tuple(float(m) for m in body.principal_moments),
         principal_axes=tuple(tuple(float(x) for x in axis) for axis in body.principal_axes),

@@ -21,7 +21,7 @@ class Soundness(Enum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RunVerdict:
     """On a run that ended.
 
     Attributes:
@@ -37,7 +37,7 @@ class Verdict:
 _GONE = {WarningCode.ATTITUDE_UNCERTAIN.value, WarningCode.RATES_UNCERTAIN.value}
 
 
-def verdict_on(summary: Summary) -> Verdict:
+def verdict_on(summary: Summary) -> RunVerdict:
     """The worst that can be said: drifts that rounding does not explain, then digits that are gone;
     projected invariants prove nothing, and a motion may amplify errors whatever its drifts.
     """
@@ -49,7 +49,7 @@ def verdict_on(summary: Summary) -> Verdict:
     }
     worst = max(shares, key=lambda name: shares[name], default="")
     share = shares.get(worst)
-    return Verdict(_soundness(summary, share), share, worst)
+    return RunVerdict(_soundness(summary, share), share, worst)
 
 
 def _soundness(summary: Summary, share: float | None) -> Soundness:

@@ -27,7 +27,7 @@ from rigidsim.model.system import System
 from rigidsim.scene.attitude import quaternion_from_euler
 from rigidsim.solve.angle_wrapping import Angles, AngleState, AngleWrapping
 from rigidsim.solve.compiled import compiled_function
-from rigidsim.solve.engine import CompiledFunction, Integrator
+from rigidsim.solve.engine import CompiledFunction, TaylorEngine
 from rigidsim.solve.precision import Precision, Scalar
 
 NEAR = 0.5
@@ -137,14 +137,14 @@ class Charts:
         """Steps follow; the latest ones' boundaries may be forgotten."""
         self._passed = [(time, self._wrapping.angles.reference)]
 
-    def __call__(self, integrator: Integrator) -> bool:
+    def __call__(self, integrator: TaylorEngine) -> bool:
         """After a natural step: follow it; False where the chart is to be left."""
         state = integrator.state
         if self.chart:
             self._follow(integrator, integrator.time, state, _HALVINGS)
         return not self.near(state)
 
-    def _follow(self, integrator: Integrator, time: Scalar, state: np.ndarray, halvings: int) -> None:
+    def _follow(self, integrator: TaylorEngine, time: Scalar, state: np.ndarray, halvings: int) -> None:
         """The asked angles from the latest known up to a state within the latest step."""
         known = self._wrapping.angles
         joined, _, swing = self._lift(known.reference, self._angles(state))

@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 
 import heyoka as hy
 
-from rigidsim.solve.engine import CompiledFunction, Integrator
+from rigidsim.solve.engine import CompiledFunction, TaylorEngine
 
 T = TypeVar("T")
 
@@ -76,7 +76,7 @@ class CodeStore:
 
     def __init__(self) -> None:
         self.functions: Kept[CompiledFunction] = Kept(32)
-        self.engines: Kept[Integrator] = Kept(8)
+        self.engines: Kept[TaylorEngine] = Kept(8)
 
 
 _stores = [CodeStore()]
@@ -105,7 +105,7 @@ def compiled_function(
     )
 
 
-def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> Integrator:
+def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> TaylorEngine:
     """As ``heyoka.taylor_adaptive``, without events: an engine of one's own, as if it were newly compiled."""
     made = _stores[-1].engines.get(
         (list(equations), initial, sorted(options.items())),

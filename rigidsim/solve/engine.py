@@ -13,7 +13,7 @@ CompiledFunction: TypeAlias = Callable[..., np.ndarray]
 """What ``heyoka.cfunc`` returns: from inputs (k,) or (k, n) to outputs, in the precision of its own."""
 
 
-class Integrator(Protocol):
+class TaylorEngine(Protocol):
     """What ``heyoka.taylor_adaptive`` returns.
 
     Attributes:

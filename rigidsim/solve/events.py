@@ -18,7 +18,7 @@ from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleState, AngleWrapping
 from rigidsim.solve.compiled import compiled_function
-from rigidsim.solve.engine import Integrator
+from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.event_units import of_order_one
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
@@ -144,8 +144,8 @@ def engine_events(
         offsets: number of the first of the parameters to be added to their expressions, one to each.
     """
 
-    def callback(index: int) -> Callable[[Integrator, Scalar, int], None]:
-        def called(integrator: Integrator, time: Scalar, _: int) -> None:
+    def callback(index: int) -> Callable[[TaylorEngine, Scalar, int], None]:
+        def called(integrator: TaylorEngine, time: Scalar, _: int) -> None:
             log.note(index, time, integrator.update_d_output(time))
 
         return called

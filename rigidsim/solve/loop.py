@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
-from rigidsim.solve.pacing import MEASURED, Pacing, Way, WayFinder
+from rigidsim.solve.pacing import MEASURED, Pacing, SampleWay, WayFinder
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_buffer import SampleBuffer
 from rigidsim.solve.sampler import Check, Progress, Reach, SampleReceiver
@@ -148,7 +148,7 @@ class IntegrationLoop:
         boundary = self.corrected.boundary()
         started = time.perf_counter()
         self.stepper.step()
-        self.ways.measured(Way.STEP, 1, time.perf_counter() - started)
+        self.ways.measured(SampleWay.STEP, 1, time.perf_counter() - started)
         self.corrected.back_to(boundary)
 
     def _ended(self, status: Status) -> Progress:
@@ -280,11 +280,11 @@ class IntegrationLoop:
         return True
 
     _Take: TypeAlias = "Callable[[IntegrationLoop, int], bool]"
-    _WAYS: ClassVar[dict[Way, _Take]] = {
-        Way.SKIP: _skip,
-        Way.GRID: _grid,
-        Way.BLOCK: _block,
-        Way.STEP: _step_by_step,
+    _WAYS: ClassVar[dict[SampleWay, _Take]] = {
+        SampleWay.SKIP: _skip,
+        SampleWay.GRID: _grid,
+        SampleWay.BLOCK: _block,
+        SampleWay.STEP: _step_by_step,
     }
 
     # --- samples, and the run's end ---------------------------------------------------------------------

@@ -28,7 +28,7 @@ from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sampling import SampleClock
 
 
-class Way(Enum):
+class SampleWay(Enum):
     """A way through the samples."""
 
     SKIP = "many steps towards a sample, without dense output"
@@ -98,23 +98,23 @@ class WayFinder:
         self._cheap = precision.cheap
         self._pacing = pacing
         self._last = float(clock.at(clock.count - 1))
-        self._paces: dict[Way, float] = {}  # steps per second, as measured last
+        self._paces: dict[SampleWay, float] = {}  # steps per second, as measured last
         self.longest = 0.0
 
-    def measured(self, way: Way, steps: int, seconds: float) -> None:
+    def measured(self, way: SampleWay, steps: int, seconds: float) -> None:
         """So many steps took so long; single ones are to be measured before anything is chosen."""
         self._paces[way] = max(steps, 1) / max(seconds, 1e-9)
 
-    def _most(self, way: Way) -> int:
+    def _most(self, way: SampleWay) -> int:
         """Steps in a chunk."""
-        pace = self._paces.get(way, self._paces[Way.STEP])
+        pace = self._paces.get(way, self._paces[SampleWay.STEP])
         return max(1, int(pace * self._pacing.chunk_seconds))
 
     def went_past(self) -> None:
         """A skip went past the sample: steps are longer than they seemed."""
         self.longest = 1.5 * max(self.longest, self._corrected.stepper.largest)
 
-    def choose(self, following: int, upcoming: Scalar) -> tuple[Way, int]:
+    def choose(self, following: int, upcoming: Scalar) -> tuple[SampleWay, int]:
         """How to go on, and for how many steps at most. The last sample alone is skipped to: what a grid goes
         past it is taken once more.
 
@@ -125,25 +125,25 @@ class WayFinder:
         # steps of a tumbling body vary a lot: predict with the longest of late, which fades slowly
         self.longest = size = max(stepper.largest, pacing.fading * self.longest)
         if size <= 0 or stepper.single_steps:
-            return Way.STEP, self._most(Way.STEP)
+            return SampleWay.STEP, self._most(SampleWay.STEP)
         limit = 2**62
         if self._cheap:
             left = int(min((self._last - float(stepper.time)) / size, limit))
             spacing = self._spacing(following)
             if self._suits_grids(spacing) and following < self._clock.count - 1:
                 if stepper.at_whole_time and left >= pacing.least_grid_steps:
-                    return Way.GRID, self._grid_steps(left)
+                    return SampleWay.GRID, self._grid_steps(left)
                 limit = corrected.left  # to where a grid can start
             if spacing <= pacing.block_spacing:
                 if min(left, corrected.left) >= pacing.least_block_steps:
                     wanted = max(1, int(pacing.rows_at_once * spacing), pacing.least_block_steps)
-                    return Way.BLOCK, min(pacing.block_steps, wanted, corrected.left, left)
+                    return SampleWay.BLOCK, min(pacing.block_steps, wanted, corrected.left, left)
                 limit = corrected.left  # to where a block is worth it again
         expected = (float(upcoming) - float(stepper.time)) / size
         if expected > pacing.skip_from:
-            steps = min(pacing.skip_margin * expected - 2, self._most(Way.SKIP), limit)
-            return Way.SKIP, max(1, int(steps))
-        return Way.STEP, min(self._most(Way.STEP), limit)
+            steps = min(pacing.skip_margin * expected - 2, self._most(SampleWay.SKIP), limit)
+            return SampleWay.SKIP, max(1, int(steps))
+        return SampleWay.STEP, min(self._most(SampleWay.STEP), limit)
 
     def _spacing(self, following: int) -> float:
         """Steps per sample, over the next samples."""
@@ -160,7 +160,7 @@ class WayFinder:
     def _grid_steps(self, left: int) -> int:
         """Whole strides, or all that is left and more: what a grid leaves over would go step by step."""
         stride = self._corrected.stride
-        most = self._most(Way.GRID)
+        most = self._most(SampleWay.GRID)
         if 2 * most >= stride:  # what a part of a stride leaves over goes step by step
             most = max(most, stride)
         count = min(most, left + left // 2 + self._pacing.least_grid_steps)

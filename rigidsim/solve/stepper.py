@@ -18,7 +18,7 @@ from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine
-from rigidsim.solve.engine import Integrator
+from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
@@ -57,7 +57,7 @@ class Watcher(Protocol):
     def begin(self, time: Scalar) -> None:
         """Steps follow, from this time on."""
 
-    def __call__(self, integrator: Integrator) -> bool:
+    def __call__(self, integrator: TaylorEngine) -> bool:
         """After each step; False ends the call that took it."""
 
 
@@ -143,7 +143,7 @@ class Stepper:
     def settle(self) -> None:
         """Take note that the state was set from outside."""
 
-    def _compiled(self, system: System) -> Integrator:
+    def _compiled(self, system: System) -> TaylorEngine:
         options = dict(self.precision.options, time=self._start)
         options["compact_mode"] = self.precision.compact or system.wide
         if self._tolerance is not None:
@@ -190,7 +190,7 @@ class Stepper:
         return self.watcher
 
     @property
-    def integrator(self) -> Integrator:
+    def integrator(self) -> TaylorEngine:
         """The heyoka object in use (for provenance)."""
         return self._integrator
 

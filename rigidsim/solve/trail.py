@@ -17,7 +17,7 @@ _MOST = {True: 64, False: 16}  # of narrow precisions, whose closed forms take a
 
 
 @dataclass
-class Trail:
+class SampleTrail:
     """Samples of every so many, and the last; which ones doesn't depend on the blocks that they came in.
 
     Attributes:

@@ -55,7 +55,7 @@ def _joined(paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.V
     from xarray.backends import BackendArray
     from xarray.core import indexing
 
-    class Column(BackendArray):
+    class Joined(BackendArray):
         """One variable along all segments."""
 
         shape = (int(starts[-1]), *like.shape[1:])
@@ -73,9 +73,9 @@ def _joined(paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.V
             return _rows(paths, starts, name, range(*wanted.indices(self.shape[0])), rest)
 
     if like.dtype.kind != "M":
-        return xarray.Variable(like.dims, indexing.LazilyIndexedArray(Column()), like.attrs)
+        return xarray.Variable(like.dims, indexing.LazilyIndexedArray(Joined()), like.attrs)
     stored = dict(like.attrs, **{key: like.encoding[key] for key in ("units", "calendar")})
-    numbers = xarray.Variable(like.dims, indexing.LazilyIndexedArray(Column()), stored)
+    numbers = xarray.Variable(like.dims, indexing.LazilyIndexedArray(Joined()), stored)
     dates: xarray.Variable = xarray.conventions.decode_cf_variable(name, numbers)
     return dates
 

@@ -55,7 +55,7 @@ def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
         write_rows(file.variable(extra.name, extra.dims, extra.attributes), 0, extra.values)
 
 
-class Rows(Protocol):
+class FileRows(Protocol):
     """Values of all variables of a file.
 
     Attributes:
@@ -74,7 +74,7 @@ class Rows(Protocol):
 
 def image(
     variables: Sequence[Variable],
-    rows: Rows | None,
+    rows: FileRows | None,
     attributes: Mapping[str, Any],
     groups: Mapping[str, Mapping[str, np.ndarray]],
 ) -> io.BytesIO:

@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.summary_fields import Claim, FiniteNumber, Part, Text
+from rigidsim.store.summary_fields import Claim, FiniteNumber, SummaryPart, Text
 from rigidsim.store.summary_parts import (
     Accuracy,
     Advice,
@@ -30,18 +30,18 @@ from rigidsim.store.summary_parts import (
     Cost,
     Digest,
     EventTimes,
-    Invariant,
+    InvariantDrift,
     Lyapunov,
     Modelling,
     TableErrors,
     WarningCode,
 )
-from rigidsim.store.understood import Body, Span, Start
+from rigidsim.store.understood import Span, Start, UnderstoodBody
 
 _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
 
 
-class Brief(Part):
+class Brief(SummaryPart):
     """What any summary says; of a run that is under way, or was killed, no more."""
 
     name: Annotated[Text, Claim()] = ""
@@ -85,12 +85,12 @@ class Summary(Brief):
     method: Annotated[Text, Claim()] = "taylor"
     hold_invariants: Annotated[StrictBool, Claim()] = False
     hold_from_step: Annotated[StrictInt | None, Claim()] = None
-    invariants: dict[Text, Invariant]
+    invariants: dict[Text, InvariantDrift]
     accuracy: Accuracy
     modelling: Modelling | None = None
     tables: dict[Text, TableErrors] = Field(default_factory=dict)
     lyapunov: Lyapunov | None = None
-    body: Annotated[Body, Claim()]
+    body: Annotated[UnderstoodBody, Claim()]
     start: Annotated[Start | None, Claim()] = None
     time: Annotated[Span | None, Claim()] = None
     bit_for_bit: BitForBit

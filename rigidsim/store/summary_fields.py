@@ -28,7 +28,7 @@ class Claim:
     beside: str = ""
 
 
-class Part(BaseModel):
+class SummaryPart(BaseModel):
     """Immutable; what a newer version wrote beside the fields is kept."""
 
     model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants", defer_build=True)

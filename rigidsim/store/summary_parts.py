@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 from pydantic import AfterValidator, Field, StrictBool, StrictInt, StrictStr
 
 from rigidsim.scene.records import dataclass
-from rigidsim.store.summary_fields import Claim, FiniteNumber, Part, Text
+from rigidsim.store.summary_fields import Claim, FiniteNumber, SummaryPart, Text
 
 ENGINE = "engine"
 """Beside the phases in ``Cost.seconds``: what the engine alone took of integrating and recording."""
@@ -60,7 +60,7 @@ Digest = Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")]
 Seconds = Annotated[dict[Text, FiniteNumber], AfterValidator(_with_engine)]
 
 
-class Cost(Part):
+class Cost(SummaryPart):
     """What a run took.
 
     Attributes:
@@ -81,7 +81,7 @@ class Cost(Part):
     wall_seconds: FiniteNumber | None = None
 
 
-class Invariant(Part):
+class InvariantDrift(SummaryPart):
     """How well one was kept.
 
     Attributes:
@@ -106,7 +106,7 @@ class Invariant(Part):
     numerical: Annotated[StrictBool, Claim()]
 
 
-class Accuracy(Part):
+class Accuracy(SummaryPart):
     """How right the attitude is at the end, rad: asked for, estimated, and certified by a reference.
 
     Attributes:
@@ -143,7 +143,7 @@ class Accuracy(Part):
     forecast: FiniteNumber | None = None
 
 
-class TableErrors(Part):
+class TableErrors(SummaryPart):
     """How well interpolation does between the rows of an orbit's table.
 
     Attributes:
@@ -157,7 +157,7 @@ class TableErrors(Part):
     expected: FiniteNumber
 
 
-class ModellingWindow(Part):
+class ModellingWindow(SummaryPart):
     """Where the full model ran beside a reduced one; see ``rigidsim.accuracy.models.modelling``.
 
     Attributes:
@@ -179,7 +179,7 @@ class ModellingWindow(Part):
     doubt: FiniteNumber
 
 
-class Modelling(Part):
+class Modelling(SummaryPart):
     """How far a reduced model is from the full one, apart from numerical errors.
 
     Attributes:
@@ -212,7 +212,7 @@ class Modelling(Part):
         return max(known, default=None)
 
 
-class Lyapunov(Part):
+class Lyapunov(SummaryPart):
     """The spectrum of the motion, 1/s, with what it says of the run's digits."""
 
     chaotic: Annotated[StrictBool, Claim()]
@@ -225,7 +225,7 @@ class Lyapunov(Part):
     units: Text = "s-1"
 
 
-class EventTimes(Part):
+class EventTimes(SummaryPart):
     """When an event happened, s.
 
     Attributes:
@@ -238,7 +238,7 @@ class EventTimes(Part):
     early: Annotated[tuple[FiniteNumber, ...], Claim(since=4)] = ()
 
 
-class Advice(Part):
+class Advice(SummaryPart):
     """Something that would do better.
 
     Attributes:
@@ -256,7 +256,7 @@ class Advice(Part):
     share: FiniteNumber | None = None
 
 
-class ChartChanges(Part):
+class ChartChanges(SummaryPart):
     """How often a run in Euler angles went from its sequence to the partner or back."""
 
     count: StrictInt
@@ -264,7 +264,7 @@ class ChartChanges(Part):
     partner: Text
 
 
-class BitForBit(Part):
+class BitForBit(SummaryPart):
     """Whether running again gives the same bits, and on what condition."""
 
     claim: StrictBool

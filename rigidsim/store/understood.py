@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pydantic import StrictInt
 
-from rigidsim.store.summary_fields import FiniteNumber, Part, Text, Three
+from rigidsim.store.summary_fields import FiniteNumber, SummaryPart, Text, Three
 
 Four = tuple[FiniteNumber, FiniteNumber, FiniteNumber, FiniteNumber]
 
 
-class Body(Part):
+class UnderstoodBody(SummaryPart):
     """Where the inertia came from; principal moments (kg m^2) and axes (rows, body axes), mass (kg).
 
     Attributes:
@@ -23,7 +23,7 @@ class Body(Part):
     center_of_mass: Three | None = None
 
 
-class Start(Part):
+class Start(SummaryPart):
     """The state that a motion starts from.
 
     Attributes:
@@ -41,7 +41,7 @@ class Start(Part):
     velocity: Three | None = None
 
 
-class Span(Part):
+class Span(SummaryPart):
     """When a motion starts and ends, and its samples.
 
     Attributes:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Shown(Protocol):
+class Viewable(Protocol):
     """What is needed of a run."""
 
     @property
@@ -29,7 +29,7 @@ class Shown(Protocol):
         """What its summary says."""
 
 
-def view(run: Shown, folder: RunFolder | None, *, web: bool = False) -> int:
+def view(run: Viewable, folder: RunFolder | None, *, web: bool = False) -> int:
     """Open a run's timeline in the viewer and wait until it is closed.
 
     Args:
@@ -52,7 +52,7 @@ def view(run: Shown, folder: RunFolder | None, *, web: bool = False) -> int:
 
 
 @contextmanager
-def drawn(run: Shown, folder: RunFolder | None) -> Iterator[Path]:
+def drawn(run: Viewable, folder: RunFolder | None) -> Iterator[Path]:
     """The recording: the run's own, kept with the run where that can be written, or one that goes at the end.
 
     Raises:
@@ -71,7 +71,7 @@ def drawn(run: Shown, folder: RunFolder | None) -> Iterator[Path]:
             yield timeline
 
 
-def _draw(run: Shown, timeline: Path) -> None:
+def _draw(run: Viewable, timeline: Path) -> None:
     from rigidsim.look.timeline import write_timeline
 
     try:

@@ -14,7 +14,7 @@ from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
 from rigidsim.solve.problem import prepare
 from rigidsim.store.summary_parts import Caution
-from rigidsim.store.understood import Body, Span, Start
+from rigidsim.store.understood import Span, Start, UnderstoodBody
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.check import QUICK, check_sweep
 from rigidsim.workflows.sweeps.members import recording
@@ -33,7 +33,7 @@ class Checked:
     source: str
     problems: tuple[Problem, ...] = ()
     cautions: tuple[Caution, ...] = ()
-    body: Body | None = None
+    body: UnderstoodBody | None = None
     start: Start | None = None
     time: Span | None = None
 

@@ -11,7 +11,7 @@ from rigidsim.errors import RESUME, RigidsimError, RunFolderError
 from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.angles import angle_unit_named
 from rigidsim.formats.naming import Naming
-from rigidsim.formats.registry import Format, Source, format_named
+from rigidsim.formats.registry import Format, TableSource, format_named
 from rigidsim.formats.tables import BLOCK_NUMBERS, Table, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.store import atomic
@@ -91,7 +91,7 @@ def _unit(name: str | None, file_format: str, found: Format) -> AngleUnit | None
     return unit
 
 
-Read = tuple[Sequence[Table], Source]
+Read = tuple[Sequence[Table], TableSource]
 """Tables of an open dataset, the main one first, and what they are of."""
 
 
@@ -100,7 +100,7 @@ def _run_read(run: SavedRun, naming: Naming, unit: AngleUnit | None) -> Iterator
     with run.opened(indexed=False) as dataset:  # sample times are not loaded as an index
         bits = _bits(dataset)
         attributes = dict(dataset.attrs, status=run.status)
-        yield tables_of(dataset, unit, bits), Source(_name(run), bits, attributes, naming, unit)
+        yield tables_of(dataset, unit, bits), TableSource(_name(run), bits, attributes, naming, unit)
 
 
 @contextmanager
@@ -109,7 +109,7 @@ def _sweep_read(sweep: SavedSweep, unit: AngleUnit | None, block_numbers: int) -
 
     with sweep.dataset as dataset:
         bits = _bits_of_members(dataset)
-        source = Source(_name(sweep), bits, dict(dataset.attrs), Naming(), unit)
+        source = TableSource(_name(sweep), bits, dict(dataset.attrs), Naming(), unit)
         yield member_tables(dataset, unit, bits, block_numbers), source
 
 
@@ -130,7 +130,9 @@ def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | Non
         raise RunFolderError(f"{sweep.place}: the sweep is {sweep.status}; {RESUME} completes it")
 
 
-def _written(tables: Sequence[Table], target: Path, found: Format, source: Source, force: bool) -> list[Path]:
+def _written(
+    tables: Sequence[Table], target: Path, found: Format, source: TableSource, force: bool
+) -> list[Path]:
     """Write the tables that a format takes, the first to the target itself."""
     kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
     for path in kept:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidsim.accuracy.bench.advice import Advice, advice
+from rigidsim.accuracy.bench.advice import BestSetting, advice
 from rigidsim.accuracy.bench.dataset import dataset_of
 from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
@@ -43,7 +43,7 @@ class Tradeoff:
     folder: Path | None = None
 
     @property
-    def advice(self) -> list[Advice]:
+    def advice(self) -> list[BestSetting]:
         """For each decade of accuracy that some setting reaches, the cheapest; equal neighbours joined."""
         return advice(self.dataset)
 

@@ -10,15 +10,16 @@ import pytest
 import xarray
 
 import rigidsim
-from rigidsim.analysis.decomposition import Found, Samples, decompose
+from rigidsim.analysis.decomposition import Decomposition, decompose
 from rigidsim.analysis.exponentials import Sum
+from rigidsim.analysis.refinement import SignalSamples
 
 CONTEXT = mpmath.MPContext()
 CONTEXT.prec = 220
 ROOT2, ROOT3 = CONTEXT.sqrt(2), CONTEXT.sqrt(3)
 
 
-def samples(total: Sum, *, real: bool, parts: int) -> Samples:
+def samples(total: Sum, *, real: bool, parts: int) -> SignalSamples:
     """A sum sampled exactly, by recurrence, in so many doubles a number."""
     count, one = total.count, 1 << 220
 
@@ -46,10 +47,10 @@ def samples(total: Sum, *, real: bool, parts: int) -> Samples:
                 top, bottom = v.as_integer_ratio()
                 column[n] -= (top << 220) // bottom
         found.append((doubles[0], doubles[1]))
-    return Samples(tuple(found), real, 53 if parts == 1 else 113, CONTEXT)
+    return SignalSamples(tuple(found), real, 53 if parts == 1 else 113, CONTEXT)
 
 
-def matched(found: Found, true: Sum) -> list[tuple[float, float, float, float]]:
+def matched(found: Decomposition, true: Sum) -> list[tuple[float, float, float, float]]:
     """Of each true line the errors of frequency (relative) and amplitude, and what they are said to be."""
     rows = []
     for frequency, amplitude in zip(true.frequencies, true.amplitudes, strict=True):
@@ -156,7 +157,7 @@ def test_errors_are_those_of_noise() -> None:
     for _ in range(30):
         noise = 0.01 * (rng.standard_normal(count) + 1j * rng.standard_normal(count))
         values: Any = clean + noise
-        found = decompose(Samples(((values.real, values.imag),), False, 53, CONTEXT), 5, -1, 1e-12)
+        found = decompose(SignalSamples(((values.real, values.imag),), False, 53, CONTEXT), 5, -1, 1e-12)
         assert len(found.sum.frequencies) == 2, "noise is no line"
         for true, frequency, error, amplitude, size, amplitude_error in zip(
             (0.123456, -0.31), found.sum.frequencies, found.frequency_errors, found.sum.amplitudes, (1, 0.2),
@@ -175,9 +176,9 @@ def test_a_secular_rate_has_an_honest_error() -> None:
     x = (2 * np.arange(count) - (count - 1)) / count
     rate, slow = 2.0, 0.1 * np.sin(np.pi * x / 3 + 0.4)
     values = rate * x + slow + 0.3 * np.cos(2 * np.pi * 40 * x)
-    found = decompose(Samples(((values, 0 * values),), True, 53, CONTEXT), 6, 1, 1e-12)
+    found = decompose(SignalSamples(((values, 0 * values),), True, 53, CONTEXT), 6, 1, 1e-12)
     off = abs(float(found.sum.polynomial[1].real) - rate)
     assert off < 0.1 * np.pi / 3 * 1.5
-    clean = decompose(Samples(((values - slow, 0 * values),), True, 53, CONTEXT), 6, 1, 1e-12)
+    clean = decompose(SignalSamples(((values - slow, 0 * values),), True, 53, CONTEXT), 6, 1, 1e-12)
     assert abs(float(clean.sum.polynomial[1].real) - rate) < 1e-13
     assert found.polynomial_errors[1] > 1e6 * clean.polynomial_errors[1]

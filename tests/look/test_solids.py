@@ -17,7 +17,7 @@ from rigidsim.look.solids import (
     rotation_matrix,
     solid_mesh,
 )
-from rigidsim.scene.bodies.outlines import THINNESS, Arc, Line, Revolved
+from rigidsim.scene.bodies.outlines import THINNESS, Arc, Revolved, StraightPiece
 from rigidsim.scene.bodies.shapes import SHAPES, Shape
 from rigidsim.scene.scene import build_scene
 
@@ -140,7 +140,7 @@ HEMISPHERE = Shape(
     lambda _, d: [83 * d["radius"][0] ** 2 / 320] * 2 + [2 * d["radius"][0] ** 2 / 5],
     lambda d: Revolved(
         (
-            Line((0.0, -3 * d["radius"][0] / 8), (d["radius"][0], -3 * d["radius"][0] / 8)),
+            StraightPiece((0.0, -3 * d["radius"][0] / 8), (d["radius"][0], -3 * d["radius"][0] / 8)),
             Arc((0.0, -3 * d["radius"][0] / 8), d["radius"][0], 0.0, np.pi / 2),
         )
     ),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Advice:
+class BestSetting:
     """For an attitude error of at most ``at_most`` and more than ``more_than``: the cheapest setting.
 
     Attributes:
@@ -38,7 +38,7 @@ class Advice:
     keys: tuple[str, ...]
 
 
-def advice(dataset: xarray.Dataset) -> list[Advice]:
+def advice(dataset: xarray.Dataset) -> list[BestSetting]:
     """For each decade of accuracy from 1 rad on, the cheapest setting that reaches it.
 
     A setting that was measured over less of the motion is named only where no other reaches the accuracy.
@@ -56,7 +56,7 @@ def advice(dataset: xarray.Dataset) -> list[Advice]:
             if len(fit):
                 found.append((exponent, int(min(fit, key=lambda n: cost[n])), kind is RowStatus.SHORT))
                 break
-    result: list[Advice] = []
+    result: list[BestSetting] = []
     for position, (exponent, n, less) in enumerate(found):
         if position and found[position - 1][1] == n:
             continue
@@ -69,9 +69,11 @@ def advice(dataset: xarray.Dataset) -> list[Advice]:
     return result
 
 
-def _advice_of(dataset: xarray.Dataset, n: int, first: int, last: int, less: bool, error: float) -> Advice:
+def _advice_of(
+    dataset: xarray.Dataset, n: int, first: int, last: int, less: bool, error: float
+) -> BestSetting:
     one = dataset.isel(setting=n)
-    return Advice(
+    return BestSetting(
         at_most=10.0**first,
         more_than=10.0 ** (last - 1),
         title=str(one["setting"].item()),

@@ -22,7 +22,7 @@ from rigidsim.accuracy.estimates.margins import MARGINS, Margins
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.trail import Trail, Waypoints
+from rigidsim.solve.trail import SampleTrail, Waypoints
 
 _LAST_BITS = 0.5  # of a recorded value, rounded
 _LABEL = 0.25  # of a sample's time, rounded: what is recorded belongs to another moment
@@ -70,7 +70,7 @@ def estimate_errors(
     steps: int,
     reached: float,
     *,
-    trail: Trail | None = None,
+    trail: SampleTrail | None = None,
     waypoints: Waypoints | None = None,
     stepper: Stepper | None = None,
     nearest: float = 1.0,

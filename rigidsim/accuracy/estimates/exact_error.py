@@ -12,7 +12,7 @@ from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.trail import Trail
+from rigidsim.solve.trail import SampleTrail
 
 _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
 
@@ -33,7 +33,7 @@ class ExactError:
     velocity: float | None
 
 
-def exact_error(prepared: InitialValueProblem, form: ClosedForm, trail: Trail) -> ExactError:
+def exact_error(prepared: InitialValueProblem, form: ClosedForm, trail: SampleTrail) -> ExactError:
     """Hold a run's samples against the closed form of its motion, which is evaluated in the run's precision
     or better: it makes some roundings at any time.
 

@@ -23,7 +23,7 @@ from rigidsim.model.averaged.average import Average
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.trail import Trail
+from rigidsim.solve.trail import SampleTrail
 
 _ORBITS = 8  # of the slowest source, from which a growth is told from what goes round with it
 _FEWEST_ORBITS = 2
@@ -68,7 +68,7 @@ class ModellingError:
 
 
 def measure_modelling(
-    prepared: InitialValueProblem, trail: Trail | None = None, go_on: Callable[[], bool] = lambda: True
+    prepared: InitialValueProblem, trail: SampleTrail | None = None, go_on: Callable[[], bool] = lambda: True
 ) -> ModellingError | None:
     """Measure the modelling error of a run.
 
@@ -120,7 +120,7 @@ def _length(scene: Scene, average: Average) -> float:
 
 
 def _places(
-    prepared: InitialValueProblem, trail: Trail | None, begin: float, end: float, length: float
+    prepared: InitialValueProblem, trail: SampleTrail | None, begin: float, end: float, length: float
 ) -> list[tuple[float, list[Any]]]:
     """Middle and end: the samples that are nearest, with the states there, the momentum's direction first."""
     context, exponent = prepared.scene.context, prepared.system.scaling.time

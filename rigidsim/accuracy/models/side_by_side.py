@@ -156,7 +156,7 @@ def _starting(
     return replace(moved, quaternion=attitude.unit_quaternion(context, quaternion), euler_angles=None)
 
 
-class _Collected(SampleReceiver):
+class _AsDoubles(SampleReceiver):
     """Keeps what is recorded in memory, as doubles."""
 
     def __init__(self, evaluator: Evaluator, names: Sequence[str]) -> None:
@@ -190,7 +190,7 @@ def _followed(
     changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
     problem = compactly(prepare_scene(prepared.experiment, replace(scene, config=changed)))
     parts = assemble(problem)
-    receiver = _Collected(parts.evaluator, names)
+    receiver = _AsDoubles(parts.evaluator, names)
 
     def check(_: Progress) -> Status | None:
         return None if go_on() else Status.INTERRUPTED

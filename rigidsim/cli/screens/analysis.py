@@ -16,7 +16,7 @@ from rigidsim.cli.screens.page import console
 from rigidsim.look.readable_time import YEAR, span_text, unit_for
 
 if TYPE_CHECKING:
-    from rigidsim.analysis.result import Analysis, Line, SignalAnalysis
+    from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
     from rigidsim.workflows.analyse import Saved
 
 _WIDE = 100  # columns, from which the tables of lines have all of theirs
@@ -167,7 +167,7 @@ def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) ->
     return table
 
 
-def _period(line: Line) -> str:
+def _period(line: SpectralLine) -> str:
     period = line.period
     if not math.isfinite(period):
         return "-"
@@ -176,7 +176,7 @@ def _period(line: Line) -> str:
     return f"{justified(period / unit.seconds, own, 9)} {unit.symbol}"
 
 
-def _label(line: Line) -> Text:
+def _label(line: SpectralLine) -> Text:
     if line.ambiguous:
         others = ", ".join(line.label.doubtful)
         return Text(f"{line.label.text}? or {others}: ambiguous", style="yellow")

@@ -13,8 +13,8 @@ from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.summary_parts import ENGINE, Accuracy, Invariant
-from rigidsim.store.understood import Body, Span, Start
+from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift
+from rigidsim.store.understood import Span, Start, UnderstoodBody
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,7 +37,7 @@ def _initial(value: float | tuple[float, ...] | None) -> str:
     return f"|{math.hypot(*value):.6g}|" if isinstance(value, tuple) else f"{value:.6g}"
 
 
-def _scales(invariants: dict[str, Invariant]) -> str:
+def _scales(invariants: dict[str, InvariantDrift]) -> str:
     """What the drifts are relative to; invariants of the same scale together."""
     names: dict[str, list[str]] = {}
     for name, row in invariants.items():
@@ -65,12 +65,14 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None) -> No
         on.line("" if number else "next", command, "cyan")
 
 
-def print_understood(body: Body | None, start: Start | None, time: Span | None, out: Console) -> None:
+def print_understood(
+    body: UnderstoodBody | None, start: Start | None, time: Span | None, out: Console
+) -> None:
     """Body, start and time as they were understood."""
     _print_understood(body, start, time, page(out))
 
 
-def _print_understood(body: Body | None, start: Start | None, time: Span | None, on: Page) -> None:
+def _print_understood(body: UnderstoodBody | None, start: Start | None, time: Span | None, on: Page) -> None:
     for label, text in understood(body, start, time):
         on.line(label, text)
 
@@ -209,7 +211,7 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     """What ``rigidsim plan`` says."""
     on = page(out)
     on.say((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}")
-    parts = Body(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
+    parts = UnderstoodBody(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
     _print_understood(*parts, on)
     for effect in plan["loads"]:
         on.line("load", effect)

@@ -14,7 +14,7 @@ from rigidsim.look.readable_time import (
     span_text,
     unit_for,
 )
-from rigidsim.store.understood import Body, Span, Start
+from rigidsim.store.understood import Span, Start, UnderstoodBody
 
 _DIGITS = 6
 _FEWER = 4
@@ -22,7 +22,9 @@ _FAR = 1e4  # m, from where on km read better
 _STRAIGHT = 1e-9  # of a direction's component: what is less is shown as zero
 
 
-def understood(body: Body | None, start: Start | None, time: Span | None) -> Iterator[tuple[str, str]]:
+def understood(
+    body: UnderstoodBody | None, start: Start | None, time: Span | None
+) -> Iterator[tuple[str, str]]:
     """Labels and texts, one for each that there is (older summaries have fewer)."""
     if body is not None:
         yield "body", body_text(body)
@@ -32,7 +34,7 @@ def understood(body: Body | None, start: Start | None, time: Span | None) -> Ite
         yield "time", time_text(time)
 
 
-def body_text(body: Body) -> str:
+def body_text(body: UnderstoodBody) -> str:
     """Mass, centre of mass and moments about which axes."""
     parts = [f"from {body.source.partition(' (')[0]}"]
     if body.mass is not None:

@@ -18,7 +18,7 @@ _UNIFORM = 0.1  # by which the rates of both halves of a run may differ: swings 
 
 
 @dataclass(frozen=True)
-class Line:
+class SecularLine:
     """``at_start + rate * (t - t[0])``, the secular part of an angle."""
 
     at_start: float
@@ -30,7 +30,7 @@ class Line:
         return np.asarray(self.at_start + self.rate * (time - self.start))
 
 
-def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
+def secular(time: Array, angle: Array, *, level: bool = False) -> SecularLine:
     """Straight line through an angle (rows,) that swings about it.
 
     Evenly sampled, its strongest sinusoids of at least 1.5 periods are fitted with it, their periods too, so
@@ -42,7 +42,7 @@ def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
     finite = np.isfinite(angle)
     t, y = time[finite], angle[finite]
     if len(t) < 3 or t[-1] == t[0]:
-        return Line(float(y.mean()) if len(y) else 0.0, 0.0, float(time[0]) if len(time) else 0.0)
+        return SecularLine(float(y.mean()) if len(y) else 0.0, 0.0, float(time[0]) if len(time) else 0.0)
     s = (t - t[0]) / (t[-1] - t[0])
     weight = np.sin(np.pi * s) ** 2 * np.gradient(s)
     weight /= weight.sum()
@@ -63,7 +63,7 @@ def secular(time: Array, angle: Array, *, level: bool = False) -> Line:
         found = _refined(columns[:polynomial], lines, found, s, y - middle, root)
     slope = 0.0 if level else float(found[1])
     rate = slope / (t[-1] - t[0])
-    return Line(middle + float(found[0]) - slope * 0.5 + rate * (time[0] - t[0]), rate, float(time[0]))
+    return SecularLine(middle + float(found[0]) - slope * 0.5 + rate * (time[0] - t[0]), rate, float(time[0]))
 
 
 def _sinusoids(lines: list[float], s: Array) -> list[Array]:
@@ -139,7 +139,7 @@ def circulation(time: Array, plane: Array) -> float | None:
 
 
 @dataclass(frozen=True)
-class Ellipse:
+class FittedEllipse:
     """``forward exp(i w t) + backward exp(-i w t)`` about the time origin `start`; `rate` is w > 0, rad/s."""
 
     forward: complex
@@ -160,7 +160,7 @@ class Ellipse:
         return np.stack([z.real, z.imag], axis=1)
 
 
-def leading_ellipse(time: Array, plane: Array) -> Ellipse | None:
+def leading_ellipse(time: Array, plane: Array) -> FittedEllipse | None:
     """The strongest periodic part of a point's motion in a plane (rows, 2), evenly sampled.
 
     None where the strongest has less than 1.5 periods in the run, or there is none that stands out.
@@ -188,4 +188,4 @@ def leading_ellipse(time: Array, plane: Array) -> Ellipse | None:
     wave = np.exp(1j * rate * (time - time[0]))
     basis = np.stack([wave, wave.conj(), np.ones_like(wave), middle, middle**2], axis=1)
     found, *_ = np.linalg.lstsq(basis, z, rcond=None)
-    return Ellipse(complex(found[0]), complex(found[1]), float(rate), float(time[0]))
+    return FittedEllipse(complex(found[0]), complex(found[1]), float(rate), float(time[0]))

@@ -150,7 +150,7 @@ def nutation_panel(axes: Axes, dataset: xarray.Dataset) -> None:
     key(axes, "Nutation: the pole about its mean motion")
 
 
-def _ellipse_label(ellipse: fits.Ellipse, period: str) -> str:
+def _ellipse_label(ellipse: fits.FittedEllipse, period: str) -> str:
     long, short = ellipse.semi_axes
     return f"{period}: semi-axes {angle_text(long, 3)}, {angle_text(short, 3)}"
 

@@ -141,7 +141,7 @@ class Shell:
 
 
 @dataclass(frozen=True)
-class Frame:
+class MovingFrame:
     """A frame that moves in space: parts may be attached to it, and a view may look from it.
 
     Attributes:
@@ -195,7 +195,7 @@ class Stage:
     vectors: list[Vector] = field(default_factory=list)
     solids: list[Solid] = field(default_factory=list)
     shells: list[Shell] = field(default_factory=list)
-    frames: list[Frame] = field(default_factory=list)
+    frames: list[MovingFrame] = field(default_factory=list)
     looked_from: str = ""
     camera: Camera | None = None
 

@@ -16,7 +16,7 @@ from rigidsim.look.stages.parts import (
     SOURCE,
     Array,
     Camera,
-    Frame,
+    MovingFrame,
     Picture,
     Stage,
     Vector,
@@ -119,7 +119,7 @@ def _in_local_frame(
         stage,
         solids=solids,
         lines=lines,
-        frames=[Frame("local", viewer_quaternion(quaternion_of(local)))],
+        frames=[MovingFrame("local", viewer_quaternion(quaternion_of(local)))],
         looked_from="local",
         camera=Camera(center + eye, center, np.array([0.0, 0.0, -1.0])),
     )

@@ -33,7 +33,7 @@ class Ellipsoid:
 
 
 @dataclass(frozen=True)
-class Line:
+class StraightPiece:
     """A straight piece of an outline, from one (radius, z) to another."""
 
     start: tuple[float, float]
@@ -54,7 +54,7 @@ class Arc:
 class Revolved:
     """A solid of revolution about z: its outline, piece by piece, runs with the outside on its right."""
 
-    pieces: tuple[Line | Arc, ...]
+    pieces: tuple[StraightPiece | Arc, ...]
 
 
 Outline: TypeAlias = Box | Ellipsoid | Revolved
@@ -62,4 +62,4 @@ Outline: TypeAlias = Box | Ellipsoid | Revolved
 
 def polygon(*corners: tuple[float, float]) -> Revolved:
     """The solid of revolution whose outline joins these (radius, z) by straight lines."""
-    return Revolved(tuple(Line(a, b) for a, b in pairwise(corners)))
+    return Revolved(tuple(StraightPiece(a, b) for a, b in pairwise(corners)))

@@ -76,7 +76,7 @@ _CHECKING = context_for("quadruple")
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Parsed:
     """What was read of an expression.
 
     Attributes:
@@ -184,7 +184,7 @@ class _Parser:
         except DimensionError as error:
             self.fail(str(error), position)
 
-    def deeper(self, weakest: int) -> _Part:
+    def deeper(self, weakest: int) -> _Parsed:
         """An expression one level down."""
         self.depth += 1
         if self.depth > DEEPEST_NESTING:
@@ -193,7 +193,7 @@ class _Parser:
         self.depth -= 1
         return node
 
-    def all(self) -> _Part:
+    def all(self) -> _Parsed:
         root = self.binary(0)
         if self.at(")"):
             self.fail('a ")" without its "("; leave it out')
@@ -212,14 +212,14 @@ class _Parser:
             return f"; a unit stands behind a number, as in 2 {name}"
         return f'; no unit is called "{name}"'
 
-    def binary(self, weakest: int) -> _Part:
+    def binary(self, weakest: int) -> _Parsed:
         """Operands and the signs that bind more strongly than ``weakest``."""
         start = self.start
         if self.at("+", "-"):
             sign, left = self.advance(), self.deeper(_SIGN_BINDS)
             if sign == "-":
                 node = operation("negative", (left.node,), (start, self.end))
-                left = _Part(node, left.measure, left.bare)
+                left = _Parsed(node, left.measure, left.bare)
         else:
             left = self.primary()
         while self.at(*_BINDS) and _BINDS[self.token] > weakest:
@@ -231,7 +231,7 @@ class _Parser:
                 exponent = self.exponent()
                 value = exponent.value if isinstance(exponent, Constant) else None
                 node = self.bounded(power(left.node, exponent, (start, self.end)), start)
-                left = _Part(node, left.measure.power(value))
+                left = _Parsed(node, left.measure.power(value))
                 continue
             right, first = self.binary(_BINDS[sign]), left
             node, span = right.node, (start, self.end)
@@ -244,7 +244,7 @@ class _Parser:
                 self.fail(f"{_PARENTHESES}: 1/(2 s) or (1/2)*(1 s)", at)
             if sign == "/" and self.constant(node) == 0:
                 raise Expression(self.text, node).error("division by the zero", node)
-            left = _Part(operation(_OPERATORS[sign], (left.node, node), span), measure)
+            left = _Parsed(operation(_OPERATORS[sign], (left.node, node), span), measure)
         return left
 
     def exponent(self) -> Node:
@@ -260,11 +260,11 @@ class _Parser:
             )
         return exponent.node
 
-    def primary(self) -> _Part:
+    def primary(self) -> _Parsed:
         start = self.start
         if self.at("("):
             inside = self.arguments()[0]
-            return _Part(inside.node, inside.measure)
+            return _Parsed(inside.node, inside.measure)
         if self.kind == "number":
             return self.quantity(start)
         if self.kind != "name":
@@ -274,18 +274,18 @@ class _Parser:
             return self.call(name, start)
         span = (start, self.end)
         if name in self.names:
-            return _Part(Name(name, span), dimensions.of_name(name))
+            return _Parsed(Name(name, span), dimensions.of_name(name))
         if name in self.constants:
             number = self.constants[name]
             value = number.alone
-            return _Part(Constant(value, span), dimensions.of_number(number))
+            return _Parsed(Constant(value, span), dimensions.of_number(number))
         if name == "e":
-            return _Part(Operation("exp", (Constant(ONE, span),), span))
+            return _Parsed(Operation("exp", (Constant(ONE, span),), span))
         near = nearest(name, self.known) or nearest(name.lower(), self.known)
         near = self.about_units(name) if units.is_unit(name) else near
         self.fail(f'unknown name "{name}"{near}; allowed: {", ".join(self.known)}', start)
 
-    def quantity(self, start: int) -> _Part:
+    def quantity(self, start: int) -> _Parsed:
         """A number, and the unit behind it."""
         try:
             value = parse_number(self.token, "1")
@@ -295,7 +295,7 @@ class _Parser:
         end = self.measured(start, lambda: end_of_unit(self.text, self.end, self.names, self.parameters))
         unit = self.text[self.start : end]
         if self.kind != "name" or not unit:
-            return _Part(Constant(value, (start, self.end)))
+            return _Parsed(Constant(value, (start, self.end)))
         try:
             number = with_unit(value, unit, self.text[start : self.start + len(unit)])
         except ValueError as error:
@@ -303,9 +303,9 @@ class _Parser:
         self.token, self.kind = unit, "unit"
         self.advance()
         value = number.alone
-        return _Part(Constant(value, (start, self.end)), dimensions.of_unit(unit), bare=True)
+        return _Parsed(Constant(value, (start, self.end)), dimensions.of_unit(unit), bare=True)
 
-    def call(self, name: str, start: int) -> _Part:
+    def call(self, name: str, start: int) -> _Parsed:
         if name in self.known:
             self.fail(f'"{name}" is no function; a product has its *, as in {name}*(...)', start)
         if name not in _FUNCTIONS:
@@ -320,7 +320,7 @@ class _Parser:
         measures = [argument.measure for argument in arguments]
         measure = self.measured(start, lambda: dimensions.of_function(name, measures))
         nodes = [argument.node for argument in arguments]
-        return _Part(self.bounded(written_out(name, nodes, (start, self.end)), start), measure)
+        return _Parsed(self.bounded(written_out(name, nodes, (start, self.end)), start), measure)
 
     def bounded(self, node: Node, start: int) -> Node:
         """A node that isn't too large: arguments of piecewise functions are written out several times."""
@@ -333,7 +333,7 @@ class _Parser:
                 self.fail("too many piecewise functions within one another; write fewer", start)
         return node
 
-    def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[_Part]:
+    def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[_Parsed]:
         """What stands in parentheses."""
         opened = self.start
         self.advance()

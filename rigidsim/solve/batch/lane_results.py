@@ -25,7 +25,7 @@ class Found:
 
 
 @dataclass
-class Lanes:
+class LaneResults:
     """How members fared.
 
     Attributes:
@@ -43,13 +43,13 @@ class Lanes:
     found: dict[int, list[Found]] = field(default_factory=dict)
 
     @classmethod
-    def empty(cls, samples: int, states: int, members: int) -> Lanes:
+    def empty(cls, samples: int, states: int, members: int) -> LaneResults:
         """Before anything ran."""
         yes = np.ones(members, dtype=bool)
         table = np.full((samples, states, members), np.nan)
         return cls(table, yes, yes.copy(), np.zeros(members, dtype=np.int64))
 
-    def put(self, places: np.ndarray, others: Lanes) -> None:
+    def put(self, places: np.ndarray, others: LaneResults) -> None:
         """How some fared, in place of what was known of them."""
         self.states[:, :, places] = others.states
         for mine, theirs in (

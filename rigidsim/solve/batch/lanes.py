@@ -14,7 +14,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.solve.batch.lane_results import IDLE, Found, Lanes, put_in_place, until_next
+from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, put_in_place, until_next
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
@@ -114,7 +114,7 @@ class BatchEngine:
         start: np.ndarray,
         times: np.ndarray,
         most_steps: int,
-    ) -> Lanes:
+    ) -> LaneResults:
         """Take members to their last samples.
 
         Args:
@@ -123,7 +123,7 @@ class BatchEngine:
             most_steps: that one may take.
         """
         count = initial.shape[1]
-        result = Lanes.empty(len(times), len(initial), count)
+        result = LaneResults.empty(len(times), len(initial), count)
         longest = self.longest(initial, parameters, start)
         if len(times) <= 2 and bool((times[:-1] == start).all()) and bool((times[-1] > start).all()):
             if len(times) == 2:
@@ -211,7 +211,7 @@ class BatchEngine:
 
     def _in_turn(
         self,
-        result: Lanes,
+        result: LaneResults,
         initial: np.ndarray,
         parameters: np.ndarray,
         start: np.ndarray,
@@ -274,7 +274,7 @@ class BatchEngine:
 
     @staticmethod
     def _after_loss(
-        result: Lanes, inside: list[int], taken: list[int], outcomes: Any, waiting: deque[int]
+        result: LaneResults, inside: list[int], taken: list[int], outcomes: Any, waiting: deque[int]
     ) -> None:
         """A state was lost, and all lanes have stopped: those beside it begin again."""
         for member, steps, outcome in zip(inside, taken, outcomes, strict=True):
@@ -289,7 +289,7 @@ class BatchEngine:
 
     def _together(
         self,
-        result: Lanes,
+        result: LaneResults,
         states: np.ndarray,
         members: list[int],
         initial: np.ndarray,

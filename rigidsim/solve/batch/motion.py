@@ -15,7 +15,7 @@ import numpy as np
 
 from rigidsim.model.tangents import LARGEST, SMALL
 from rigidsim.solve.batch.events import EventExpressions
-from rigidsim.solve.batch.lane_results import Lanes
+from rigidsim.solve.batch.lane_results import LaneResults
 from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
 
@@ -67,7 +67,7 @@ class BatchMotion:
         start: np.ndarray,
         times: np.ndarray,
         most_steps: int,
-    ) -> tuple[Lanes, np.ndarray | None]:
+    ) -> tuple[LaneResults, np.ndarray | None]:
         """Take members to their last samples.
 
         Args:
@@ -83,7 +83,7 @@ class BatchMotion:
 
         moving = self._traced.moving
 
-        def plain(which: np.ndarray) -> Lanes:
+        def plain(which: np.ndarray) -> LaneResults:
             return self._plain.run(
                 initial[:moving, which], parameters[:, which], start[which], times[:, which], most_steps
             )
@@ -107,7 +107,7 @@ class BatchMotion:
         return motion, along.states
 
 
-def _same_bits(some: Lanes, whole: Lanes, which: np.ndarray) -> bool:
+def _same_bits(some: LaneResults, whole: LaneResults, which: np.ndarray) -> bool:
     """Whether members fared the same in both.
 
     Args:

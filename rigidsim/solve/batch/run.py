@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidsim.solve.batch.events import EventExpressions
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.lane_results import Lanes
+from rigidsim.solve.batch.lane_results import LaneResults
 from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.solve.batch.motion import UNFELT, BatchMotion
 from rigidsim.solve.batch.outputs import BatchOutputs, Values
@@ -168,7 +168,7 @@ class BatchRun:
         given_up = _MOST_STEPS + int(min(_STEPS_PER_UNIT * longest, 1e12))
         return given_up if asked is None else min(int(asked), given_up)
 
-    def _status(self, lanes: Lanes, most: int) -> np.ndarray:
+    def _status(self, lanes: LaneResults, most: int) -> np.ndarray:
         asked = self._traced.prepared.scene.config.limits.max_steps
         short = Status.MAX_STEPS if asked is not None and most == int(asked) else None
         found = np.full(len(lanes.arrived), Status.FINISHED, dtype=object)
@@ -188,7 +188,7 @@ class BatchRun:
 
     def _events(
         self,
-        lanes: Lanes,
+        lanes: LaneResults,
         swept: np.ndarray,
         numbers: Numbers,
         part: np.ndarray,
@@ -238,7 +238,7 @@ class BatchRun:
             _end(block, m, int(np.argmax(beyond[:, m])) + 1)
 
 
-def _reached(lanes: Lanes) -> np.ndarray:
+def _reached(lanes: LaneResults) -> np.ndarray:
     """Samples that each member got to, (members,)."""
     found = np.full(len(lanes.arrived), len(lanes.states))
     short = np.flatnonzero(~lanes.arrived)

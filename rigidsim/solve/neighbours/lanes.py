@@ -15,7 +15,7 @@ import numpy as np
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
-from rigidsim.solve.engine import Integrator
+from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
@@ -181,7 +181,7 @@ class OwnLanes:
         loose: whether its states bear a loose tolerance, where many more steps are to be taken.
     """
 
-    def __init__(self, system: System, integrator: Integrator, *, loose: bool = True) -> None:
+    def __init__(self, system: System, integrator: TaylorEngine, *, loose: bool = True) -> None:
         self._system, self._loose = system, loose
         self._integrator = copy.deepcopy(integrator)
         self.tolerance = float(integrator.tol)
@@ -279,13 +279,13 @@ class SeriesErrors:
         integrator: of the system and the tolerance, in double precision; without one it is compiled.
     """
 
-    def __init__(self, system: System, tolerance: float, integrator: Integrator | None = None) -> None:
+    def __init__(self, system: System, tolerance: float, integrator: TaylorEngine | None = None) -> None:
         wide = tolerance < _LEAST_TOLERANCE and _EIGHTY_BITS
         tried = max(tolerance, _LEAST_WIDE_TOLERANCE if wide else _LEAST_TOLERANCE)
         self._share = min(tolerance / tried * _ONE_ORDER, 1.0)
         self._rounding = 16 * float(np.finfo(np.longdouble if wide else float).eps)
         if integrator is not None and not wide and tried == tolerance:
-            self._integrator: Integrator = copy.deepcopy(integrator)
+            self._integrator: TaylorEngine = copy.deepcopy(integrator)
             return
         number: Any = np.longdouble if wide else float
         initial = [number(float(x)) for x in system.initial]

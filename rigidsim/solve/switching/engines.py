@@ -17,13 +17,13 @@ import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.solve.building import interruptible
-from rigidsim.solve.engine import Integrator
+from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.event_units import of_order_one
 from rigidsim.solve.events import BESIDE, EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.switching.resting import Meeting
-from rigidsim.solve.switching.sides import HELD, SLIDES, Choice, Look, Probe, continued
+from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe, continued
 from rigidsim.solve.switching.sliding import sliding
 
 _BISECTIONS = 4  # of a step for each bit of the precision
@@ -47,7 +47,7 @@ class SwitchedEngines(Stepper):
     ) -> None:
         self._roots: list[Root] = []
         self._probes: dict[int, Probe] = {}
-        self._slid: dict[tuple[int, tuple[int, ...], tuple[int, ...]], Integrator] = {}
+        self._slid: dict[tuple[int, tuple[int, ...], tuple[int, ...]], TaylorEngine] = {}
         self._chart = 0
         surfaces = system.plan.surfaces
         self._modes = [1] * len(surfaces.found)
@@ -138,7 +138,7 @@ class SwitchedEngines(Stepper):
 
     def _compiled(
         self, system: System, along: tuple[int, ...] = (), held: Mapping[int, tuple[int, int]] | None = None
-    ) -> Integrator:
+    ) -> TaylorEngine:
         held = held or {}
         options = dict(self.precision.options)
         equations, kind = system.equations, self.precision.scalar
@@ -171,8 +171,8 @@ class SwitchedEngines(Stepper):
         self._slid[(self._chart, along, tuple(self._modes[j] for j in held))] = integrator
         return integrator
 
-    def _noting(self, j: int, end: int = 0) -> Callable[[Integrator, Scalar, int], None]:
-        def called(_: Integrator, time: Scalar, way: int) -> None:
+    def _noting(self, j: int, end: int = 0) -> Callable[[TaylorEngine, Scalar, int], None]:
+        def called(_: TaylorEngine, time: Scalar, way: int) -> None:
             self._roots.append((time, j, end or way))
 
         return called
@@ -220,7 +220,7 @@ class SwitchedEngines(Stepper):
         self._angles = [a + 2 * np.pi * n for a, n in zip(plain, turns, strict=True)]
         self._quaternion = [sign * x for x in quaternion]
 
-    def _set(self, engine: Integrator) -> None:
+    def _set(self, engine: TaylorEngine) -> None:
         """Give an engine its parameters at this boundary.
 
         The engine finds a zero at a step's very beginning again and again, in place of those that follow. So
@@ -247,7 +247,7 @@ class SwitchedEngines(Stepper):
             return 2 * noise
         return 2.0 ** (-self.precision.bits - BESIDE) if self._fresh and value == 0 else 0.0
 
-    def _at_rest(self, on: list[int], look: Look) -> Choice | None:
+    def _at_rest(self, on: list[int], look: Look) -> Continuation | None:
         """How to go on where swings about the meeting of two surfaces have come down to rounding."""
         small = [
             i

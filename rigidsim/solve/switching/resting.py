@@ -19,7 +19,7 @@ import numpy as np
 
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.switching.sides import HELD, SLIDES, Choice, Look, Probe
+from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe
 
 _NEAR = 4.0
 """Roundings of its argument within which a rate is zero."""
@@ -52,7 +52,7 @@ class Meeting:
     time: Scalar
     epsilon: float
 
-    def rest(self, on: Sequence[int], kept: Mapping[int, int]) -> Choice | None:
+    def rest(self, on: Sequence[int], kept: Mapping[int, int]) -> Continuation | None:
         """How the motion keeps to surfaces that it lies on, or that it could leave them by growing swings;
         None where it does neither on two of them, or where others than those that it keeps to already take
         part.
@@ -66,9 +66,11 @@ class Meeting:
                 continue
             sign = self._sign(held, rate, others)
             if isinstance(sign, str):
-                return Choice(None, sign)
+                return Continuation(None, sign)
             if sign:
-                return Choice({held: sign * (HELD + rate), rate: SLIDES, **{j: kept[j] for j in others}})
+                return Continuation(
+                    {held: sign * (HELD + rate), rate: SLIDES, **{j: kept[j] for j in others}}
+                )
         return None
 
     def _sign(self, i: int, m: int, others: Sequence[int]) -> int | str:

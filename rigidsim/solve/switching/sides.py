@@ -129,7 +129,7 @@ class Probe:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Continuation:
     """How to go on from some surfaces.
 
     Attributes:
@@ -187,7 +187,7 @@ class Fields:
             if all(abs(float(look.rate(j))) <= noise for look in self._looks.values())
         ]
 
-    def choose(self) -> Choice:
+    def choose(self) -> Continuation:
         """The one combination whose field agrees with it."""
         found, added = [], len(self.surfaces) == 1 or self.add_up
         for modes in product((1, -1, SLIDES), repeat=len(self.surfaces)):
@@ -202,10 +202,12 @@ class Fields:
             if agrees:
                 found.append(dict(zip(self.surfaces, modes, strict=True)))
         if len(found) == 1:
-            return Choice(found[0])
+            return Continuation(found[0])
         if found:
-            return Choice(None, "it could leave it in more than one way, so that what follows isn't unique")
-        return Choice(None, "no side agrees with its own field", tangential=True)
+            return Continuation(
+                None, "it could leave it in more than one way, so that what follows isn't unique"
+            )
+        return Continuation(None, "no side agrees with its own field", tangential=True)
 
     def _slides(self, modes: Sequence[int]) -> bool:
         along = [i for i, mode in enumerate(modes) if mode == SLIDES]

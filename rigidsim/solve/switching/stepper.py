@@ -18,7 +18,7 @@ from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.step_bounds import bound_of_sparse_series
 from rigidsim.solve.switching.engines import Root, SwitchedEngines
-from rigidsim.solve.switching.sides import HELD, SLIDES, Choice, Fields, Look
+from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE
 
 _ATTEMPTS = 32  # at one step
@@ -279,7 +279,7 @@ class SwitchingStepper(SwitchedEngines):
                 break
         return look
 
-    def _take(self, choice: Choice) -> None:
+    def _take(self, choice: Continuation) -> None:
         assert choice.modes is not None
         for j, mode in choice.modes.items():
             self._modes[j] = mode
@@ -288,7 +288,7 @@ class SwitchingStepper(SwitchedEngines):
         if self._along:
             self._keep_to_surfaces()
 
-    def _chosen(self, on: list[int], hint: tuple[int, int] | None = None) -> Choice:
+    def _chosen(self, on: list[int], hint: tuple[int, int] | None = None) -> Continuation:
         """How to go on from surfaces that the state lies on."""
 
         def at(sides: dict[int, int]) -> Look:
@@ -302,17 +302,17 @@ class SwitchingStepper(SwitchedEngines):
         if not moving:
             return self._by_trial(idle)
         if len(moving) > MOST_AT_ONCE:
-            return Choice(None, f"more than {MOST_AT_ONCE} surfaces meet there")
+            return Continuation(None, f"more than {MOST_AT_ONCE} surfaces meet there")
         fields = Fields(at, self._probe, moving)
         choice = fields.choose()
         if choice.modes is not None:
-            return Choice({**idle, **choice.modes})
+            return Continuation({**idle, **choice.modes})
         if not choice.tangential or hint is None:
             return choice
         # touched: rounding hides the rates, but the step was seen to get to the other side
-        return Choice({**idle, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
+        return Continuation({**idle, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
 
-    def _by_trial(self, idle: dict[int, int]) -> Choice:
+    def _by_trial(self, idle: dict[int, int]) -> Continuation:
         """At rest on a surface: the side on which a step stays on its own."""
         modes = dict(idle)
         for j in idle:
@@ -324,11 +324,11 @@ class SwitchingStepper(SwitchedEngines):
                     kept.append(side if moved else 0)
             self._modes[j] = idle[j]
             if kept == [1, -1]:
-                return Choice(None, "it could leave it to either side")
+                return Continuation(None, "it could leave it to either side")
             if not kept:
-                return Choice(None, "both sides lead back to it with growing speed")
+                return Continuation(None, "both sides lead back to it with growing speed")
             modes[j] = kept[0] or idle[j]
-        return Choice(modes)
+        return Continuation(modes)
 
     def _fail(self, j: int, why: str) -> bool:
         surface = self.system.plan.surfaces.found[j]

@@ -127,7 +127,7 @@ class JoinedAngles:
             angles[lost] = self._zero  # no direction
         plain, size = angles.astype(np.float64), np.sqrt(squared)
         times, states = samples.times.astype(np.float64), self._followed.states(samples)
-        block = _Block(times, states, plain, size)
+        block = _DoubleSamples(times, states, plain, size)
         if known.wrapped_from == -math.inf:  # apart from the samples
             turns, wrapped_from = np.zeros(angles.shape, dtype=np.int64), known.wrapped_from
         elif self.dense:
@@ -185,7 +185,7 @@ class JoinedAngles:
             found |= set(rows.tolist())
         return np.array(sorted(found), dtype=np.int64)
 
-    def _nearest(self, known: Continuity, block: _Block) -> np.ndarray:
+    def _nearest(self, known: Continuity, block: _DoubleSamples) -> np.ndarray:
         """The full turns (n, angles) from row to row that make each angle nearest to the sample before, but
         for those near a pole, whose way is followed.
         """
@@ -203,7 +203,7 @@ class JoinedAngles:
                 made[row] = made[row] if found is None else found
         return made
 
-    def _sparse_turns(self, known: Continuity, block: _Block) -> tuple[np.ndarray, float]:
+    def _sparse_turns(self, known: Continuity, block: _DoubleSamples) -> tuple[np.ndarray, float]:
         """The full turns (n, angles) of each row, and from when on those that are followed are lost."""
         turns = np.zeros(block.angles.shape, dtype=np.int64)
         wrapped_from = known.wrapped_from
@@ -218,7 +218,7 @@ class JoinedAngles:
     def _steady_variables(self) -> list[Recorded]:
         return [] if self._steady is None else self._steady.variables
 
-    def _advanced(self, known: Continuity, block: _Block, columns: np.ndarray) -> np.ndarray:
+    def _advanced(self, known: Continuity, block: _DoubleSamples, columns: np.ndarray) -> np.ndarray:
         """The full turns (n, columns) from row to row of angles that advance steadily."""
         assert self._steady is not None
         made = np.zeros((len(block.times), len(columns)), dtype=np.int64)
@@ -236,7 +236,9 @@ class JoinedAngles:
             made[row] = found
         return made
 
-    def _counted(self, known: Continuity, block: _Block, columns: np.ndarray) -> tuple[np.ndarray, float]:
+    def _counted(
+        self, known: Continuity, block: _DoubleSamples, columns: np.ndarray
+    ) -> tuple[np.ndarray, float]:
         """The full turns (n, columns) of the motion from sample to sample; none once they are lost, and from
         when on they are.
         """
@@ -261,7 +263,7 @@ class JoinedAngles:
 
 
 @dataclass(frozen=True)
-class _Block:
+class _DoubleSamples:
     """Samples in float64, internal units.
 
     Attributes:

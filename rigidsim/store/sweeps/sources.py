@@ -29,7 +29,7 @@ def plain(item: str) -> str:
 
 
 @dataclass(frozen=True)
-class Source:
+class ItemPlaces:
     """Where an item lies of each member, (members,): a tile of a generation, and the place in it; -1 where it
     lies nowhere.
     """
@@ -39,7 +39,7 @@ class Source:
     row: np.ndarray
 
     @classmethod
-    def nowhere(cls, count: int) -> Source:
+    def nowhere(cls, count: int) -> ItemPlaces:
         """Of no member."""
         return cls(
             np.full(count, _NOWHERE, dtype=np.int16),
@@ -57,7 +57,7 @@ class Source:
 class Sources:
     """Where what is kept of a sweep's members lies, by item; ``ALWAYS`` with them."""
 
-    found: dict[str, Source] = field(default_factory=dict)
+    found: dict[str, ItemPlaces] = field(default_factory=dict)
 
     def works(self) -> tuple[Work, ...]:
         """What is still to be computed: members of which the same is missing go together."""
@@ -81,7 +81,7 @@ def sources_of(sweep: Sweep, folder: SweepFolder, generations: Sequence[tuple[Ge
     Args:
         generations: of the folder, with the sweeps that their configs describe.
     """
-    found = {item: Source.nowhere(sweep.count) for item in (ALWAYS, *items_of(sweep))}
+    found = {item: ItemPlaces.nowhere(sweep.count) for item in (ALWAYS, *items_of(sweep))}
     for generation, then in generations:
         old = positions(sweep, then)
         present = folder.present(generation)

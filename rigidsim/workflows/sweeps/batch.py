@@ -14,7 +14,7 @@ from rigidsim.errors import ConfigError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.session.kept import Kept, KeptVariable, Points, Series, kept_events, kept_of_series
+from rigidsim.session.kept import Kept, KeptVariable, MemberSeries, Points, kept_events, kept_of_series
 from rigidsim.session.members import (
     ENDED_WELL,
     OUTCOMES,
@@ -238,7 +238,7 @@ def _kept(
             values = block.drifts[variable.name].T[:, :, None]
         else:
             continue
-        series.append(Series(variable, [values]))
+        series.append(MemberSeries(variable, [values]))
     kept = kept_of_series(series, block.times, block.reached, keep, hidden)
     recorded = {name: variable for name, variable in recorded.items() if name not in hidden}
     for event in block.events:

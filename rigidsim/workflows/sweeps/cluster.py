@@ -70,7 +70,7 @@ class Cluster:
     def _stream(
         self, distributed: Any, client: Any, generation: Generation, waiting: list[int]
     ) -> Iterator[tuple[int, bytes]]:
-        workers = _Workers(client, self._address, self._alone)
+        workers = _ClusterWorkers(client, self._address, self._alone)
         deaths: Counter[int] = Counter()
         running: dict[Any, int] = {}
         while waiting or running:
@@ -101,7 +101,7 @@ class Cluster:
             yield tile, image
 
 
-class _Workers:
+class _ClusterWorkers:
     """Those of a scheduler, and since when there is none.
 
     Args:
@@ -133,7 +133,7 @@ class _Workers:
         return 0
 
 
-def _fetched(future: Any, workers: _Workers) -> bytes:
+def _fetched(future: Any, workers: _ClusterWorkers) -> bytes:
     """A tile that was done, which may have gone since with its worker: then it is computed again.
 
     Raises:

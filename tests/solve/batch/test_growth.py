@@ -11,7 +11,7 @@ from test_batch_families import FREE, ORBIT, PLANAR, TORQUE, swept
 from test_batch_lanes import blocks_of, by_member
 
 import rigidsim
-from rigidsim.solve.batch.lanes import BatchEngine, Lanes, recommended_width
+from rigidsim.solve.batch.lanes import BatchEngine, LaneResults, recommended_width
 
 RATES = {"initial.angular_velocity[2]": "uniform = [0.3, 2.2], count = 9"}
 
@@ -59,7 +59,7 @@ def test_one_integrator_does_for_both_only_where_it_may(monkeypatch: pytest.Monk
     plain = BatchEngine.run
     otherwise = False
 
-    def counted(self: BatchEngine, initial: np.ndarray, *arguments: Any) -> Lanes:
+    def counted(self: BatchEngine, initial: np.ndarray, *arguments: Any) -> LaneResults:
         taken.append(initial.shape)
         lanes = plain(self, initial, *arguments)
         if otherwise and initial.shape == tried:  # as a compiler may round beside other equations
