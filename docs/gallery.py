@@ -1,8 +1,9 @@
 """The gallery: every ready config with its picture, what to look for in it, and its numbers.
 
 ``python -m docs.gallery [NAME...]`` runs the configs, draws what ``rigidsim plot`` draws of each (or of those
-named) into docs/figures/gallery, and writes docs/gallery.md. ``--table`` prints the table of numbers alone,
-which the tests compare with the one on the page.
+named) into docs/figures/gallery, and writes docs/gallery.md. ``--timelines`` draws their timelines instead,
+as ``rigidsim view --png`` does, for which the rerun viewer needs a renderer (a software one will do).
+``--table`` prints the table of numbers alone, which the tests compare with the one on the page.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import sys
 import tempfile
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import rigidsim
 
@@ -26,6 +28,7 @@ CONFIGS = [
 ]
 _DOTS_PER_INCH = 100
 _COLOURS = 256  # of a picture's palette
+_TIMELINE_WIDTH = 1200
 _COLUMNS = (
     "config",
     "states",
@@ -100,11 +103,33 @@ def picture(run: rigidsim.Run, name: str) -> None:
     figure.savefig(data, format="png", dpi=_DOTS_PER_INCH)
     pyplot.close(figure)
     data.seek(0)
-    drawn = Image.open(data).convert("RGB")
+    _save(Image.open(data), f"{name}.png")
+
+
+def timeline(run: rigidsim.Run, folder: Path, name: str) -> None:
+    """What the viewer shows of a run, small.
+
+    Args:
+        folder: for the picture at its full size.
+    """
+    from PIL import Image
+
+    from rigidsim.workflows.view import render
+
+    whole = folder / f"{name}.png"
+    render([(name, run)], whole)
+    drawn = Image.open(whole).convert("RGB")
+    size = _TIMELINE_WIDTH, round(drawn.height * _TIMELINE_WIDTH / drawn.width)
+    _save(drawn.resize(size, Image.Resampling.LANCZOS), f"{name}_timeline.png")
+
+
+def _save(drawn: Any, file: str) -> None:
+    from PIL import Image
+
     # colours of thin lines keep a place in the palette, and k-means moves it to where colours are
-    image = drawn.quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, kmeans=8)
+    image = drawn.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, kmeans=8)
     PICTURES.mkdir(parents=True, exist_ok=True)
-    image.save(PICTURES / f"{name}.png", optimize=True)
+    image.save(PICTURES / file, optimize=True)
 
 
 def page(rows: list[list[str]]) -> str:
@@ -114,6 +139,8 @@ def page(rows: list[list[str]]) -> str:
         "Every config of `configs/`, as it is run and drawn by two commands (`python -m docs.gallery` makes "
         "this page):",
         "```sh\nrigidsim run configs/heavy_top_nutating.toml\nrigidsim plot runs/heavy_top_nutating\n```",
+        "Of each its timeline comes first, stopped on its way (`rigidsim view runs/heavy_top_nutating --png "
+        "timeline.png`; all of them by `python -m docs.gallery --timelines`), and then what `plot` draws.",
         "## Their numbers",
         "Announced error of the attitude at the end (of an averaged model that of its axes, beside which its "
         "integration's is nothing), and the largest drift of any invariant over what rounding explains "
@@ -127,6 +154,7 @@ def page(rows: list[list[str]]) -> str:
         path = config.relative_to(ROOT).as_posix()
         parts.append(f"*{description}.* [{config.name}](../{path})")
         parts.append(look)
+        parts.append(f"![Its timeline](figures/gallery/{config.stem}_timeline.png)")
         parts.append(f"![What rigidsim plot draws of it](figures/gallery/{config.stem}.png)")
     parts.append("## Sweeps")
     for config in sorted((ROOT / "configs" / "sweeps").glob("*.toml")):
@@ -150,15 +178,18 @@ def page(rows: list[list[str]]) -> str:
 
 def main(given: list[str]) -> None:
     """Run, draw and write; or print the table alone."""
-    alone = "--table" in given
+    alone, timelines = "--table" in given, "--timelines" in given
     named = {name for name in given if not name.startswith("-")}
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for config in CONFIGS:
             print(config.stem, file=sys.stderr, flush=True)
-            run = rigidsim.run(config, out=folder, changes={"output.timeline": False})
+            wanted = not named or config.stem in named
+            run = rigidsim.run(config, out=folder, changes={"output.timeline": timelines and wanted})
             rows.append(numbers(run))
-            if not alone and (not named or config.stem in named):
+            if timelines and wanted:
+                timeline(run, Path(folder), config.stem)
+            elif not alone and wanted:
                 picture(run, config.stem)
     if alone:
         print(table(rows))

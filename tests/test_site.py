@@ -112,7 +112,9 @@ def test_every_config_is_in_the_gallery() -> None:
     assert [name for name in names if f"\n## {name}\n" not in text] == []
     sweeps = [config.stem for config in (ROOT / "configs" / "sweeps").glob("*.toml")]
     assert [name for name in sweeps if f"](figures/{name}.png)" not in text] == []
-    assert [n for n in names if not (ROOT / "docs" / "figures" / "gallery" / f"{n}.png").exists()] == []
+    drawn = ROOT / "docs" / "figures" / "gallery"
+    assert [n for n in names if not (drawn / f"{n}.png").exists()] == []
+    assert [n for n in names if not (drawn / f"{n}_timeline.png").exists()] == []
 
 
 def test_a_site_built_before_is_no_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -183,6 +183,21 @@ def test_a_globe_without_rotation_points_where_its_axis_does(symmetric_top: Buil
         assert any("direction of the Sun isn't shown" in note for note in found.notes)
 
 
+def test_against_a_moving_plane_a_globe_is_seen_from_that_plane(symmetric_top: Build) -> None:
+    top = symmetric_top(count=101)
+    dataset = averaged(top, "figure", earth(top))
+    pole = dataset["figure_axis"].values  # of its angles against the plane, whichever way that lies
+    config = dataset.attrs["config"] + '\n[frame]\nreference = "orbit"\n'
+    dataset = dataset.drop_vars("figure_axis").assign_attrs(config=config)
+    found, _ = build_picture(dataset)
+    (stage,) = found.stages
+    assert stage.quaternion is not None
+    turn = rotation_matrix(stage.quaternion[:, [3, 0, 1, 2]])
+    np.testing.assert_allclose(turn[:, :, 2], pole, rtol=0, atol=1e-6)  # float32
+    assert [arrow.name for arrow in stage.arrows] == ["figure_axis"]  # nothing says where the Sun is
+    assert any("as seen from it" in note for note in found.notes)
+
+
 def test_of_a_tumbling_body_without_attitude_the_momentum_is_shown_alone(symmetric_top: Build) -> None:
     top = symmetric_top(count=101)
     dataset = averaged(top, "momentum", top)

@@ -64,6 +64,9 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     turns = subject.attitude is not None
     if not turns and "angular_velocity" not in dataset:
         subject = precession.pointed(dataset, subject, figure)
+    beside = subject.attitude is None and not turns and precession.moving_plane(dataset)
+    if beside and "angular_velocity" not in dataset:
+        subject = precession.pointed(dataset, subject, figure, plane=True)
     subject = replace(subject, meshes=[mesh], reach=float(axes.max()))
     stage = replace(subject.stage([], []), title=name.capitalize() or "Planet", axis_length=0.0)
     stage.lines.extend(
@@ -89,6 +92,9 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     precession.circle_of_precession(dataset, stage, pole, "figure", notes)
     if turns:
         stage.arrows.extend(source_arrows(dataset, subject, 1.75))
+    elif beside:
+        notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
+        notes.append(precession.standing_note(dataset, "globe"))
     else:
         stage.arrows.extend(precession.followed_sources(dataset, subject, 1.75, notes))
         notes.append(precession.standing_note(dataset, "globe"))

@@ -49,27 +49,38 @@ def axis_in_space(dataset: Table, axis: str) -> Array | None:
     As recorded, else from its obliquity and node longitude where these are against the XY plane.
     """
     found = signals.pole(dataset, axis)
-    if found is None and "obliquity" in dataset and "node_longitude" in dataset:
-        pair = signals.orientation(dataset, axis)
-        against_space = read_config(dataset).get("frame", {}).get("reference", "space") == "space"
-        if pair is not None and against_space:
-            tilt, node = pair
-            found = np.stack(
-                [np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1
-            )
+    if found is None and not moving_plane(dataset):
+        found = _against_plane(dataset, axis)
     return found if found is not None and np.isfinite(found).all() else None
 
 
-def pointed(dataset: Table, subject: Subject, figure: Array) -> Subject:
+def moving_plane(dataset: Table) -> bool:
+    """Whether obliquity and node longitude are against another plane than XY of space, which may move."""
+    return bool(read_config(dataset).get("frame", {}).get("reference", "space") != "space")
+
+
+def _against_plane(dataset: Table, axis: str) -> Array | None:
+    """Unit vectors (rows, 3) along the plane's X', Y' and normal, from obliquity and node longitude."""
+    if "obliquity" not in dataset or "node_longitude" not in dataset:
+        return None
+    pair = signals.orientation(dataset, axis)
+    if pair is None:
+        return None
+    tilt, node = pair
+    return np.stack([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1)
+
+
+def pointed(dataset: Table, subject: Subject, figure: Array, *, plane: bool = False) -> Subject:
     """The subject with an attitude whose figure axis is the recorded one, and which keeps to its node.
 
     The same subject where no figure axis is known.
 
     Args:
         figure: (3,) unit vector of the figure axis, body axes.
+        plane: take the axis against the plane of reference, which may move in space.
     """
-    pole = axis_in_space(dataset, "figure")
-    if pole is None:
+    pole = _against_plane(dataset, "figure") if plane else axis_in_space(dataset, "figure")
+    if pole is None or not np.isfinite(pole).all():
         return subject
     node = np.stack([-pole[:, 1], pole[:, 0], np.zeros(len(pole))], axis=1)
     node[np.hypot(pole[:, 0], pole[:, 1]) < _UPRIGHT] = (1.0, 0.0, 0.0)

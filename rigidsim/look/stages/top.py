@@ -75,7 +75,9 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     stage.vectors.append(
         Vector("gravity", "gravity", PULL, 1.25 * across[0] + 0.9 * up, -0.55 * up, SPACE, "gravity", 0.02)
     )
-    stage.spots.append(Spot("pivot", "pivot", PALE, np.zeros(3), SPACE, 5.0))
+    # on a post the label is below, where it is clear of the body's own
+    label = np.zeros(3) if drop == 0 else 0.55 * ground
+    stage.spots.append(Spot("pivot", "pivot", PALE, label, SPACE, 5.0 if drop == 0 else 0.0))
     if symbol is None:
         com = arm / subject.reach
         stage.lines.append(Line("arm", PALE, np.stack([np.zeros(3), com]), BODY, 2.5))
