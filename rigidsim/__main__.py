@@ -1,7 +1,7 @@
 """``python -m rigidsim``, and the program ``rigidsim``."""
 
 from rigidsim.cli.app import main
-from rigidsim.cli.leaving import left_at_once
+from rigidsim.cli.ending import left_at_once
 
 
 def start() -> None:

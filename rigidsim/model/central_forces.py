@@ -5,7 +5,7 @@ from __future__ import annotations
 from rigidsim.model import fixed_axes
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene.arithmetic import Vector, norm, parallel
 
 
 def _pulling(m: Mechanics) -> list[Load]:
@@ -34,7 +34,7 @@ def line(m: Mechanics) -> Vector | None:
     if m.scene.gravity is not None and any(load.uniform_field is not None for load in others):
         directions.append(m.scene.gravity)
     directions = [d for d in directions if any(x != 0 for x in d)]
-    if not directions or not all(fixed_axes.parallel(context, directions[0], d) for d in directions):
+    if not directions or not all(parallel(context, directions[0], d) for d in directions):
         return None
     size = norm(context, directions[0])
     axis = [x / size for x in directions[0]]

@@ -32,7 +32,7 @@ from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, eigen, negligible, norm
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, eigen, negligible, norm, parallel
 from rigidsim.scene.tracing.numbers import largest_of
 
 
@@ -63,11 +63,6 @@ def _sources(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Any, Vector]]:
 def _source_matrix(sources: list[tuple[Any, Vector]]) -> Matrix:
     """S, 1/s^2, of at least one source."""
     return _added([_outer([s * x for x in d], d) for s, d in sources])
-
-
-def parallel(context: Any, a: Vector, b: Vector) -> bool:
-    """Whether two vectors lie on one line, up to rounding."""
-    return bool(norm(context, cross(a, b)) <= norm(context, a) * norm(context, b) * negligible(context))
 
 
 def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bool:

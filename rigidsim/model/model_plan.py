@@ -15,8 +15,8 @@ from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.paired_products import pairs_products
-from rigidsim.model.parity import refuse_odd_loads
 from rigidsim.model.planar import PlaneOfMotion, asked_plane, gradient_plane
+from rigidsim.model.refusals import refuse_odd_loads
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit

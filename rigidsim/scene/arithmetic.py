@@ -70,8 +70,8 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def parallel(context: Any, a: Vector, b: Vector) -> bool:
-    """Whether two unit vectors point along one line."""
-    return bool(norm(context, cross(a, b)) <= negligible(context))
+    """Whether two vectors lie on one line, up to rounding."""
+    return bool(norm(context, cross(a, b)) <= norm(context, a) * norm(context, b) * negligible(context))
 
 
 def apply(matrix: Matrix, a: Vector) -> Vector:

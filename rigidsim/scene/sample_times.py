@@ -55,6 +55,13 @@ class SampleTimes:
         """Time of the last sample (mpf)."""
         return rounded(self.exact_last, self.context)
 
+    @property
+    def largest_spacing(self) -> float:
+        """Of neighbouring samples, s."""
+        if self.times is None:
+            return float(self.step)
+        return max((float(b - a) for a, b in pairwise(self.times)), default=0.0)
+
 
 def sample_times(table: schema.Time, context: Any) -> tuple[Any, Any, SampleTimes]:
     """Start and end of the motion (s, mpf), and the samples, of a config's ``[time]``.

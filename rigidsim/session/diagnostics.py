@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from rigidsim.accuracy.estimates.growth import UNCERTAIN
@@ -168,7 +167,7 @@ class Diagnostics:
 
     def _joining(self) -> Iterator[Caution]:
         system = self.prepared.system
-        turns = float(system.rate_bound) * largest_spacing(self.prepared) / math.pi
+        turns = float(system.rate_bound) * self.prepared.scene.samples.largest_spacing / math.pi
         joined = [r.name for r in system.recorded if r.continuity == "nearest"]
         lost = self.statistics.angles_wrapped_from
         if not math.isnan(lost):
@@ -217,12 +216,3 @@ class Diagnostics:
         system = self.prepared.system
         shortest = math.ldexp(self.progress.smallest_step, system.scaling.time)
         return shortest * float(system.rate_bound) * _STEPS_TO_SINGULARITY
-
-
-def largest_spacing(prepared: InitialValueProblem) -> float:
-    """Between neighbouring samples, seconds."""
-    samples = prepared.scene.samples
-    if samples.times is not None:
-        pairs = pairwise(samples.times)
-        return max((float(b - a) for a, b in pairs), default=0.0)
-    return float(samples.step)

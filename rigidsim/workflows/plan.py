@@ -13,7 +13,6 @@ import numpy as np
 from rigidsim.accuracy.choice import chosen
 from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
 from rigidsim.accuracy.models.level import choose_level
-from rigidsim.accuracy.motion import run_pilot
 from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.storage import storage
@@ -26,11 +25,10 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
-from rigidsim.workflows.plan_levels import compared_levels
+from rigidsim.workflows.plan_levels import compared_levels, timed_pilot
 from rigidsim.workflows.read import Given, as_experiment
 
 _PILOT_SECONDS = 0.5
-_LARGEST_CHUNK = 1024  # of steps: calls cost next to nothing
 _BASE_MEMORY = 170e6  # interpreter, libraries and compiled code
 _COMPRESSION = 2.5e-8  # seconds a byte: gzip 4 with shuffle writes about 40 MB/s
 _BUFFERING = 2e-7  # seconds a sample
@@ -69,14 +67,7 @@ def plan(
     parts = assemble(prepared)
     compile_seconds = time.perf_counter() - started
     corrected = parts.corrected
-    pilot = run_pilot(
-        corrected.stepper,
-        prepared.clock,
-        corrected.skip,
-        seconds=pilot_seconds,
-        chunk=1,
-        largest_chunk=_LARGEST_CHUNK,
-    )
+    pilot = timed_pilot(prepared, corrected, pilot_seconds)
     step = math.ldexp(pilot.step, prepared.system.scaling.time)
     duration = float(prepared.scene.samples.last - prepared.scene.start)
     steps = max(1.0, duration / step)

@@ -8,16 +8,17 @@ from typing import Any
 
 from rigidsim.accuracy.models.level import CHEAPEST_FIRST, LevelChoice
 from rigidsim.accuracy.models.modelling import measure_modelling
-from rigidsim.accuracy.motion import run_pilot
+from rigidsim.accuracy.motion import Pilot, run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.model_table import FULL
 from rigidsim.solve.assembly import assemble
+from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
 _PILOT_SECONDS = 0.2
-_LARGEST_CHUNK = 1024  # of steps
+_LARGEST_CHUNK = 1024  # of steps: calls cost next to nothing
 
 
 def compared_levels(
@@ -59,16 +60,20 @@ def compared_levels(
     return found
 
 
-def _cost(prepared: InitialValueProblem) -> dict[str, float]:
-    """Steps and seconds of the whole integration."""
-    corrected = assemble(prepared).corrected
-    pilot = run_pilot(
+def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seconds: float) -> Pilot:
+    """The first steps of a motion, corrections included, for so many seconds of CPU time."""
+    return run_pilot(
         corrected.stepper,
         prepared.clock,
         corrected.skip,
-        seconds=_PILOT_SECONDS,
+        seconds=seconds,
         chunk=1,
         largest_chunk=_LARGEST_CHUNK,
     )
+
+
+def _cost(prepared: InitialValueProblem) -> dict[str, float]:
+    """Steps and seconds of the whole integration."""
+    pilot = timed_pilot(prepared, assemble(prepared).corrected, _PILOT_SECONDS)
     steps = math.ceil(pilot.whole)
     return {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}

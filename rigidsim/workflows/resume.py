@@ -17,7 +17,7 @@ from rigidsim.scene.python_values import assignments_of
 from rigidsim.session.attributes import root_attributes as attributes_now
 from rigidsim.session.completion import with_timeline
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress.watching import watched
+from rigidsim.session.progress.progress import watched
 from rigidsim.session.session import Session
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.problem import InitialValueProblem, prepare

@@ -12,7 +12,7 @@ from rigidsim.errors import ConfigError
 from rigidsim.scene.model_table import AUTO, FULL
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress.watching import watched
+from rigidsim.session.progress.progress import watched
 from rigidsim.session.session import Session
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
 from rigidsim.session.tuning import Tuning

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -115,3 +116,24 @@ def observer(*, notebook: bool = False) -> TerminalObserver | LineObserver:
     from rigidsim.session.progress.bar import TerminalObserver
 
     return TerminalObserver(Console(force_jupyter=True) if notebook else None)
+
+
+@contextmanager
+def watched(given: Observer | None, progress: bool | None) -> Iterator[Observer]:
+    """The observer of a run.
+
+    Args:
+        given: one of the caller's.
+        progress: whether a bar shows how it goes where none is given; None: in notebooks.
+    """
+    if given is not None or not (in_notebook() if progress is None else progress):
+        yield given or Observer()
+        return
+    with observer(notebook=in_notebook()) as bar:
+        yield bar
+
+
+def in_notebook() -> bool:
+    """Whether a Jupyter kernel runs this."""
+    shell = sys.modules.get("IPython")
+    return shell is not None and hasattr(shell.get_ipython(), "kernel")

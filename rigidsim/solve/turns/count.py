@@ -17,7 +17,6 @@ import math
 import time as clock_time
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import heyoka as hy
 import numpy as np
@@ -73,20 +72,13 @@ class Place:
     angles: np.ndarray
 
 
-def largest_spacing(samples: SampleTimes) -> float:
-    """Between neighbouring samples, seconds."""
-    if samples.times is None:
-        return float(samples.step)
-    return max((float(b - a) for a, b in pairwise(samples.times)), default=0.0)
-
-
 def radians_between(samples: SampleTimes, rate: float) -> float:
     """By how much a body turns at most between neighbouring samples.
 
     Args:
         rate: bound of each component of the angular velocity, rad/s.
     """
-    return math.sqrt(3) * rate * largest_spacing(samples)
+    return math.sqrt(3) * rate * samples.largest_spacing
 
 
 def angles_to_join(system: System) -> list[Recorded]:

@@ -11,7 +11,7 @@ from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.turns.count import Place, largest_spacing
+from rigidsim.solve.turns.count import Place
 
 _OPEN = 0.5
 """Angle (rad) that may be left open where a turn is told from rates: a sixth of what would mistake it."""
@@ -21,7 +21,7 @@ def advances_steadily(system: System, variable: Recorded) -> bool:
     """Whether the turns of a variable's angles between all samples are told by their rates."""
     if variable.steady is None:
         return False
-    spacing = largest_spacing(system.scene.samples)
+    spacing = system.scene.samples.largest_spacing
     return variable.steady.uncertainty * spacing + variable.steady.excursion < _OPEN
 
 

@@ -9,7 +9,7 @@ import pytest
 
 
 def ended(program: str) -> subprocess.CompletedProcess[str]:
-    code = f"import atexit, sys, threading, time\nfrom rigidsim.cli.leaving import left_at_once\n{program}"
+    code = f"import atexit, sys, threading, time\nfrom rigidsim.cli.ending import left_at_once\n{program}"
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 
