@@ -281,17 +281,23 @@ def _random(way: str, given: Sequence[Any], count: int, key: str, seed: int, len
     if way == "normal" and any(deviation[0] < 0 for _, deviation in pairs):
         raise ValueError("a standard deviation of zero or more is allowed")
 
+    uniform = way == "uniform"
+    draw, units = (_uniform, 2 * _PLACES) if uniform else (_normal, _DRAWN)
+    lines = [(*_line(a[0], (b[0] - a[0] if uniform else b[0]) / units), a[1], a[2]) for a, b in pairs]
+
     def entry(index: int) -> Entry:
-        found = []
-        for component, (a, b) in enumerate(pairs):
-            if way == "uniform":
-                value = a[0] + (b[0] - a[0]) * Fraction(_uniform(seed, key, index, component), 2 * _PLACES)
-            else:
-                value = a[0] + b[0] * Fraction(_normal(seed, key, index, component), _DRAWN)
-            found.append(Written(ExactNumber(value, a[1]), a[2]))
-        return tuple(found)
+        return tuple(
+            Written(ExactNumber(Fraction(first + step * draw(seed, key, index, k), below), power), unit)
+            for k, (first, step, below, power, unit) in enumerate(lines)
+        )
 
     return AxisValues(count, components, entry)
+
+
+def _line(first: Fraction, step: Fraction) -> tuple[int, int, int]:
+    """Both as numerators of one denominator: sums of fractions take four times as long as one of integers."""
+    below = math.lcm(first.denominator, step.denominator)
+    return int(first * below), int(step * below), below
 
 
 _SUCH_AS = {"normal": "[[0, 0, 1], [0.1, 0.1, 0.1]]", "uniform": "[[0, 0, 0], [1, 1, 1]]"}

@@ -78,14 +78,23 @@ def until_next(
     begun: list[float],
     taken: list[int],
     most_steps: int,
+    pace: float,
 ) -> int:
-    """Steps until about the first lane arrives at its pace so far, and those that arrive shortly after."""
+    """Steps until about the first lane arrives at its pace so far, and those that arrive shortly after.
+
+    Args:
+        pace: steps in a unit of time of the member that arrived last, which one that has just begun is taken
+            to have as well; 0 where none did.
+    """
     expected = []
     for lane, member in enumerate(inside):
         if member == IDLE:
             continue
         gone, left = moments[lane] - begun[lane], targets[lane] - moments[lane]
-        steps = _FIRST_STEPS if taken[lane] == 0 or gone <= 0 else int(left / gone * taken[lane]) + 2
+        if taken[lane] and gone > 0:
+            steps = int(left / gone * taken[lane]) + 2
+        else:
+            steps = int(left * pace) if pace else _FIRST_STEPS
         expected.append(min(max(steps, _LEAST_STEPS), most_steps - taken[lane]))
     first = min(expected)
     return max(max(steps for steps in expected if steps <= first + _SHORTLY), 1)

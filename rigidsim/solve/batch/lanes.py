@@ -220,31 +220,36 @@ class BatchEngine:
         most_steps: int,
     ) -> None:
         """Run members whose end alone is asked for: whoever arrives makes room for the next in its lane."""
-        integrator, width = self._integrator, self.width
+        integrator, width, used = self._integrator, self.width, self._used
+        state, numbers = (
+            integrator.state,
+            integrator.pars,
+        )  # one lane at a time: indices by lists cost ten times
         waiting = deque(range(initial.shape[1]))
         inside, taken = [IDLE] * width, [0] * width
         target, bounds, begun = np.zeros(width), np.empty(width), [0.0] * width
         high, low = np.zeros(width), np.zeros(width)
+        pace = 0.0
 
-        def enter(lanes: list[int]) -> None:
+        def enter(lanes: Sequence[int]) -> None:
             """The next members, or nobody: a lane that has arrived already, with the state of some member."""
-            members = [waiting.popleft() if waiting else IDLE for _ in lanes]
-            somebody = [max(member, 0) for member in members]
-            integrator.state[:, lanes] = initial[:, somebody]
-            bounds[lanes] = longest[somebody]
-            if self._used:
-                integrator.pars[:, lanes] = parameters[: self._used, somebody]
-            for lane, member, there in zip(lanes, members, somebody, strict=True):
+            for lane in lanes:
+                member = waiting.popleft() if waiting else IDLE
+                there = max(member, 0)
+                state[:, lane] = initial[:, there]
+                if used:
+                    numbers[:, lane] = parameters[:used, there]
+                bounds[lane] = longest[there]
                 inside[lane], taken[lane] = member, 0
                 begun[lane] = high[lane] = start[there]
                 low[lane], target[lane] = 0.0, start[there] if member == IDLE else end[there]
             integrator.set_dtime(high, low)
 
-        enter(list(range(width)))
+        enter(range(width))
         moments, targets = high.tolist(), target.tolist()
         while any(member != IDLE for member in inside):
             self._log.clear()
-            most = until_next(moments, inside, targets, begun, taken, most_steps)
+            most = until_next(moments, inside, targets, begun, taken, most_steps, pace)
             integrator.propagate_until(target, max_steps=most, max_delta_t=bounds)
             outcomes = integrator.propagate_res
             high, low = (np.array(part) for part in integrator.dtime)
@@ -262,12 +267,12 @@ class BatchEngine:
                     for lane, member in enumerate(inside)
                     if member != IDLE and (moments[lane] == targets[lane] or taken[lane] >= most_steps)
                 ]
-                members = [inside[lane] for lane in lanes]
-                there = [moments[lane] == targets[lane] for lane in lanes]
-                result.steps[members] = [taken[lane] for lane in lanes]
-                result.arrived[members] = there
-                # of one that didn't arrive nothing is known at the end
-                result.states[-1][:, members] = np.where(there, integrator.state[:, lanes], np.nan)
+                for lane in lanes:
+                    member, there = inside[lane], moments[lane] == targets[lane]
+                    result.steps[member], result.arrived[member] = taken[lane], there
+                    # of one that didn't arrive nothing is known at the end
+                    result.states[-1, :, member] = state[:, lane] if there else np.nan
+                    pace = taken[lane] / (moments[lane] - begun[lane]) if there else pace
             if lanes:
                 enter(lanes)
                 moments, targets = high.tolist(), target.tolist()

@@ -21,7 +21,7 @@ from rigidsim.solve.batch import double_double as dd
 from rigidsim.solve.batch.double_double import Doubled
 from rigidsim.solve.precision import precision_of
 
-_SHORT = 100  # bits of a whole number that two doubles hold
+_MANTISSA, _NORMAL = 53, 2.3e-308  # bits of a double, and about the least that has them all
 _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
 """Of mpmath, where a number is outside the range of an operation: what the member's own build says of it is
 its own matter.
@@ -285,35 +285,30 @@ def _doubled(value: Any) -> Doubled:
 
 
 def _of_exact(values: Sequence[ExactNumber]) -> Doubled:
-    """Exact numbers in two doubles: quotients of whole numbers, all at once where these are short enough."""
-    rationals = [value.rational for value in values]
-    parts = [(r.numerator, r.denominator) for r in rationals]
-    short = [
-        max(abs(n), d).bit_length() <= _SHORT and not v.pi_power
-        for (n, d), v in zip(parts, values, strict=True)
-    ]
-    numerator, denominator = (
-        _whole([part[k] if s else 1 for part, s in zip(parts, short, strict=True)]) for k in (0, 1)
-    )
-    quotient = dd.divide(numerator, denominator)
-    whole = np.array([d == 1 for _, d in parts]) & (numerator.low == 0)
-    high = np.asarray(np.where(whole, numerator.high, quotient.high))
-    low = np.asarray(np.where(whole, 0.0, quotient.low))
-    error = np.asarray(np.where(whole, 0.0, quotient.error))
-    exact = (denominator.low == 0) & (np.frexp(denominator.high)[0] == 0.5) & (numerator.low == 0)
-    error[exact], low[exact] = 0.0, 0.0
-    context = context_for(34)
-    for i in np.flatnonzero(~np.array(short, dtype=bool)).tolist():
-        high[i], low[i], error[i] = _parts(values[i].at(context))
-        error[i] += abs(high[i]) * 2.0**-200
+    """Exact numbers in two doubles."""
+    parts = np.array([_parts_of_exact(value) for value in values], dtype=np.float64)
+    high, low, error = parts.reshape(-1, 3).T.copy()
     return Doubled(high, low, error)
 
 
-def _whole(numbers: Sequence[int]) -> Doubled:
-    high = np.array([float(n) for n in numbers])
-    return Doubled(
-        high, np.array([float(n - int(h)) for n, h in zip(numbers, high.tolist(), strict=True)]), 0.0
-    )
+def _parts_of_exact(value: ExactNumber) -> tuple[float, float, float]:
+    """An exact number as ``_parts`` has it; quotients of whole numbers are rounded once by Python."""
+    above, below = value.rational.numerator, value.rational.denominator
+    try:
+        if value.pi_power:
+            raise OverflowError
+        high = above / below
+    except OverflowError:
+        high, low, error = _parts(value.at(context_for(34)))
+        return high, low, error + abs(high) * 2.0**-200
+    up, down = high.as_integer_ratio()
+    rest, under = above * down - up * below, below * down
+    if not rest:
+        return high, 0.0, 0.0
+    low = rest / under
+    if under & (under - 1) == 0 and rest.bit_length() <= _MANTISSA and abs(low) > _NORMAL:
+        return high, low, 0.0
+    return high, low, abs(low) * 2.0**-_MANTISSA + 5e-324
 
 
 def _is_power_of_two(graph: Graph, node: int) -> bool:

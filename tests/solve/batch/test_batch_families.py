@@ -1,6 +1,7 @@
 """Families: whoever shares a system has exactly the numbers of its own build; others are told apart."""
 
 import re
+from fractions import Fraction
 
 import heyoka as hy
 import numpy as np
@@ -11,11 +12,13 @@ from support import config
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import parse
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.tracing.numbers import Traced
 from rigidsim.scene.tracing.whole import TracedWhole
 from rigidsim.solve.batch.family import Alone, Families, batchable
 from rigidsim.solve.batch.members import Members
+from rigidsim.solve.batch.replay import Distinct
 from rigidsim.solve.problem import prepare
 
 FREE = config(
@@ -247,3 +250,27 @@ def test_traced_numbers_are_hashed_for_comparison_alone() -> None:
     assert hash(mass) == hash(mass + 1)
     assert isinstance(family.traced.system.scaling.time, int | TracedWhole)
     assert np.isfinite(float(mass.value))
+
+
+@pytest.mark.parametrize(
+    ("text", "exact"),
+    [
+        ("0", True),
+        ("3", True),
+        ("0.375", True),
+        ("9007199254740993", True),  # one more than a double holds
+        ("0.1", False),
+        ("-1/3", False),
+        ("5791275151624127793/2500000000000000000", False),
+        ("1e-320", False),  # the second part is below every double
+        ("123456789012345678901234567890123456789/10000000000000000000000000000000000000001", False),
+    ],
+)
+def test_a_swept_number_in_two_doubles_is_within_its_bound(text: str, exact: bool) -> None:
+    value = Fraction(text)
+    found = Distinct([ExactNumber(value)]).doubled
+    high, low, error = (Fraction(float(part[0])) for part in (found.high, found.low, found.error))
+    assert high == Fraction(float(value))
+    assert abs(value - high - low) <= error
+    assert error <= abs(value) * Fraction(1, 2**105) + Fraction(5e-324)
+    assert (error == 0) == exact
