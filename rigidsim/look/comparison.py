@@ -14,7 +14,7 @@ from rigidsim.look.clock import Clock, build_clock
 from rigidsim.look.drawn import DrawnRun
 from rigidsim.look.page import legible
 from rigidsim.look.plots import Plot, Series
-from rigidsim.look.recording import CHUNK, recording_to
+from rigidsim.look.recording import STRETCH, recording_to
 from rigidsim.look.thinning import AnyTable, thin, thinned_indices
 
 if TYPE_CHECKING:
@@ -60,8 +60,8 @@ def write_comparison(named: Sequence[tuple[str, AnyTable]], path: Path, *, rows:
         recording.start(build_comparison(drawn, clock, apart))
         for run in drawn:
             run.draw_static(recording.stream, legend=run is drawn[0])
-            for start in range(0, len(run.seconds), CHUNK):
-                run.draw_rows(recording.stream, slice(start, min(start + CHUNK, len(run.seconds))))
+            for start in range(0, len(run.seconds), STRETCH):
+                run.draw_rows(recording.stream, slice(start, min(start + STRETCH, len(run.seconds))))
         if apart is not None:
             drawn[0].draw_plots(recording.stream, [apart])
     return sum(map(len, seconds))

@@ -43,6 +43,9 @@ def draw_static(recording: rr.RecordingStream, stages: Sequence[Stage]) -> None:
     for stage in stages:
         root = f"/{stage.root}"
         recording.log(root, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        if stage.turns_with:
+            turning = rr.Transform3D.from_fields(parent_frame=f"tf#/{stage.turns_with}/{BODY}")
+            recording.log(f"{root}/{BODY}", turning, static=True)
         for number, mesh in enumerate(stage.meshes):
             _draw_mesh(recording, f"{root}/body/solids/{number}", mesh)
         if len(stage.points):
@@ -56,14 +59,16 @@ def draw_static(recording: rr.RecordingStream, stages: Sequence[Stage]) -> None:
         if stage.axis_length:
             _draw_axes(recording, stage)
         for arrow in stage.arrows:
-            path = _arrow_path(stage, arrow)
-            style = rr.Arrows3D.from_fields(colors=[arrow.color], radii=[arrow.radius])
-            recording.log(path, style, static=True)
-            if arrow.label:
-                label = rr.Points3D.from_fields(
-                    colors=[arrow.color], labels=[arrow.label], show_labels=True, radii=[0.0]
+            style: list[rr.AsComponents] = [
+                rr.Arrows3D.from_fields(colors=[arrow.color], radii=[arrow.radius])
+            ]
+            if arrow.label:  # at its tip, of the same entity: an entity of its own would repeat every time
+                style.append(
+                    rr.Points3D.from_fields(
+                        colors=[arrow.color], labels=[arrow.label], show_labels=True, radii=[0.0]
+                    )
                 )
-                recording.log(f"{path}/label", label, static=True)
+            recording.log(_arrow_path(stage, arrow), *style, static=True)
         for trail in stage.trails:
             _draw_trail_static(recording, trail_path(stage, trail), trail)
         _draw_surroundings(recording, stage)
@@ -212,7 +217,7 @@ def stage_columns(
         centre = rr.Transform3D.columns(translation=transform["translation"])
         if any(trail.with_centre for trail in stage.trails) or stage.arrows:
             yield f"{root}/centre", rows, centre
-    if stage.quaternion is not None:
+    if stage.quaternion is not None and not stage.turns_with:
         transform["quaternion"] = stage.quaternion[rows]
     if transform:
         yield f"{root}/body", rows, rr.Transform3D.columns(**transform)
@@ -228,10 +233,10 @@ def stage_columns(
         picked = _every(rows, strides[path])
         vectors = arrow.vectors[picked].astype(np.float32)
         if len(vectors):
-            yield path, picked, rr.Arrows3D.columns(vectors=vectors)
+            columns = [*rr.Arrows3D.columns(vectors=vectors)]
             if arrow.label:
-                tips = vectors * np.float32(arrow.label_at)
-                yield f"{path}/label", picked, rr.Points3D.columns(positions=tips)
+                columns += rr.Points3D.columns(positions=vectors * np.float32(arrow.label_at))
+            yield path, picked, columns
     for trail in stage.trails:
         path = trail_path(stage, trail)
         yield from _trail_columns(path, trail, rows, strides[path])

@@ -130,12 +130,13 @@ class DrawnRun:
             return
         plotting.draw_legend(recording, plotting.legend_of(self.picture.stages))
         told = thinned_indices(len(self.seconds), plotting.CLOCK_ROWS)
-        words = [f"t = {self.words.coarse(float(t))}" for t in self.seconds[told]]
+        words = [f"t = {text}" for text in self.words.coarse(self.seconds[told].tolist())]
         plotting.draw_clock(recording, words, self._times(self.clock.ticks[told], self.steps[told]))
 
     def draw_rows(self, recording: Any, rows: slice) -> None:
         """What changes, for some rows."""
         from rigidsim.look import drawing, plotting
+        from rigidsim.look.sending import send
 
         times = self._times(self.clock.ticks[rows], self.steps[rows])
         known = {(rows.start, rows.step or 1): times}
@@ -147,7 +148,7 @@ class DrawnRun:
                 if mine is None:
                     mine = self._times(self.clock.ticks[picked], self.steps[picked])
                     known[picked.start, picked.step or 1] = mine
-                recording.send_columns(path, indexes=mine, columns=columns)
+                send(recording, path, mine, columns)
         plotting.draw_plot_rows(recording, self.plots, times, rows)
         plotting.draw_plane_rows(recording, self.planes, times, rows)
 

@@ -13,7 +13,7 @@ import numpy as np
 from rigidsim.look import viewer
 from rigidsim.look.drawn import DrawnRun
 from rigidsim.look.page import legible, title_of
-from rigidsim.look.recording import CHUNK, strict
+from rigidsim.look.recording import STRETCH, strict
 from rigidsim.look.thinning import thin, thinned_indices
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ class LiveRecording:
                 self._stream.send_recording_name(legible(title_of(dataset)))
             run.draw_static(self._stream)
             first = int(np.searchsorted(steps, self._last, side="right"))
-            for start in range(first, len(steps), CHUNK):
-                part = slice(start, min(start + CHUNK, len(steps)))
+            for start in range(first, len(steps), STRETCH):
+                part = slice(start, min(start + STRETCH, len(steps)))
                 run.draw_rows(self._stream, part)
                 self.rows += part.stop - part.start
         self._last = int(steps[-1])

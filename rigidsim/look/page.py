@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -88,7 +89,7 @@ def config_page(dataset: Table) -> str:
 
 def legible(text: str) -> str:
     """A text of characters that the viewer has glyphs for: over others it ends itself (0.41, Inter alone)."""
-    return "".join(c if _has_glyph(ord(c)) else "?" for c in text)
+    return _WITHOUT_GLYPH.sub("?", text)
 
 
 # What Inter has of the blocks that texts about motion use; what lies outside is written as a question mark.
@@ -97,11 +98,9 @@ _GLYPHS = (
     (0x3A3, 0x3E1), (0x3F0, 0x49D), (0x4A0, 0x4FF), (0x1E00, 0x1EFF), (0x2000, 0x200A), (0x2010, 0x2027),
     (0x2030, 0x205E), (0x2074, 0x208E), (0x2090, 0x209C), (0x20A0, 0x20BF), (0x2190, 0x2199),
 )  # fmt: skip
-_SINGLE = frozenset(map(ord, "\n\t²³−√∞≈≠≤≥∂∆∏∑∫■▲▼◆●○◊"))
-
-
-def _has_glyph(code: int) -> bool:
-    return code in _SINGLE or any(low <= code <= high for low, high in _GLYPHS)
+_SINGLE = "\n\t²³−√∞≈≠≤≥∂∆∏∑∫■▲▼◆●○◊"
+_RANGES = "".join(f"{re.escape(chr(low))}-{re.escape(chr(high))}" for low, high in _GLYPHS)
+_WITHOUT_GLYPH = re.compile(f"[^{_SINGLE}{_RANGES}]")
 
 
 def largest_drift(variable: Variable) -> float:

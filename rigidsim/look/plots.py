@@ -40,15 +40,17 @@ _PALETTE: tuple[Color, ...] = (
     (120, 165, 200),
     (200, 200, 120),
 )
+DRIFTS = "all"
+"""Name of the drifts together."""
 _MOST_SERIES = 16  # of one variable, so that a recorded matrix history stays readable
 
 
 @dataclass(frozen=True)
 class Series:
-    """One variable as it is plotted.
+    """One variable as it is plotted, or several of one plot, whose rows then share their times.
 
     Attributes:
-        name: variable of the dataset.
+        name: variable of the dataset, or ``DRIFTS``.
         labels: names of its curves, one per component.
         colors: one per component.
         values: (rows, components) float64.
@@ -140,11 +142,19 @@ def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
             series = replace(series, error=_uncertainty(dataset, series.values, factor))
         plot.series.append(series)
     if "drift" in plots:
-        plots["drift"].levels.extend(_announced(dataset))
+        drift = plots["drift"]
+        plots["drift"] = replace(drift, series=[_together(drift.series)], levels=_announced(dataset))
     order = {name: number for number, name in enumerate(first)}
     return sorted(
         plots.values(), key=lambda plot: (_ORDER.index(plot.place), order.get(plot.key, len(order)))
     )
+
+
+def _together(several: list[Series]) -> Series:
+    """Curves that are drawn alike as one entity."""
+    labels = [label for series in several for label in series.labels]
+    colors = [color for series in several for color in series.colors]
+    return Series(DRIFTS, labels, colors, np.concatenate([series.values for series in several], axis=1))
 
 
 def _reading(variable: Variable, unit: str) -> tuple[float, str]:

@@ -12,6 +12,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rigidsim.look.plots import Plot, Series
+from rigidsim.look.sending import send
 from rigidsim.look.stages.parts import Arrow, Color, Line, Plane, Stage, Trail, Vector
 from rigidsim.look.states import States
 
@@ -69,7 +70,7 @@ def draw_plot_rows(
                 columns = rr.Scalars.columns(scalars=series.values[rows])
             else:
                 columns = _measured(series, rows)
-            recording.send_columns(path, indexes=times, columns=columns)
+            send(recording, path, times, columns)
 
 
 def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list[rr.TimeColumn]) -> None:
@@ -173,9 +174,7 @@ def draw_plane_rows(
     for plane in planes:
         if plane.moves:
             places = flipped(plane.points[rows]).astype(np.float32)
-            recording.send_columns(
-                f"{plane_path(plane)}/now", indexes=times, columns=rr.Points2D.columns(positions=places)
-            )
+            send(recording, f"{plane_path(plane)}/now", times, rr.Points2D.columns(positions=places))
 
 
 def plane_reach(plane: Plane) -> float:

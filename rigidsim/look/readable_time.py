@@ -7,7 +7,7 @@ What a config says of it in ``[time] unit`` and ``epoch`` stands in the dataset'
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
@@ -158,13 +158,14 @@ class TimeWords:
         """A time of the scene to six digits, as ``304.2 d``."""
         return span_text(seconds, 6, self.unit)
 
-    def coarse(self, seconds: float) -> str:
-        """A time of the scene to a thousandth of its span: ``3.50 s``, and with an epoch the date alone."""
+    def coarse(self, seconds: Sequence[float]) -> list[str]:
+        """Times of the scene to a thousandth of its span: ``3.50 s``, and with an epoch the date alone."""
         if self.epoch is not None:
-            return instant_text(self.epoch, seconds, self.span)
+            return [instant_text(self.epoch, one, self.span) for one in seconds]
         step = 1e-3 * self.span / self.unit.seconds * _CLOSE
         decimals = min(max(math.ceil(-math.log10(step)), 0), 9) if step > 0 else 3
-        return f"{seconds / self.unit.seconds:.{decimals}f} {self.unit.symbol}"
+        scale, after = self.unit.seconds, f" {self.unit.symbol}"
+        return [f"{one / scale:.{decimals}f}{after}" for one in seconds]
 
     def moment(self, seconds: float, digits: int = 9) -> str:
         """A time of the scene: ``304.2 d``, and with an epoch ``304.2 d (2029-04-13 TDB)``."""

@@ -13,6 +13,7 @@ from rigidsim.look.page import legible
 from rigidsim.scene.records import dataclass
 
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
+STRETCH = 16 * CHUNK  # rows that are made ready for rerun at once: what a call costs is shared by them
 _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 

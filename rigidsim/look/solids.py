@@ -170,7 +170,7 @@ def point_positions(drawing: str | None) -> Array:
 def rotation_matrix(quaternion: Sequence[float] | Array) -> Array:
     """Rotation matrices (..., 3, 3) of quaternions (..., 4) [w, x, y, z] of any norm > 0."""
     q = np.asarray(quaternion, dtype=float)
-    unit = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
+    unit = np.moveaxis(q / np.sqrt(np.einsum("...i,...i->...", q, q))[..., None], -1, 0)
     return np.moveaxis(np.array(rotations.rotation_matrix(list(unit))), (0, 1), (-2, -1))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rigidsim.look.drawn import DrawnRun
 from rigidsim.look.page import title_of
-from rigidsim.look.recording import CHUNK, check_room, recording_to
+from rigidsim.look.recording import STRETCH, check_room, recording_to
 from rigidsim.look.thinning import AnyTable, KeptRows, thin, thinned_indices
 
 
@@ -39,7 +39,7 @@ def write_timeline(
     with recording_to(path, title_of(dataset), count) as recording:
         recording.start(run.blueprint())
         run.draw_static(recording.stream)
-        for start in range(0, count, CHUNK):
+        for start in range(0, count, STRETCH):
             check_room(path, count - start)
-            run.draw_rows(recording.stream, slice(start, min(start + CHUNK, count)))
+            run.draw_rows(recording.stream, slice(start, min(start + STRETCH, count)))
     return count

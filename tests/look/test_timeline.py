@@ -13,10 +13,11 @@ pytest.importorskip("rerun")
 
 import rigidsim
 from rigidsim.look.drawing import OLDER
+from rigidsim.look.recording import CHUNK, STRETCH
 from rigidsim.look.rows import Column, Rows
 from rigidsim.look.stages.bodies import plane_view
 from rigidsim.look.thinning import KeptRows, thin
-from rigidsim.look.timeline import CHUNK, write_timeline
+from rigidsim.look.timeline import write_timeline
 
 Build = Callable[..., xarray.Dataset]
 Read = Callable[[Path, str], dict[str, np.ndarray]]
@@ -28,13 +29,16 @@ def entities(path: Path) -> set[str]:
     return {chunk.entity_path for chunk in RrdReader(path).stream()}
 
 
-def page(path: Path, name: str = "summary") -> str:
+def component(path: Path, entity: str, name: str) -> list[object]:
+    """What holds for all times."""
     from rerun.chunk import RrdReader
 
-    for chunk in RrdReader(path).stream():
-        if chunk.entity_path == f"/{name}":
-            return str(chunk.to_record_batch().column("TextDocument:text").to_pylist()[0][0])
-    raise AssertionError(f"no {name}")
+    (chunk,) = (c for c in RrdReader(path).stream() if c.entity_path == entity and c.is_static)
+    return list(chunk.to_record_batch().column(name).to_pylist()[0])
+
+
+def page(path: Path, name: str = "summary") -> str:
+    return str(component(path, f"/{name}", "TextDocument:text")[0])
 
 
 def as_rows(dataset: xarray.Dataset) -> Rows:
@@ -84,7 +88,7 @@ def test_a_run_draws_what_it_kept(tmp_path: Path, read_back: Read, monkeypatch: 
         run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
     with run.dataset as dataset:
         assert write_timeline(dataset, tmp_path / "later.rrd", rows=300) == 300
-    for entity in ("/scene/body", "/plots/angular_momentum", "/plots/drift/energy_drift"):
+    for entity in ("/scene/body", "/plots/angular_momentum", "/plots/drift/all"):
         drawn, later = (read_back(path, entity) for path in (run.folder.timeline, tmp_path / "later.rrd"))
         assert drawn.keys() == later.keys()
         for name in drawn:
@@ -99,6 +103,13 @@ def test_attitude_is_the_datasets_to_float32(symmetric_top: Build, read_back: Re
     # Half a unit in the last place of float32 numbers below 1.
     np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
     np.testing.assert_array_equal(rows["step"], np.arange(1001))
+
+
+def test_a_body_on_two_stages_is_written_once(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
+    """The ellipsoid of energy turns in the frame of the body itself, and is drawn from its own stage's."""
+    write_timeline(symmetric_top(), tmp_path / "t.rrd")
+    assert "Transform3D:quaternion" in read_back(tmp_path / "t.rrd", "/scene/body")
+    assert component(tmp_path / "t.rrd", "/poinsot/body", "Transform3D:parent_frame") == ["tf#/scene/body"]
 
 
 def test_quaternion_of_any_norm_is_drawn_as_a_rotation(
@@ -124,7 +135,7 @@ def test_values_of_plots_are_float64(symmetric_top: Build, read_back: Read, tmp_
     write_timeline(dataset, tmp_path / "t.rrd")
     rows = read_back(tmp_path / "t.rrd", "/plots/angular_velocity")
     np.testing.assert_array_equal(rows["Scalars:scalars"], dataset["angular_velocity"].values)
-    drift = read_back(tmp_path / "t.rrd", "/plots/drift/energy_drift")["Scalars:scalars"]
+    drift = read_back(tmp_path / "t.rrd", "/plots/drift/all")["Scalars:scalars"]
     np.testing.assert_allclose(drift[100:], np.log10(1e-16 * np.arange(100, 1001)), rtol=1e-12)
     assert np.isfinite(drift[0])  # the drift of zero at the start
 
@@ -136,8 +147,8 @@ def test_drift_of_zero_stays_below_the_others_at_any_precision(
     dataset["energy_drift"] = ("time", 1e-34 * (1 + np.arange(1001.0)), {"drift_of": "energy"})
     dataset["quaternion_norm_drift"] = ("time", np.zeros(1001), {"drift_of": "quaternion_norm"})
     write_timeline(dataset, tmp_path / "t.rrd")
-    energy = read_back(tmp_path / "t.rrd", "/plots/drift/energy_drift")["Scalars:scalars"]
-    zero = read_back(tmp_path / "t.rrd", "/plots/drift/quaternion_norm_drift")["Scalars:scalars"]
+    drifts = read_back(tmp_path / "t.rrd", "/plots/drift/all")["Scalars:scalars"]
+    energy, zero = drifts.T
     np.testing.assert_allclose(energy[50:], np.log10(1e-34 * (1 + np.arange(50, 1001.0))), rtol=1e-12)
     assert zero.max() <= energy.min()
     assert zero.min() > -40
@@ -174,11 +185,17 @@ def test_only_the_rows_shown_are_read_from_a_file(symmetric_top: Build, tmp_path
 
 
 def test_chunk_borders_lose_and_double_nothing(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
-    count = 2 * CHUNK + 1
-    write_timeline(symmetric_top(count=count), tmp_path / "t.rrd")
-    for entity in ("/scene/body", "/plots/energy", "/poinsot/body/polhode/recent"):
-        steps = read_back(tmp_path / "t.rrd", entity)["step"]
-        np.testing.assert_array_equal(steps, np.arange(count))
+    from rerun.chunk import RrdReader
+
+    count = STRETCH + CHUNK + 1
+    dataset = symmetric_top(count=count)
+    write_timeline(dataset, tmp_path / "t.rrd")
+    for entity in ("/scene/body", "/plots/angular_velocity"):
+        rows = read_back(tmp_path / "t.rrd", entity)
+        np.testing.assert_array_equal(rows["step"], np.arange(count))
+    np.testing.assert_array_equal(rows["Scalars:scalars"], dataset["angular_velocity"].values)
+    sizes = [len(chunk) for chunk in RrdReader(tmp_path / "t.rrd").stream()]
+    assert max(sizes) == CHUNK  # what the viewer reads well
 
 
 def test_trail_joins_each_row_to_the_one_before(
@@ -324,7 +341,7 @@ def test_fast_rotation_is_drawn_by_its_extremes_and_not_by_its_average(
             found[chunk.entity_path.split("/")[-1]] = column.to_pylist()[0][0]
     assert found["fast"] == AggregationPolicy.MinMax.value
     assert found["slow"] == AggregationPolicy.Average.value
-    assert found["energy_drift"] == AggregationPolicy.Max.value
+    assert found["all"] == AggregationPolicy.Max.value
 
 
 def test_camera_sees_an_orbit_from_outside_its_plane() -> None:

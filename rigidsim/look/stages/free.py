@@ -60,7 +60,7 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
         return Picture("free rotation", [stage], [], _LEADING, notes)
     stage = subject.stage(arrows, trails)
     followed = _followed_axis(dataset, rates)
-    tip = 1.15 * subject.attitude @ followed
+    tip = np.einsum("tij,j->ti", subject.attitude, 1.15 * followed)
     name = _axis_name(followed)
     trace = trail("axis_trace", FIGURE, tip, with_centre=True, words=f"trace of the body's {name} axis")
     if trace.line:  # of samples too far apart it would be a cloud
@@ -83,7 +83,7 @@ def energy_ellipsoid(dataset: Table) -> Array | None:
     moments, rates = signals.moments(dataset), signals.principal_rates(dataset)
     if moments is None or rates is None:
         return None
-    rates = rates[np.isfinite(rates).all(axis=1)]
+    rates = signals.finite_rows(rates)
     twice, square = rates**2 @ moments, rates**2 @ moments**2
     for values in (twice, square):
         if not len(values) or values.min() <= 0 or values.max() > (1 + _SPREAD) * values.min():
@@ -150,6 +150,7 @@ def _poinsot(dataset: Table, subject: Subject, radii: Array, rates: Array, body:
         points=np.zeros((0, 3)),
         axis_length=0.0,
         quaternion=body.quaternion,
+        turns_with=body.root,
         translation=None,
         arrows=[Arrow("angular_velocity", "", VELOCITY, tip, False, "angular velocity ω", radius=0.014)],
         trails=[

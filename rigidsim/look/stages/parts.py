@@ -176,6 +176,7 @@ class Stage:
         translation: (rows, 3) of the reference point, or None: it stays at the origin.
         origin: whether the origin of space is in the picture and marked.
         looked_from: name of a frame, or empty for space.
+        turns_with: root of another stage whose body turns alike about the same point (written once).
         camera: None for the one that suits arrows and path.
     """
 
@@ -197,6 +198,7 @@ class Stage:
     shells: list[Shell] = field(default_factory=list)
     frames: list[MovingFrame] = field(default_factory=list)
     looked_from: str = ""
+    turns_with: str = ""
     camera: Camera | None = None
 
 
