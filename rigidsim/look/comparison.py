@@ -94,7 +94,13 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
             )
             for one in plot.series
         ]
-        plots.append(replace(plot, series=series))
+        levels = [
+            replace(
+                one, key=f"{root} {one.key}", label=f"{title}: {one.label}", color=_shade(COLORS[number], 1)
+            )
+            for one in plot.levels
+        ]
+        plots.append(replace(plot, series=series, levels=levels))
     pages = {f"{root}_{key}": text for key, text in run.pages.items() if key == "Summary"}
     picture = replace(run.picture, stages=stages, planes=[])
     return replace(run, picture=picture, plots=plots, planes=[], states=[], pages=pages)

@@ -49,7 +49,12 @@ def build_comparison(runs: Sequence[DrawnRun], clock: Clock, difference: Plot | 
         for plot in run.plots:
             common.setdefault(plot.key, []).append(plot)
     joined = [
-        replace(same[0], series=[one for plot in same for one in plot.series]) for same in common.values()
+        replace(
+            same[0],
+            series=[one for plot in same for one in plot.series],
+            levels=[one for plot in same for one in plot.levels],
+        )
+        for same in common.values()
     ]
     views = [] if difference is None else [plot_view(difference)]
     views += [plot_view(plot) for plot in joined if plot.place == "leading"][: 4 - len(views)]

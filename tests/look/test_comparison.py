@@ -40,6 +40,18 @@ def test_runs_side_by_side_share_a_clock_and_show_how_far_they_are_apart(
     assert (10 ** difference[1::2]).max() < (2 * 0.04) ** 2 / 8
 
 
+def test_each_run_keeps_the_level_of_its_own_error(
+    symmetric_top: Build, read_back: Read, tmp_path: Path
+) -> None:
+    runs = [(name, symmetric_top(end=end).assign_attrs(attitude_error=error))
+            for name, end, error in (("a", 20.0, 1e-9), ("b", 10.0, 1e-6))]  # fmt: skip
+    write_comparison(runs, tmp_path / "t.rrd")
+    for number, (end, level) in enumerate([(20.0, -9.0), (10.0, -6.0)]):
+        rows = read_back(tmp_path / "t.rrd", rf"/plots/drift/run{number}\ attitude_error")
+        np.testing.assert_allclose(rows["Scalars:scalars"], level, rtol=1e-15)
+        np.testing.assert_array_equal(rows["time"].astype(np.int64), [0, round(end * 1e9)])
+
+
 def _turn_about_z(angle: float) -> np.ndarray:
     """What a quaternion w x y z becomes with a rotation about Z after it."""
     c, s = np.cos(angle / 2), np.sin(angle / 2)
