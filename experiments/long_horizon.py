@@ -12,7 +12,7 @@ Tolerances are "auto". At epsilon itself truncation leaves a bias wherever round
 little: in single precision (order 9 for 8.97) the mean energy error of 24 starts was 9 standard errors from
 zero at 1.3e5 rad, in 80 bits (23 for 22.83) that of 16 starts 3.2 at 3e4 rad, and the exponents came out at
 0.61 to 0.66 and 1.63. With an eighth of epsilon (orders 11 and 24) they are 1.7 and 0.2. Double precision (20
-for 19.02) shows none. (tests/solve/test_truncation_bias.py)
+for 19.02) shows none. (tests/solve/test_auto_tolerance.py)
 
 Series that ``DIR/long_horizon.h5`` has for the same settings aren't measured again.
 
