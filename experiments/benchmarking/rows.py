@@ -18,6 +18,7 @@ end = {end}
 samples = {samples}
 [integrator]
 precision = "{precision}"
+hold_invariants = false
 [output]
 timeline = {timeline}
 estimate = {estimate}

@@ -46,10 +46,10 @@ def overrides(variant: str, knob: float) -> list[str]:
         return ['integrator.method="closed_form"']
     settings = [f"integrator.tolerance={knob!r}"]
     if variant == "extended":
-        return [*settings, 'integrator.precision="extended"']
+        return [*settings, "integrator.hold_invariants=false", 'integrator.precision="extended"']
     if variant == "held":
         return [*settings, "integrator.hold_invariants=true"]
-    return [*settings, f'integrator.formulation="{variant}"']
+    return [*settings, "integrator.hold_invariants=false", f'integrator.formulation="{variant}"']
 
 
 class Clock(Observer):

@@ -51,9 +51,9 @@ class Integrator(ConfigTable):
         "functions at a cost that doesn't depend on the time",
     )
     hold_invariants: StrictBool | Literal["auto"] = Field(
-        default=False,
+        default="auto",
         description="put what is conserved back as the run goes on: errors of long runs grow far slower; "
-        "auto: from step 8192 on, so that shorter runs are the plain ones",
+        "auto: from step 8192 on, so that shorter runs are the plain ones; in sweeps it means false",
     )
 
     @field_validator("hold_invariants", mode="before")

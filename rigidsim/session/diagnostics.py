@@ -118,6 +118,14 @@ class Diagnostics:
                     "sqrt(steps), which rounding alone explains; choose a tighter tolerance, a higher "
                     "precision or another formulation",
                 )
+        for name, size in self.statistics.put_back.items():
+            if not abs(size) <= self.drift_bound:
+                yield Caution(
+                    WarningCode.DRIFT,
+                    f"{name} was put back by {abs(size):.2g} in all, more than {self.drift_bound:.2g} = 50 "
+                    "tolerance sqrt(steps), which rounding alone explains; choose a tighter tolerance or a "
+                    "higher precision, or set hold_invariants = false to see how it drifts",
+                )
 
     def _singularity(self) -> Iterator[Caution]:
         system, seen, passed = self.prepared.system, self.statistics, self._passed()

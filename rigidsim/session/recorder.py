@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import sys
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,13 +76,15 @@ class Recorder(SampleReceiver):
             else copy.deepcopy(self._evaluator.continuity)
         )
         recorded = self._evaluator.evaluate(block)
-        wanted = self._wanted(recorded)
+        put_back = put_back_by_invariant(self._prepared.projected_scalars, block.put_back)
+        wanted = self._wanted(recorded, put_back)
         if wanted <= len(block):
             self.last_wanted = block.first + wanted - 1
         if wanted < len(block):
             self._evaluator.continuity = before
             block = block.rows(0, wanted)
             recorded = self._evaluator.evaluate(block)
+            put_back = {name: values[:wanted] for name, values in put_back.items()}
         if self._prepared.scene.config.output.estimate:
             self.trail.take(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)
@@ -92,7 +95,7 @@ class Recorder(SampleReceiver):
             recorded |= self._dates.of_samples(block.first, len(block))
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[drift_name(invariant.name)][0][:, 0])
-        for name, values in put_back_by_invariant(self._prepared.projected_scalars, block.put_back).items():
+        for name, values in put_back.items():
             recorded[put_back_name(name)] = [values[:, None]]
             self.statistics.put_back[name] = float(values[-1])
         self._note_lost_turns()
@@ -107,13 +110,14 @@ class Recorder(SampleReceiver):
         lost = self._evaluator.continuity.wrapped_from
         self.statistics.angles_wrapped_from = math.ldexp(lost, self._prepared.clock.exponent)
 
-    def _wanted(self, recorded: RecordedParts) -> int:
+    def _wanted(self, recorded: RecordedParts, put_back: Mapping[str, np.ndarray]) -> int:
         """How many samples there are up to the first past the guard, and with it; more than all where none
-        is.
+        is. What a run puts back that nobody asked for it counts as the drift that it would have been.
         """
         if self._max_drift is None:
             return sys.maxsize
-        drifts = (recorded[drift_name(i.name)][0][:, 0] for i in self._prepared.system.invariants)
+        drifts = [recorded[drift_name(i.name)][0][:, 0] for i in self._prepared.system.invariants]
+        drifts += list(put_back.values()) if self._prepared.holds_late else []
         past = [np.flatnonzero(np.abs(drift) > self._max_drift) for drift in drifts]
         return min((int(found[0]) + 1 for found in past if len(found)), default=sys.maxsize)
 

@@ -25,7 +25,8 @@ class RunVerdict:
     """On a run that ended.
 
     Attributes:
-        share: largest drift of any invariant over what rounding explains; None where nothing was checked.
+        share: largest drift of any invariant, or what was put back of it, over what rounding explains; None
+            where nothing was checked.
         worst: the invariant that it is of; empty for none.
     """
 
@@ -38,12 +39,13 @@ _GONE = {WarningCode.ATTITUDE_UNCERTAIN.value, WarningCode.RATES_UNCERTAIN.value
 
 
 def verdict_on(summary: Summary) -> RunVerdict:
-    """The worst that can be said: drifts that rounding does not explain, then digits that are gone;
-    projected invariants prove nothing, and a motion may amplify errors whatever its drifts.
+    """The worst that can be said: drifts that rounding does not explain, then digits that are gone; a motion
+    may amplify errors whatever its drifts. Of projected invariants what was put back tells: it is the drift
+    that would have been.
     """
     checked = {name: row for name, row in summary.invariants.items() if not row.numerical}
     shares = {
-        name: row.largest_drift / row.bound
+        name: max(row.largest_drift, abs(row.put_back or 0.0)) / row.bound
         for name, row in (checked or summary.invariants).items()
         if row.largest_drift is not None and row.bound > 0
     }

@@ -63,7 +63,6 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     projection = None
     if prepared.holds_invariants:
         projection = Projection(system, precision, start, late=prepared.holds_late)
-        stepper.held_system = prepared.held_system if prepared.holds_late else None
     interval = steps_between(precision, late=prepared.holds_late)
     corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
     countable = not system.turning  # from samples alone nobody can tell what such a load does

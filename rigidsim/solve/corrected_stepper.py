@@ -128,8 +128,6 @@ class CorrectedStepper:
         self.wrapping.angles = boundary.angles
         if self.projection is not None:
             self.projection.memory[...] = boundary.projection
-            if self.stepper.held_system is not None:
-                self.stepper.hold(self.projection.holding)
         if self.charts is not None:
             self.charts.changes = boundary.chart_changes
             self.stepper.use(self.charts.chart)
@@ -213,12 +211,11 @@ class CorrectedStepper:
     def _project(self, projection: Projection) -> None:
         state, time, steps = self.stepper.state, self.stepper.time, self.stepper.steps
         if projection.holding:
-            if not self.stepper.held or steps % self._projection_interval == 0:
+            if not projection.late or steps % self._projection_interval == 0:
                 projection.project(state, time)
         elif steps >= LATE:
             interruptible(projection.load)
             projection.begin(state, time)
-            self.stepper.hold(True)
         elif steps % NOTED == 0:
             projection.note(state, time, steps // NOTED - 1)
 

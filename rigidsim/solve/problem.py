@@ -72,10 +72,6 @@ class InitialValueProblem:
         """Whether invariants are projected along the way."""
         return self.scene.config.integrator.hold_invariants is True or self.holds_late
 
-    def held_system(self) -> System:
-        """What to go on with where they are from a count of steps on."""
-        return projected_system(self.system, self.precision)
-
     @cached_property
     def projected_scalars(self) -> tuple[str, ...]:
         """The invariant that each projected scalar belongs to; none where invariants aren't projected."""

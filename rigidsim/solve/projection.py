@@ -11,6 +11,9 @@ remains. Three things make that work to the last bit:
   small offset that will cancel the integral so far. It removes the bias of corrections below half a last
   bit, and that of an invariant that drifts to one side between corrections.
 - Coefficients are carried in two parts (``rigidsim.model.two_part``): a rounded one is a wrong frequency.
+  Where projection begins late the equations stay as they are, and nothing is compiled anew: what they lack,
+  f(x) with all digits of the coefficients less f(x) with the rounded ones, is added at each correction for
+  the time since the last. It is taken at places all over the motion, so that its mean is right.
 
 Where gradients are nearly parallel (spin about a principal axis) the ill-determined direction is left to
 itself, by a damping of the size of what the residuals' own rounding would do there.
@@ -22,15 +25,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import heyoka as hy
-import mpmath
 import numpy as np
 
 from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System
 from rigidsim.model.two_part import in_two_parts
 from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.correction import correction, damping_between, lacking_rates
 from rigidsim.solve.engine import CompiledFunction
-from rigidsim.solve.least_correction import least_correction
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
 LATE = 8192
@@ -114,6 +116,7 @@ class Projection:
     Attributes:
         names: the invariant that each projected scalar belongs to.
         left_out: (invariant, why) of those not projected themselves.
+        late: whether it begins at ``LATE``.
         memory: all that later corrections depend on, changed in place and part of a checkpoint; float64
             (3 m + 3,): of each projected scalar its residual's integral over time, what was put back, and its
             residual after the latest correction; the time of that and the longest interval so far (internal
@@ -135,7 +138,7 @@ class Projection:
         self.memory = np.zeros(3 * m + 3 + late + self._notes.size)
         if late:
             self._notes = self.memory[-self._notes.size :].reshape(self._notes.shape)
-        self._late, self._parts = late, parts
+        self.late, self._parts = late, parts
         self._sums, self._then = self.memory[: 2 * m], self.memory[2 * m : 3 * m]
         self._residuals_memory, self._times = self.memory[: 3 * m], self.memory[3 * m : 3 * m + 3 + late]
         self._times[0] = self._start
@@ -163,7 +166,7 @@ class Projection:
     @property
     def holding(self) -> bool:
         """Whether it corrects, or looks on."""
-        return not self._late or self._times[3] == 1.0
+        return not self.late or self._times[3] == 1.0
 
     def note(self, state: np.ndarray, time: Scalar, number: int) -> None:
         """Note a state before anything is corrected.
@@ -209,9 +212,7 @@ class Projection:
         if not self._functions:
             self._prepare()
         if self._chart not in self._functions:
-            system = self._wide if self._chart == 0 else self._wide.partner
-            assert system is not None
-            self._functions[self._chart] = self._compile(system)
+            self._functions[self._chart] = self._compile()
         self._residuals, self._correction = self._functions[self._chart]
         self._loaded = self._chart
 
@@ -300,47 +301,32 @@ class Projection:
             return change.astype(low.scalar)
         return np.array([hy.real(float(x), low.bits) for x in change])
 
-    # --- the compiled correction ------------------------------------------------------------------------
-
     @property
     def _options(self) -> dict[str, Any]:
         return {"compact_mode": self._high.compact, **self._high.options}
 
-    def _compile(self, wide: System) -> tuple[CompiledFunction, CompiledFunction]:
-        """Functions of a system at the higher precision: the residuals, and the correction with new sums."""
-        high, x = self._high, wide.variables
+    def _compile(self) -> tuple[CompiledFunction, CompiledFunction]:
+        """Functions of the system in use at the higher precision: residuals, and correction with new sums."""
+        low, high, wide = self._low, self._high, self._in_use(self._wide)
         projected, _ = projected_invariants(wide)
         residuals = [
             high.number(1 / h.scale) * (h.expression - hy.expression(value))
             for h, value in zip(projected, self._reference, strict=True)
         ]
-        n, m = len(x), len(projected)
-        elapsed, pace = hy.make_vars("elapsed", "pace_of_corrections")
-        integrals, put_back, then = (
-            [hy.make_vars(f"{name}_{j}") for j in range(m)] for name in ("integral", "put_back", "then")
-        )
-        new_integrals = [
-            s + 0.5 * (elapsed * (a + b)) for s, a, b in zip(integrals, residuals, then, strict=True)
-        ]
-        new_put_back = [c + (a - b) for c, a, b in zip(put_back, residuals, then, strict=True)]
-        wanted = [r + pace * s for r, s in zip(residuals, new_integrals, strict=True)]
-        tensors = hy.diff_tensors(residuals, x, diff_order=1)
-        gradients = [[tensors[(j, *(int(k == i) for k in range(n)))] for i in range(n)] for j in range(m)]
-        correction = least_correction(gradients, wanted, high.number(self._damping(wide.scene.context)))
-        size = hy.sum([c * c for c in correction])
-        outputs = [*correction, *new_integrals, *new_put_back, size]
-        inputs = [*x, elapsed, pace, *integrals, *put_back, *then]
+        lacking = []
+        if self.late:
+            as_integrated = self._system.rounded(lambda value: high.number(low.exact(low.number(value))))
+            lacking = lacking_rates(wide, self._in_use(as_integrated))
+        context = wide.scene.context
+        damping = high.number(damping_between(low.bits, high.bits, context))
+        inputs, outputs = correction(wide.variables, residuals, lacking, damping)
         return (
-            compiled_function(residuals, x, **self._options),
+            compiled_function(residuals, wide.variables, **self._options),
             compiled_function(outputs, inputs, **self._options),
         )
 
-    def _damping(self, context: mpmath.MPContext) -> mpmath.mpf:
-        """Square of the sine between gradients below which a direction is left to itself.
-
-        Residuals are known to some eps_high, so that the correction in a direction of singular value s is
-        known to eps_high / s; damped by d it errs by at most eps_high / (2 sqrt d), which is to stay below
-        an eighth of eps. The Gram matrix must stay positive after its own rounding.
-        """
-        two = context.mpf(2)
-        return max(two ** (2 * (2 + self._low.bits - self._high.bits)), two ** (9 - self._high.bits))
+    def _in_use(self, system: System) -> System:
+        """A system, or its partner where that is the chart in use."""
+        found = system if self._chart == 0 else system.partner
+        assert found is not None
+        return found

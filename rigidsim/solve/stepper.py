@@ -79,8 +79,6 @@ class Stepper:
         failure: why the latest step couldn't be taken, where its state is finite; empty otherwise.
         destination: time of the last sample, internal units; None where steps may become as small as they
             like.
-        held_system: makes the same motion with coefficients in two parts, for a run that projects from a
-            count of steps on; ``held`` says whether it goes by them.
         unresolved: whether several steps were taken at once of which some are tiny, so that they have to be
             taken back and taken one by one, for ``collapsed`` to be told from the motion alone.
     """
@@ -88,7 +86,6 @@ class Stepper:
     single_steps = False
     careful = False
     begun: Mark
-    held_system: Callable[[], System] | None
     cuts_steps = False
 
     def __init__(
@@ -106,7 +103,7 @@ class Stepper:
         self.has_events = log is not None and bool(system.crossings)
         self._integrator = self._compiled(system)
         self._charts = {0: self._integrator}
-        self._chart, self.held, self.held_system = 0, False, None
+        self._chart = 0
         far = 1e37 if precision.scalar is np.float32 else _FAR
         self._far = precision.number(system.scene.context.mpf(far))
         bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
@@ -159,30 +156,14 @@ class Stepper:
 
     def use(self, chart: int) -> None:
         """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
-        key = chart + 2 * self.held
-        if key not in self._charts:
-            made = self.held_system if self.held else None
-            own = self.system if made is None else made()
-            wanted = own if chart == 0 else own.partner
+        if chart not in self._charts:
+            wanted = self.system if chart == 0 else self.system.partner
             assert wanted is not None
-            self._charts[key] = interruptible(lambda: self._compiled(wanted))
+            self._charts[chart] = interruptible(lambda: self._compiled(wanted))
         time = self._integrator.dtime
-        self._chart, self._integrator = chart, self._charts[key]
+        self._chart, self._integrator = chart, self._charts[chart]
         self._integrator.dtime = time
         self._longest = self._bounds[chart]
-
-    def hold(self, held: bool) -> None:
-        """Go on with the equations of ``held_system``, or of the plain one, from the same state."""
-        if held == self.held:
-            return
-        state, before = np.array(self._integrator.state), self.held
-        self.held = held
-        try:
-            self.use(self._chart)
-        except KeyboardInterrupt:  # while they were compiled
-            self.held = before
-            raise
-        self._integrator.state[:] = state
 
     def _watched(self) -> Watcher | None:
         if self.watcher is not None:

@@ -36,7 +36,10 @@ def join_segments(paths: Sequence[Path], *, status: str, indexed: bool = True) -
     starts = np.concatenate([[0], np.cumsum(rows)])
     with open_dataset(paths[0], indexed=False) as first:
         joined: dict[str, xarray.Variable] = {}
+        unused = _not_begun(first, paths[-1])
         for name, variable in first.variables.items():
+            if name in unused:
+                continue
             if variable.dims[:1] == ("time",):
                 joined[str(name)] = _joined(paths, starts, str(name), variable)
             elif name in LABELS or name in OF_THE_RUN:
@@ -48,6 +51,18 @@ def join_segments(paths: Sequence[Path], *, status: str, indexed: bool = True) -
         bare = xarray.Coordinates(coordinates, indexes={})
         return xarray.Dataset(joined, coords=bare, attrs=attributes)
     return xarray.Dataset(joined, coords=coordinates, attrs=attributes)
+
+
+def _not_begun(first: xarray.Dataset, last: Path) -> set[str]:
+    """What was put back, of a run that is to project from a count of steps on and hasn't come there: zero
+    until its last sample, and left out of the dataset of a run that ends so.
+    """
+    if "hold_from_step" not in first.attrs:
+        return set()
+    names = {str(name) for name, variable in first.variables.items() if "put_back_of" in variable.attrs}
+    with netcdf.reading(last) as file:
+        begun = any(file[name].shape[0] and float(file[name][-1]) != 0.0 for name in names)
+    return set() if begun else names
 
 
 def _joined(paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.Variable) -> xarray.Variable:

@@ -11,7 +11,12 @@ from typing import Any
 import numpy as np
 
 from rigidsim.accuracy.choice import chosen
-from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any, motion_growth
+from rigidsim.accuracy.error_law import (
+    attitude_error,
+    closed_form_if_any,
+    held_error,
+    motion_growth,
+)
 from rigidsim.accuracy.models.level import choose_level
 from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names
@@ -79,6 +84,9 @@ def plan(
     system, unused = prepared.system, unused_variables(prepared, int(steps))
     rate = float(system.rate_bound)
     growth = motion_growth(prepared)
+    plain_error = attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth)
+    first = LATE if prepared.holds_late else 0
+    held = prepared.holds_invariants and closed is not None and steps > first
     warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene)]
     if room.problem is not None:
         warnings.append(("disk_space", f"the run {room.problem}"))
@@ -131,7 +139,8 @@ def plan(
             "free_bytes": room.free,
             "attitude_error_rad": None
             if system.requirements.formulation == "rates"
-            else attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth),
+            else (held_error(prepared, int(steps), rate, duration, growth) if held else plain_error),
+            "held": held,
             "amplification": growth.at(duration),
             "growth_seconds": growth.seconds,
         },

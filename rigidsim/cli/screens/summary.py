@@ -255,9 +255,8 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     if error is not None and math.isfinite(error):
         factor = predicted["amplification"]
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        on.line(
-            "accuracy", f"attitude uncertain by about {error:.1e} rad at the end (round-off law{unstable})"
-        )
+        law = "invariants held" if predicted["held"] else "round-off law"
+        on.line("accuracy", f"attitude uncertain by about {error:.1e} rad at the end ({law}{unstable})")
         seen = predicted["growth_seconds"]
         if seen:
             on.line(

@@ -14,8 +14,8 @@ _SOUND = "sound: every drift is within what rounding explains, {share} of it at 
 _WORDS = {
     Soundness.SOUND: _SOUND,
     Soundness.AMPLIFIED: _SOUND + "; the motion itself amplifies errors",
-    Soundness.HELD: "sound as far as drifts tell: these are projected away; the attitude's error is "
-    "estimated apart from them",
+    Soundness.HELD: "sound: what was put back is within what rounding explains, {share} of it at most; "
+    "drifts themselves are projected away",
     Soundness.UNCHECKED: "unchecked: nothing is conserved here that could be watched",
     Soundness.LOST: "drifts are within what rounding explains, {share} of it at most, but digits are gone at "
     "the end: see the warning",

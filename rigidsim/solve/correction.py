@@ -1,0 +1,81 @@
+"""The correction that puts invariants back, as expressions: of the state, of what was remembered since the
+latest one, and of what the integrated equations lack (``rigidsim.solve.projection``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import heyoka as hy
+import mpmath
+
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.system import System
+from rigidsim.solve.least_correction import least_correction
+from rigidsim.solve.precision import Scalar
+
+
+def correction(
+    states: Sequence[Symbolic], residuals: Sequence[Symbolic], lacking: Sequence[Symbolic], damping: Scalar
+) -> tuple[list[Symbolic], list[Symbolic]]:
+    """What a correction is worked out from, and what comes of it.
+
+    Args:
+        states: n of them, the variables.
+        residuals: (value - initial) / scale of each of the m projected scalars.
+        lacking: of each state's derivative (``lacking_rates``); empty where nothing is.
+        damping: see ``damping_between``.
+
+    Returns:
+        The inputs: states, the time since the latest correction, one over the interval that the next is
+        expected within, and of each scalar its residual's integral until then, what was put back, and the
+        residual that was left. The outputs: what to take off the states, the integrals, what was put back,
+        and the square of the size of the part that puts invariants back.
+    """
+    m, x = len(residuals), list(states)
+    elapsed, pace = hy.make_vars("elapsed", "pace_of_corrections")
+    integrals, put_back, then = (
+        [hy.make_vars(f"{name}_{j}") for j in range(m)] for name in ("integral", "put_back", "then")
+    )
+    new_integrals = [
+        s + 0.5 * (elapsed * (a + b)) for s, a, b in zip(integrals, residuals, then, strict=True)
+    ]
+    new_put_back = [c + (a - b) for c, a, b in zip(put_back, residuals, then, strict=True)]
+    tensors = hy.diff_tensors(residuals, x, diff_order=1)
+    gradients = [
+        [tensors[(j, *(int(k == i) for k in range(len(x))))] for i in range(len(x))] for j in range(m)
+    ]
+    wanted = [r + pace * s for r, s in zip(residuals, new_integrals, strict=True)]
+    if lacking:  # along the invariants' level sets: what it would change of them is taken off at once
+        across = [hy.sum([g * f for g, f in zip(row, lacking, strict=True)]) for row in gradients]
+        wanted = [r + elapsed * a for r, a in zip(wanted, across, strict=True)]
+    change = least_correction(gradients, wanted, damping)
+    size = hy.sum([c * c for c in change])
+    if lacking:
+        change = [hy.sum([c, -(elapsed * f)]) for c, f in zip(change, lacking, strict=True)]
+    return [*x, elapsed, pace, *integrals, *put_back, *then], [*change, *new_integrals, *new_put_back, size]
+
+
+def lacking_rates(exact: System, integrated: System) -> list[Symbolic]:
+    """What integrated equations lack of each derivative, since their coefficients are rounded.
+
+    Args:
+        exact: with all digits of its coefficients that the higher precision holds.
+        integrated: with those that the integration has, in the higher precision.
+    """
+    pairs = zip(exact.equations, integrated.equations, strict=True)
+    return [right - rounded for (_, right), (_, rounded) in pairs]
+
+
+def damping_between(low: int, high: int, context: mpmath.MPContext) -> mpmath.mpf:
+    """Square of the sine between gradients below which a direction is left to itself.
+
+    Residuals are known to some eps_high, so that the correction in a direction of singular value s is
+    known to eps_high / s; damped by d it errs by at most eps_high / (2 sqrt d), which is to stay below
+    an eighth of eps. The Gram matrix must stay positive after its own rounding.
+
+    Args:
+        low, high: bits of the working precision and of the one that residuals are evaluated in.
+    """
+    two = context.mpf(2)
+    return max(two ** (2 * (2 + low - high)), two ** (9 - high))
