@@ -41,8 +41,8 @@ class Load(SceneLoad):
             Jacobi's constant.
         masses_beside: whether its source is one of the point masses that move beside the body.
         has_source: whether the direction to its source is known: nadir, roll and libration count from it.
-        gradient_source: of a load that is the gravity gradient of a distant body and nothing else; None for
-            all others.
+        gradient_alone: whether the gravity gradient of a distant body is all that it is; ``gradient_source``:
+            where that body is, unless it moves beside this one.
         attracting_point: centre of its force (mpf, m, space axes), where that always points to one.
         without_plane: why its source has an orbit, but no ``plane`` that is known.
     """
@@ -57,6 +57,7 @@ class Load(SceneLoad):
     corotating_orbit: KeplerOrbit | None = None
     has_source: bool = False
     masses_beside: bool = False
+    gradient_alone: bool = False
     gradient_source: GradientSource | None = None
     attracting_point: Vector | None = None
     without_plane: str = ""
@@ -179,3 +180,8 @@ class Load(SceneLoad):
     def effect(self) -> str:
         """What it does, in one sentence for ``rigidsim plan``."""
         return f"{self.title}: given from Python"
+
+
+def loads_of(scene: Scene) -> list[Load]:
+    """The loads of a scene, as the mechanics knows them."""
+    return [load for load in scene.loads if isinstance(load, Load)]

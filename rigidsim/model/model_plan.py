@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.frames.orbital import corotating_orbit
 from rigidsim.model.frames.reference_plane import refuse_without_plane
-from rigidsim.model.load import Load
+from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
@@ -84,7 +84,7 @@ def plan_model(
     """
     if extra_loads:
         scene = replace(scene, loads=(*scene.loads, *extra_loads))
-    loads: list[Load] = [*UniformGravity.of(scene), *scene.loads]  # type: ignore[list-item]
+    loads: list[Load] = [*UniformGravity.of(scene), *loads_of(scene)]
     if scene.config.model.reduced:
         return _averaged(scene, loads)
     requirements = choose_requirements(scene, loads)
@@ -123,15 +123,15 @@ def plan_model(
 
 
 def _tables(scene: Scene, longitude: Carried = Carried.ECCENTRIC) -> dict[TabulatedOrbit, TablePlace]:
-    tables = [(str(number), getattr(load, "table", None)) for number, load in enumerate(scene.loads, start=1)]
+    tables = [(str(number), load.table) for number, load in enumerate(loads_of(scene), start=1)]
     return places_of([(tag, table) for tag, table in tables if table is not None], longitude)
 
 
 def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
     tags: dict[KeplerOrbit, str] = {}
-    for number, load in enumerate(scene.loads, start=1):
-        if getattr(load, "orbit", None) is not None:
-            tags.setdefault(load.orbit, str(number))  # type: ignore[attr-defined]
+    for number, load in enumerate(loads_of(scene), start=1):
+        if load.orbit is not None:
+            tags.setdefault(load.orbit, str(number))
     return tags
 
 

@@ -9,6 +9,7 @@ from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya
 from rigidsim.model.frames.local import first_source, flies_about_source
 from rigidsim.model.frames.reference_plane import flies_in_plane
 from rigidsim.model.frames.rotating import rotating_orbit
+from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.scene.arithmetic import negligible
 from rigidsim.scene.records import dataclass
@@ -88,7 +89,7 @@ def _source_states(scene: Scene) -> str | None:
 
 
 def _no_source(scene: Scene, formulation: str) -> str | None:
-    if first_source(scene.loads) is not None:
+    if first_source(loads_of(scene)) is not None:
         return None
     return (
         "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
@@ -110,7 +111,7 @@ def _free_axis(which: int) -> Need:
 
 
 def _plane_states(scene: Scene) -> str | None:
-    return "flight" if flies_in_plane(scene, scene.loads) else None
+    return "flight" if flies_in_plane(scene, loads_of(scene)) else None
 
 
 def _isotropic_damping(m: Mechanics) -> bool:

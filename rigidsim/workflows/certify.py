@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from rigidsim.accuracy.asked import wanted
 from rigidsim.accuracy.certificate import certify, verdict
 from rigidsim.accuracy.choice import Choice
+from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.session.session import Session
 from rigidsim.solve.status import Status
@@ -23,7 +24,7 @@ def certified(
     experiment: Experiment,
     choice: Choice | None,
     session: Session,
-    loads: Sequence[Any] = (),
+    loads: Sequence[Load] = (),
 ) -> tuple[AnyRun, bool]:
     """A finished run's certificate, put into its summary, where ``accuracy`` asks for one.
 

@@ -11,6 +11,7 @@ from typing import Any
 import mpmath
 
 from rigidsim.analysis.labels import Known
+from rigidsim.model.load import loads_of
 from rigidsim.scene.arithmetic import Vector, apply, dot, transpose
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.scene import Scene
@@ -45,12 +46,14 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
         found = _of_motion(closed.motion)
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
     found = []
-    orbits = [load for load in scene.loads if getattr(load, "orbit", None) is not None]
-    for number, load in enumerate(orbits, 1):
-        found += _of_orbit(load.orbit, str(number) if len(orbits) > 1 else "")  # type: ignore[attr-defined]
-    if any(getattr(load, "ephemeris", None) for load in scene.loads):
+    loads = loads_of(scene)
+    orbits = [load.orbit for load in loads if load.orbit is not None]
+    for number, orbit in enumerate(orbits, 1):
+        found += _of_orbit(orbit, str(number) if len(orbits) > 1 else "")
+    sources = [load.gradient_source for load in loads]
+    if any(source is not None and source.ephemeris for source in sources):
         found += _delaunay(scene)
-    librations = _librations(scene, orbits[0].orbit) if len(orbits) == 1 == len(scene.loads) else []  # type: ignore[attr-defined]
+    librations = _librations(scene, orbits[0]) if len(orbits) == 1 == len(loads) else []
     return found + (librations or _of_spin(scene))
 
 
@@ -171,7 +174,7 @@ def _of_spin(scene: Scene) -> list[Known]:
         if abs(third) <= 3 * context.hypot(rates[across[0]], rates[across[1]]):
             continue
         # gravity gradients leave a symmetric body its axial rate, and hardly change its wobble
-        pulled = all(getattr(load, "title", "") == "gravity_gradient" for load in scene.loads)
+        pulled = all(load.gradient_alone for load in loads_of(scene))
         symmetric = abs(a - b) <= 1e-12 * c and pulled
         source = "initial rate about the principal axis"
         body = "body" if symmetric else ""

@@ -13,12 +13,11 @@ Spacecraft Attitude Determination and Control, 1978, ch. 2.)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable
 
 import heyoka as hy
 
-from rigidsim.model.load import Load
+from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import cross, norm
@@ -50,14 +49,14 @@ class LocalFrame:
         return x
 
 
-def first_source(loads: Sequence[Any]) -> Any | None:
+def first_source(loads: Iterable[Load]) -> Load | None:
     """The load whose source angles speak of; None where no load has one."""
-    return next((load for load in loads if getattr(load, "has_source", False)), None)
+    return next((load for load in loads if load.has_source), None)
 
 
 def flies_about_source(scene: Scene) -> bool:
     """Whether the source's direction is that of the body's own flight."""
-    load = first_source(scene.loads)
+    load = first_source(loads_of(scene))
     return load is not None and load.plane is not None and load.plane.flown
 
 
@@ -73,7 +72,7 @@ def moves_slowly_in_orbit(m: Mechanics) -> bool:
     """Whether the scene is about the body's attitude in its orbit: a prescribed one or free flight, and at
     most two turns per revolution at the start.
     """
-    load: Load | None = first_source(m.loads)
+    load = first_source(m.loads)
     if load is None:
         return False
     rate = None if load.plane is None else load.plane.rate(m.scene)

@@ -60,7 +60,7 @@ def refuse_without_plane(scene: Scene, loads: Sequence[Load]) -> None:
         _orbit_plane(loads)
 
 
-def flies_in_plane(scene: Scene, loads: Sequence[Any]) -> bool:
+def flies_in_plane(scene: Scene, loads: Sequence[Load]) -> bool:
     """Whether the plane is that of the body's own flight."""
     return scene.reference is None and _orbit_plane(loads).flown
 
@@ -85,22 +85,21 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
     return _moving(plane.normal(m), plane.described)
 
 
-def initial_normal(scene: Scene, loads: Sequence[Any]) -> Vector:
+def initial_normal(scene: Scene, loads: Sequence[Load]) -> Vector:
     """About where the normal points at the start (mpf, space axes), not of unit length."""
     return scene.reference if scene.reference is not None else _orbit_plane(loads).at_start(scene)
 
 
-def plane_drift(scene: Scene, loads: Sequence[Any]) -> Any | None:
+def plane_drift(scene: Scene, loads: Sequence[Load]) -> Any | None:
     """Bound of the rate (rad/s) at which the plane turns; None where none is known."""
     return scene.context.zero if scene.reference is not None else _orbit_plane(loads).drift(scene)
 
 
-def _orbit_plane(loads: Sequence[Any]) -> OrbitPlane:
+def _orbit_plane(loads: Sequence[Load]) -> OrbitPlane:
     """Of the first load that has one."""
     for load in loads:
         if load.plane is not None:
-            found: OrbitPlane = load.plane
-            return found
+            return load.plane
     what = f'given "{ORBIT}", but no load of the scene has an orbit whose plane is known'
     why = next((load.without_plane for load in loads if load.without_plane), "")
     what += f" ({why})" if why else ""

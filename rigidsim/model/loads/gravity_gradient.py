@@ -73,6 +73,7 @@ class GravityGradient(Load):
     described = "a gravity-gradient load"
     reads = frozenset({"attitude"})
     has_source = True
+    gradient_alone = True
 
     @classmethod
     def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> Load:

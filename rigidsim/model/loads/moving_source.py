@@ -50,6 +50,11 @@ class MovingSource(Load):
         return "central_gravity" if self.pulls else "gravity_gradient"
 
     @property
+    def gradient_alone(self) -> bool:  # type: ignore[override]
+        """See ``Load``."""
+        return not self.pulls
+
+    @property
     def described(self) -> str:  # type: ignore[override]
         """See ``SceneLoad``."""
         return f"a {self.title} load"
