@@ -1,4 +1,4 @@
-"""The states of a system, block by block: which there are, how they change, where they begin, and why."""
+"""Assembly of a system's states, block by block: equations, initial values, and the reason for each block."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def assemble_states(
     """The mechanical quantities of a scene, and the blocks of its states in the order of the system.
 
     Args:
-        number: from an mpf to the working precision's scalar, rounded once.
-        sequence: of the Euler angles that are states, where it is not the scene's.
+        number: rounds an mpf once to the working precision's scalar.
+        sequence: sequence of the Euler angles that are states, if it isn't the scene's.
 
     Raises:
         ConfigError: a load without a potential in the canonical formulation.
@@ -114,7 +114,7 @@ def assemble_states(
 def _attitude(
     plan: ModelPlan, rates: list[Symbolic], number: Rounder, sequence: str | None
 ) -> AttitudeStates | None:
-    """Of the formulations that carry an attitude beside the rates."""
+    """Attitude states of a formulation that carries an attitude besides the rates; None if none is carried."""
     scene, formulation = plan.scene, plan.requirements.formulation
     if formulation == "rates":
         return None
@@ -196,7 +196,7 @@ def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
 
 
 def _point_mass_blocks(m: Mechanics) -> list[StateBlock]:
-    """The bodies that move beside this one, and what they feel of it."""
+    """States of the point masses besides the body, and the forces that the body exerts on them."""
     states = m.point_masses
     if states is None:
         return []
@@ -205,7 +205,7 @@ def _point_mass_blocks(m: Mechanics) -> list[StateBlock]:
 
 
 def _load_blocks(m: Mechanics) -> list[StateBlock]:
-    """Orbits, each once for all the loads on it, and what other states loads bring."""
+    """Orbits, each once for all loads on it, and any other states that loads bring."""
     blocks: list[StateBlock] = []
     placed: dict[KeplerOrbit, list[str]] = {}
     carried: set[TabulatedOrbit] = set()
@@ -235,7 +235,7 @@ def _work_block(m: Mechanics) -> StateBlock:
 
 
 def _pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
-    """The state by which no step passes over a pulse or a switch, where there is any."""
+    """The state that keeps steps from passing over a pulse or a switch; none if the loads have neither."""
     watched, rooted = arguments(m), roots(m)
     if not (watched or rooted):
         return []

@@ -31,9 +31,9 @@ class CanonicalStates:
     """Angles, momenta, and the body rates as expressions of them.
 
     Attributes:
-        attitude: as of the Euler-angle formulation.
+        attitude: states as in the Euler-angle formulation.
         rates: angular velocity, body axes, in units of 1/time.
-        initial_momenta: mpf, internal units.
+        initial_momenta: canonical momenta at the start (mpf), internal units.
     """
 
     attitude: AttitudeStates
@@ -44,7 +44,7 @@ class CanonicalStates:
 def canonical_states(
     scene: Scene, scaling: Scaling, numbers: ScaledNumbers, number: Rounder
 ) -> CanonicalStates:
-    """Set the angles and momenta up."""
+    """Set up the angles and momenta."""
     context, sequence = scene.context, scene.config.integrator.euler_sequence
     angles = list(hy.make_vars("phi", "theta", "psi"))
     momenta = list(hy.make_vars(*MOMENTA))
@@ -101,7 +101,7 @@ def hamilton_equations(m: Mechanics) -> list[Symbolic]:
     hamiltonian = hy.sum(parts)
     angles = list(hy.make_vars("phi", "theta", "psi"))
     momenta = list(hy.make_vars(*MOMENTA))
-    # an orbit's phase and a position are no coordinates of the rotation: parameters stand in for them
+    # an orbit's phase and a position are no coordinates of the rotation: parameters take their place
     own = {"phi", "theta", "psi", *MOMENTA}
     foreign = [hy.make_vars(name) for name in hy.get_variables(hamiltonian) if name not in own]
     there = {x: hy.par[i] for i, x in enumerate(foreign)}

@@ -17,14 +17,14 @@ def _points(m: Mechanics) -> list[Vector]:
 
 
 def one_point(m: Mechanics) -> bool:
-    """Whether there are loads that attract to a point, the same for all, and no others."""
+    """Whether all loads attract to one common point, and there is at least one."""
     points = _points(m)
     return bool(points) and len(points) == len(m.loads) and all(point == points[0] for point in points)
 
 
 def line(m: Mechanics) -> Vector | None:
-    """Unit vector of the line through all attracting points about which no load turns the motion of the body;
-    None without one, and where the whole momentum is conserved.
+    """Unit vector of the line through all attracting points about which no load exerts a moment on the body's
+    motion; None without such a line, or if the whole momentum is conserved.
     """
     points, context = _points(m), m.scene.context
     if not points or one_point(m):

@@ -1,4 +1,4 @@
-"""What drifts of invariants are relative to: sizes that the quantities have or can reach, SI."""
+"""Scales of invariants' relative drifts: sizes that the quantities have or can reach, SI."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def rotational_scale(m: Mechanics) -> tuple[Any, str]:
 
 
 def energy_scale(m: Mechanics) -> tuple[Any, str]:
-    """As ``rotational_scale``, plus the largest kinetic energy of the flight."""
+    """Energy scale: ``rotational_scale`` plus the largest kinetic energy of the flight."""
     scene, context = m.scene, m.scene.context
     scale, name = rotational_scale(m)
     if m.velocity is None or scene.velocity is None:
@@ -64,7 +64,7 @@ def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
 
 
 def attracting_point(m: Mechanics) -> Vector:
-    """The (first) attracting point, m."""
+    """Position of the (first) attracting point, m, space axes."""
     return next(load.attracting_point for load in m.loads if load.attracting_point is not None)
 
 

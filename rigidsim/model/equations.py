@@ -61,7 +61,7 @@ def rate_equations(m: Kinematics, torque: list[Term]) -> list[Symbolic]:
 
 
 def vertical_from_attitude(matrix: SymbolicMatrix, numbers: ScaledNumbers, number: Rounder) -> list[Symbolic]:
-    """The unit vector against gravity, R^T up, in body axes."""
+    """Unit vector against gravity, R^T up, in body axes."""
     assert numbers.up is not None
     terms = [[number(u) * matrix[i][k] for i, u in enumerate(numbers.up) if u != 0] for k in range(3)]
     return [hy.sum(column) for column in terms]

@@ -1,4 +1,5 @@
-"""Two charts of one attitude: the asked Euler sequence, and a partner whose singularity is far from its own.
+"""Two charts of one attitude: the requested Euler sequence, and a partner whose singularity is far from its
+own.
 
 A sequence ijk is singular where body axis k lies along space axis i: its factor is f = sqrt(1 - R_ik^2),
 |sin| of the middle angle for proper sequences (k = i) and |cos| for the others. The partner keeps i and j and
@@ -18,26 +19,26 @@ from rigidsim.scene.attitude import AXES, parity
 
 
 def is_proper(sequence: str) -> bool:
-    """Whether the outer axes are the same."""
+    """Whether a sequence is proper, that is, whether its outer axes are the same."""
     return sequence[0] == sequence[2]
 
 
 def partner_sequence(sequence: str) -> str:
-    """The sequence that a run changes to near the singularity of ``sequence``; its own partner is that."""
+    """The sequence that a run changes to near the singularity of ``sequence``; the relation is mutual."""
     first, second = sequence[0], sequence[1]
     last = (set(AXES) - {first, second}).pop() if is_proper(sequence) else first
     return first + second + last
 
 
 def across(sequence: str, angles: list[Any], functions: Any, branch: Any = 1.0) -> list[Any]:
-    """The same attitude in the partner's angles, the first not brought into one turn.
+    """The same attitude in the partner's angles; the first isn't reduced to one turn.
 
     No digits are lost anywhere: small sines come from small sines. Every attitude has two triples of angles;
     exactly in the partner's singularity the outer ones are those that atan2(0, 0) = 0 gives.
 
     Args:
-        angles: of ``sequence``, radians.
-        functions: where ``sin``, ``cos``, ``sqrt`` and ``atan2`` are taken from: ``math`` or ``heyoka``.
+        angles: angles of ``sequence``, radians.
+        functions: module that provides ``sin``, ``cos``, ``sqrt`` and ``atan2``: ``math`` or ``heyoka``.
         branch: +1 for a middle angle in [0, pi] or [-pi/2, pi/2], -1 for the other triple.
     """
     first, middle, last = angles
@@ -60,8 +61,8 @@ def across(sequence: str, angles: list[Any], functions: Any, branch: Any = 1.0) 
 
 
 def pole_of_partner(sequence: str, angles: list[float], functions: Any) -> float:
-    """R_ik' at these angles of ``sequence``: +1 or -1 in the partner's singularity, where the sum (+1) or the
-    difference (-1) of the partner's outer angles is all that is defined.
+    """R_ik' at these angles of ``sequence``, which is +1 or -1 in the partner's singularity, where only the
+    sum (+1) or the difference (-1) of the partner's outer angles is defined.
     """
     _, middle, last = angles
     if not is_proper(sequence):
@@ -71,5 +72,5 @@ def pole_of_partner(sequence: str, angles: list[float], functions: Any) -> float
 
 
 def singular_factor(sequence: str, middle: float, functions: Any) -> float:
-    """What vanishes in the singularity; negative on the branch of the other triple."""
+    """Factor that vanishes in the singularity; negative on the branch of the other triple."""
     return float(functions.sin(middle) if is_proper(sequence) else functions.cos(middle))

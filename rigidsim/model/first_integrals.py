@@ -1,4 +1,4 @@
-"""The two integrable heavy tops beside Lagrange's: Kovalevskaya's and Goryachev-Chaplygin's.
+"""The two integrable heavy tops besides Lagrange's: Kovalevskaya's and Goryachev-Chaplygin's.
 
 Both are symmetric bodies (moments A = B and C) whose centre of mass lies in the equatorial plane, and have
 a fourth integral of the motion. In the axes e1 towards the centre of mass, e3 along the body's own axis of
@@ -38,7 +38,7 @@ class EquatorialTop:
 
 
 def equatorial_top(m: Mechanics) -> EquatorialTop | None:
-    """The scene as such a top; None where it is another body, or another load turns it too."""
+    """The scene as such a top; None for any other body, or if another load exerts a torque too."""
     context, scene = m.scene.context, m.scene
     axis, arm = m.symmetry_direction, scene.torque_arm
     if m.vertical is None or axis is None or arm is None or scene.gravity is None:
@@ -58,12 +58,12 @@ def equatorial_top(m: Mechanics) -> EquatorialTop | None:
 
 
 def kovalevskaya_top(m: Mechanics) -> EquatorialTop | None:
-    """The scene as Kovalevskaya's top, A = B = 2 C; None where it isn't."""
+    """The scene as Kovalevskaya's top, A = B = 2 C; None if it isn't one."""
     return _with_ratio(m, 2)
 
 
 def goryachev_chaplygin_top(m: Mechanics) -> EquatorialTop | None:
-    """The scene as Goryachev's and Chaplygin's top, A = B = 4 C and L_z = 0; None where it isn't."""
+    """The scene as Goryachev and Chaplygin's top, A = B = 4 C and L_z = 0; None if it isn't one."""
     top = _with_ratio(m, 4)
     if top is None:
         return None
@@ -110,7 +110,7 @@ def goryachev_chaplygin_constant(m: Mechanics) -> Symbolic:
 
 
 def _largest(m: Mechanics, top: EquatorialTop) -> tuple[Any, Any]:
-    """Bounds of the squared equatorial rate and of the axial rate: all energy in either of them."""
+    """Bounds of the squared equatorial rate and of the axial rate: all energy in one of them."""
     w = m.scene.angular_velocity
     twice = dot(w, apply(m.scene.body.inertia, w)) + 4 * top.strength
     return twice / top.equatorial, m.scene.context.sqrt(twice / top.axial)

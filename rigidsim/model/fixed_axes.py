@@ -61,15 +61,15 @@ def _sources(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Any, Vector]]:
 
 
 def _source_matrix(sources: list[tuple[Any, Vector]]) -> Matrix:
-    """S, 1/s^2, of at least one source."""
+    """S (1/s^2) of at least one source."""
     return _added([_outer([s * x for x in d], d) for s, d in sources])
 
 
 def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bool:
-    """Whether no torque acts about a unit axis in space, whatever the motion.
+    """Whether no torque acts about a unit axis in space, however the body moves.
 
     Args:
-        loads: that are looked at; all of them by default.
+        loads: the loads to look at; all of them by default.
     """
     tiny = negligible(m.scene.context)
     turning = [load for load in m.turning if loads is None or load in loads]
@@ -91,7 +91,7 @@ def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bo
 
 
 def field_axis(m: Mechanics) -> Vector | None:
-    """Unit vector along the field that linear potentials add up to; None where they don't add up to one."""
+    """Unit vector along the field to which the linear potentials combine; None if they don't combine to one."""
     linear = _linear(m, m.turning)
     if not linear:
         return None
@@ -107,7 +107,9 @@ def field_axis(m: Mechanics) -> Vector | None:
 
 
 def source_axis(m: Mechanics) -> Vector | None:
-    """Unit vector towards the fixed sources, where they lie on one line, or else their axis of symmetry."""
+    """Unit vector towards the fixed sources if they lie on one line, or else along their axis of symmetry;
+    None without either.
+    """
     sources = _sources(m, m.turning)
     if not sources:
         return None
@@ -123,12 +125,14 @@ def source_axis(m: Mechanics) -> Vector | None:
 
 
 def weight_axis(m: Mechanics) -> Vector | None:
-    """Unit vector against gravity, where it turns the body."""
+    """Unit vector against gravity if gravity exerts a torque; None otherwise."""
     return m.numbers.up if m.numbers.arm is not None else None
 
 
 def free_axis(m: Mechanics, which: int) -> Vector | None:
-    """A space axis without a torque about it, where some torque acts and the axis has no better name."""
+    """Space axis without a torque about it, if some torque acts and the axis has no more specific name; None
+    otherwise.
+    """
     context = m.scene.context
     axis = [context.one if i == which else context.zero for i in range(3)]
     named = [a for a in (weight_axis(m), source_axis(m), field_axis(m)) if a is not None]
@@ -138,7 +142,7 @@ def free_axis(m: Mechanics, which: int) -> Vector | None:
 
 
 def kept_source_axis(m: Mechanics) -> Vector | None:
-    """``source_axis`` where the momentum along it is conserved, and it isn't the vertical."""
+    """``source_axis`` if the momentum along it is conserved and it isn't the vertical; None otherwise."""
     axis, weight = source_axis(m), weight_axis(m)
     if axis is None or (weight is not None and parallel(m.scene.context, axis, weight)):
         return None
@@ -146,7 +150,7 @@ def kept_source_axis(m: Mechanics) -> Vector | None:
 
 
 def kept_field_axis(m: Mechanics) -> Vector | None:
-    """``field_axis``, likewise, where it is no source's axis either."""
+    """``field_axis`` under the same condition, if it isn't a source's axis either; None otherwise."""
     axis = field_axis(m)
     others = [a for a in (weight_axis(m), source_axis(m)) if a is not None]
     if axis is None or any(parallel(m.scene.context, axis, other) for other in others):
@@ -163,13 +167,13 @@ def along(m: Mechanics, axis: Vector) -> Symbolic:
 
 
 def sources_alone(m: Mechanics) -> bool:
-    """Whether fixed sources have all the torque there is."""
+    """Whether all torque comes from fixed sources."""
     turning = m.turning
     return bool(turning) and all(load.fixed_source(m.scene) is not None for load in turning)
 
 
 def several_directions(m: Mechanics) -> bool:
-    """Whether fixed sources that have all the torque lie in more than one direction."""
+    """Whether all torque comes from fixed sources that lie in more than one direction."""
     if not sources_alone(m):
         return False
     first, *others = (d for _, d in _sources(m, m.loads))
@@ -183,8 +187,8 @@ def adjugate(matrix: Matrix) -> Matrix:
 
 
 def _squares(m: Mechanics) -> tuple[list[tuple[Any, Vector, Symbolic]], Symbolic]:
-    """For each direction d of the principal axes of S (internal units): its value s, d, and adj(I) seen along
-    it; and |L|^2.
+    """For each principal direction d of S (internal units): its value s, d, and d . R adj(I) R^T d; then
+    |L|^2.
     """
     context = m.scene.context
     values, axes = eigen(context, _source_matrix(_sources(m, m.loads)))

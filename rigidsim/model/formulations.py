@@ -1,6 +1,6 @@
-"""How an attitude is carried: quaternion, Euler angles of any sequence, or rotation matrix.
+"""Formulations of the attitude: quaternion, Euler angles of any sequence, or rotation matrix.
 
-Each formulation yields its states, their kinematic equations for given body rates, R, and the quaternion
+Each formulation provides its states, their kinematic equations for given body rates, R, and the quaternion
 and Euler angles as expressions of its states.
 """
 
@@ -22,12 +22,13 @@ from rigidsim.scene.scene import Scene
 
 @dataclass(frozen=True)
 class OrbitalFrame:
-    """What an attitude relative to a circular orbit gives (``rigidsim.model.frames.orbital``).
+    """Quantities of the orbital frame, for an attitude carried relative to a circular orbit
+    (``rigidsim.model.frames.orbital``).
 
     Attributes:
         direction: unit vector towards the attracting body, body axes.
-        normal: of the orbit, body axes.
-        states: the orbit's own, from which attitudes in space follow.
+        normal: unit normal of the orbit, body axes.
+        states: states of the orbit itself, from which the attitude in space follows.
     """
 
     direction: list[Symbolic]
@@ -41,18 +42,18 @@ class AttitudeStates:
 
     Attributes:
         kind: name of the formulation.
-        names: of the states.
+        names: names of the states.
         derivatives: right-hand sides, in the same order.
-        initial: mpf values.
+        initial: initial values (mpf).
         matrix: R, body to space, as expressions of the states.
         quaternion: [w, x, y, z] as expressions; see ``quaternion_sign``.
         quaternion_sign: how it is made continuous: "state" (it is one), "wrapping" (it changes sign with
             each full turn of an angle) or "nearest" (the sign nearest to the sample before).
-        angles: positions within ``names`` of states that are angles and grow without bound.
+        angles: indices in ``names`` of states that are angles and grow without bound.
         defect: name, long name and expression of what should stay constant by construction, or None.
-        singular_factor: expression that vanishes where the formulation breaks down, or None.
-        angle_unit: binary exponent of the unit that such angles are carried in, rad.
-        orbital: where the states are the attitude relative to an orbital frame.
+        singular_factor: expression that vanishes where the formulation is singular, or None.
+        angle_unit: binary exponent of the unit in which such angles are carried, rad.
+        orbital: the orbital frame, if the states are the attitude relative to it; else None.
     """
 
     kind: str
@@ -109,7 +110,7 @@ def euler_states(scene: Scene, rates: list[Symbolic], sequence: str | None = Non
     """Three angles; singular where the middle one makes the outer axes parallel.
 
     Args:
-        sequence: another than the scene's (its partner, see ``rigidsim.model.euler_charts``).
+        sequence: a sequence other than the scene's (its partner, see ``rigidsim.model.euler_charts``).
     """
     asked = scene.config.integrator.euler_sequence
     sequence = sequence or asked
@@ -137,7 +138,7 @@ def euler_states(scene: Scene, rates: list[Symbolic], sequence: str | None = Non
 
 
 def _opposite(scene: Scene, angles: list[Any]) -> bool:
-    """Whether the quaternion of the asked sequence's angles is minus the one that the scene was given."""
+    """Whether the quaternion of the requested sequence's angles is minus the scene's initial one."""
     made = attitude.quaternion_from_euler(scene.context, angles, scene.config.integrator.euler_sequence)
     return bool(dot(made, list(scene.quaternion)) < 0)
 

@@ -1,4 +1,4 @@
-"""The torque of a gravity gradient (MacCullagh), whatever its source, and how much it can do."""
+"""The torque of a gravity gradient (MacCullagh), whatever its source, and the range of its potential energy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def gradient_terms(
 
     Args:
         strength: constant part (mpf), which becomes one coefficient with the moments.
-        factor: what varies of it.
+        factor: its varying part, as an expression.
     """
     inertia = m.numbers.inertia
     units = unit_vectors(m.scene.context)

@@ -1,4 +1,4 @@
-"""The source of a gravity gradient, as averages and the equations in paired products know it."""
+"""The source of a gravity gradient, as averages and paired-product equations use it."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class GradientSource:
-    """Where a distant attracting body is: exactly one of the four places is given.
+    """Position of a distant attracting body; exactly one of the four ways to give it is used.
 
     Attributes:
         gravitational_parameter: m^3/s^2 (mpf).
-        orbit: that it moves on.
-        table: by which its orbit goes.
-        position: where it rests, space axes, m (mpf).
-        ephemeris: name of its series.
-        epoch: time 0 of the scene, for the series.
+        orbit: Kepler orbit on which it moves.
+        table: tabulated orbit on which it moves.
+        position: fixed position, space axes, m (mpf).
+        ephemeris: name of its analytic series.
+        epoch: date of the scene's time 0, for the series.
     """
 
     gravitational_parameter: Any
@@ -33,7 +33,7 @@ class GradientSource:
     epoch: Epoch | None = None
 
     def distance(self, context: Any) -> Any:
-        """Semi-major axis, or the distance of a source at rest, or the mean one of the series, m (mpf)."""
+        """Semi-major axis, distance of a source at rest, or mean distance of the series, m (mpf)."""
         if self.orbit is not None:
             return self.orbit.semi_major_axis
         if self.table is not None:

@@ -1,6 +1,6 @@
-"""A user's expression as a heyoka expression, its constants rounded once, to the working precision.
+"""Conversion of a user's expression to heyoka, its constants rounded once to the working precision.
 
-What heyoka does with expressions on its own account, and what is done about it here:
+heyoka's own treatment of expressions, and what is done about it here:
 
 - ``x / c`` becomes ``(1/c) * x`` with a reciprocal taken in the working precision: constants are divided
   and reduced in the scene's arithmetic before they get there.
@@ -34,12 +34,12 @@ def to_heyoka(
     context: Any,
     sides: Mapping[Node, Any] = _NO_SIDES,
 ) -> Any:
-    """The expression over heyoka's variables.
+    """Convert an expression to heyoka's variables.
 
     Args:
         variables: a heyoka expression for every name that the expression uses; ``t`` is heyoka's time
             unless it is given here.
-        number: from an mpf to the working precision's scalar, rounded once.
+        number: rounds an mpf once to the working precision's scalar.
         context: mpmath context with guard bits, in which constant parts are worked out.
         sides: heyoka expressions for the signs of arguments that are switching surfaces; those of others are
             found wherever the expression is evaluated, which is right for values alone: a series would go on
@@ -50,7 +50,7 @@ def to_heyoka(
     """
 
     def literal(node: Node, value: Any) -> Any:
-        """A constant (mpf) as an expression; what is an expression already stays."""
+        """A constant (mpf) as an expression; an expression is returned unchanged."""
         if isinstance(value, hy.expression):
             return value
         try:
@@ -59,7 +59,7 @@ def to_heyoka(
             raise expression.error("a constant beyond the range of the working precision", node) from None
 
     def combine(node: Node, operands: list[Any]) -> Any:
-        """An mpf while everything is constant, an expression from the first name on."""
+        """An mpf as long as all operands are constant, otherwise an expression."""
         if isinstance(node, expressions.Constant):
             return node.value.at(context)
         if isinstance(node, Name):
@@ -83,7 +83,7 @@ def to_heyoka(
 
 
 def whole_power(base: Any, exponent: int) -> Any:
-    """``base**exponent`` out of squares and products, whose Taylor series hold at base = 0 as well."""
+    """``base**exponent`` as a product of squares, whose Taylor series is regular at base = 0 too."""
     if exponent < 0:
         return 1.0 / whole_power(base, -exponent)
     factors = []

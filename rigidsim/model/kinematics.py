@@ -1,6 +1,6 @@
-"""The state of a scene as expressions: what loads, observables and equations of motion are written in.
+"""The state of a scene as expressions, in which loads, observables and equations of motion are written.
 
-One object for all of them, in internal units; what a scene doesn't carry is None.
+One object serves all of them, in internal units; what a scene doesn't carry is None.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Expressions of the state.
+    """Expressions of the state, in internal units.
 
     Attributes:
         rate_states: the three states of the rates, each in its own unit.
-        attitude: None where no attitude is carried.
+        attitude: None if no attitude is carried.
         vertical: unit vector against gravity, body axes; None where no torque needs it.
         position, velocity: states in their own units; None unless carried.
-        number: mpf to the working precision.
-        orbit_tags: what makes the names of each prescribed orbit's states unique.
-        surfaces: on whose sides expressions are smooth.
-        tables: where the states and parameters of orbits by a table are.
+        number: rounds an mpf once to the working precision.
+        orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
+        surfaces: switching surfaces, between which expressions are smooth.
+        tables: positions of the states and parameters of tabulated orbits.
     """
 
     scene: Scene
@@ -65,7 +65,7 @@ class Kinematics:
 
     @cached_property
     def sides(self) -> Mapping[Node, Symbolic]:
-        """For the sign of each surface's argument the side that the motion is on, as a parameter."""
+        """For the sign of each surface's argument, the parameter that tells the side the motion is on."""
         places = self.surfaces.places
         return {node: hy.par[index] if sign > 0 else -hy.par[index] for node, (index, sign) in places.items()}
 
@@ -92,31 +92,31 @@ class Kinematics:
 
     @staticmethod
     def carried(part: T | None) -> T:
-        """A part that the caller knows to be carried (``Observable.needs`` says so)."""
+        """The part itself, which the caller knows to be carried (because ``Observable.needs`` says so)."""
         assert part is not None
         return part
 
     @property
     def matrix(self) -> SymbolicMatrix:
-        """R, body to space."""
+        """Rotation matrix R, body to space axes."""
         assert self.attitude is not None
         return self.attitude.matrix
 
     @cached_property
     def rotational_energy(self) -> Symbolic:
-        """w . I w / 2."""
+        """Rotational energy w . I w / 2."""
         return 0.5 * hy.sum([w * m for w, m in zip(self.rates, self.momentum_body, strict=True)])
 
     @property
     def marked(self) -> Vector | None:
-        """A vector in body axes that a uniform field pulls at (mpf); None without one."""
+        """Body-axes vector that a uniform field pulls on (mpf); None without one."""
         return self.numbers.arm
 
     @cached_property
     def symmetry_direction(self) -> Vector | None:
         """Unit axis about which the tensor is symmetric, body axes (mpf).
 
-        None for an asymmetric body, and for a sphere on which nothing marks an axis.
+        None for an asymmetric body, and for a sphere on which no load marks an axis.
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
@@ -143,14 +143,14 @@ class Kinematics:
 
     @cached_property
     def point_masses(self) -> PointMassStates | None:
-        """The bodies that move beside this one; None without any."""
+        """The point masses besides the body; None if there are none."""
         masses = self.scene.bodies
         if masses is None:
             return None
         return PointMassStates(masses, self.scaling, self.scene.context, self.number)
 
     def table(self, orbit: TabulatedOrbit) -> OrbitStates:
-        """An orbit by a table, likewise."""
+        """A tabulated orbit, carried by the states that all its loads share."""
         if orbit not in self._orbits:
             place = self.tables.get(orbit) or TablePlace("", 0)
             made = table_states(orbit, place, self.scaling.time, self.scene.start, self.number)
@@ -158,7 +158,7 @@ class Kinematics:
         return self._orbits[orbit]
 
     def orbit_block(self, orbit: KeplerOrbit) -> StateBlock:
-        """The states that carry an orbit: those of the attitude's own frame, where that turns with it."""
+        """The states that carry an orbit: those of the orbital frame, if the attitude is carried in it."""
         if self.attitude is not None and self.attitude.orbital is not None:
             return self.attitude.orbital.states
         return self.orbit(orbit).block

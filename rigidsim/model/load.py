@@ -1,8 +1,8 @@
-"""What a load is: one class from the keys of a config to torque, force and potential.
+"""Loads: one class each, from the keys of a config to torque, force and potential.
 
 Torques and forces are sums of terms, each a constant vector (mpf, worked out with guard bits) times an
 expression of the state, so that constants are rounded once, with those of the inertia tensor already in them.
-Loads of the config, of rigidsim and of one's own in Python derive from ``Load`` alike.
+Loads in a config, rigidsim's own and those you write in Python all derive from ``Load``.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ Term = tuple[Vector, Symbolic]
 
 
 class Load(SceneLoad):
-    """Base of all loads; the defaults are those of a load that does nothing, of a size nobody knows.
+    """Base of all loads; the defaults are those of a load that does nothing and whose size is unknown.
 
     Attributes:
-        title: in reasons and messages.
-        reads: what it must find among the states: "attitude", "vertical", "flight".
+        title: name used in reasons and messages.
+        reads: states that it must find: "attitude", "vertical", "flight".
         conservative: whether it has a potential that doesn't depend on time.
-        wide: whether its expressions are too many to be unrolled (series of thousands of terms).
+        wide: whether its expressions are too long to be unrolled (series of thousands of terms).
         about_vertical: whether it may have a torque about the direction of gravity.
         orbit: the prescribed orbit that its source moves on; all loads on one orbit share its states.
-        table: the orbit of its source, where a table gives it; loads on it share its states likewise.
+        table: the tabulated orbit of its source; loads on it share its states likewise.
         corotating_orbit: a circular orbit in a fixed plane in whose frame its potential rests: then there is
             Jacobi's constant.
-        masses_beside: whether its source is one of the point masses that move beside the body.
-        has_source: whether the direction to its source is known: nadir, roll and libration count from it.
-        gradient_alone: whether the gravity gradient of a distant body is all that it is; ``gradient_source``:
+        masses_beside: whether its source is one of the point masses besides the body.
+        has_source: whether the direction to its source is known, from which nadir, roll and libration count.
+        gradient_alone: whether it is just the gravity gradient of a distant body; ``gradient_source`` tells
             where that body is, unless it moves beside this one.
-        attracting_point: centre of its force (mpf, m, space axes), where that always points to one.
-        without_plane: why its source has an orbit, but no ``plane`` that is known.
+        attracting_point: centre (mpf, m, space axes) to which its force always points, or None.
+        without_plane: why its source has an orbit, but no known ``plane``.
     """
 
     title = "load"
@@ -64,7 +64,7 @@ class Load(SceneLoad):
 
     @property
     def plane(self) -> OrbitPlane | None:
-        """That its source moves in, or the body about its source."""
+        """Plane in which its source moves, or the body about its source; None if there is none."""
         if self.orbit is not None:
             return KeplerPlane(self.orbit)
         if self.table is not None:
@@ -74,11 +74,11 @@ class Load(SceneLoad):
     # --- equations ---------------------------------------------------------------------------------------
 
     def extra_states(self, m: Kinematics) -> StateBlock | None:
-        """States of its own; those of ``orbit`` need not be named."""
+        """States of its own besides those of ``orbit``; None if it has none."""
         return None
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """About the reference point, body axes, in internal units of energy."""
+        """Torque about the reference point, body axes, in internal units of energy."""
         return []
 
     def force(self, m: Kinematics) -> list[Term]:
@@ -86,12 +86,14 @@ class Load(SceneLoad):
         return []
 
     def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
-        """What the point masses beside the body feel of it, as of ``PointMassStates.react``."""
+        """Accelerations that the body causes on the point masses besides it, as ``PointMassStates.react``
+        takes them.
+        """
         return []
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """Potential energy in internal units; part of the total energy where ``conservative``, and of the
-        Hamiltonian of the canonical formulation in any case.
+        """Potential energy in internal units: part of the total energy if ``conservative``, and of the
+        canonical formulation's Hamiltonian in any case.
         """
         return None
 
@@ -106,17 +108,17 @@ class Load(SceneLoad):
         )
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether its torque has no part across a principal axis of a body that turns about it alone.
+        """Whether its torque stays along a principal axis about which alone the body turns.
 
         Args:
-            axis: unit, body axes (mpf).
+            axis: the principal axis, unit, body axes (mpf).
             normal: the same in space axes.
         """
         return False
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether it may have a torque about a unit axis in space (mpf). Not asked where ``linear_potential``
-        or ``fixed_source`` say more.
+        """Whether it may have a torque about a unit axis in space (mpf); not called if ``linear_potential``
+        or ``fixed_source`` says more.
         """
         up = m.numbers.up
         return self.about_vertical or up is None or norm(m.scene.context, cross(up, axis)) != 0
@@ -126,34 +128,39 @@ class Load(SceneLoad):
         return None
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
-        """3 G M / R^3 (mpf, 1/s^2) and unit vector (space axes) of a source that rests in space."""
+        """3 G M / R^3 (mpf, 1/s^2) and unit vector (space axes) of a source at rest in space; None otherwise."""
         return None
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
-        """Unit vector towards its source, body axes, where it ``has_source``."""
+        """Unit vector towards its source, body axes, if it ``has_source``."""
         return None
 
     def damping(self) -> Vector | None:
-        """Coefficients c_i (mpf, kg m^2/s) of a torque -c_i w_i about the body axes, where it is one."""
+        """Coefficients c_i (mpf, kg m^2/s) of a torque -c_i w_i about the body axes; None if it isn't a
+        damping.
+        """
         return None
 
     def narrow(self, m: Kinematics) -> list[Symbolic]:
-        """Dimensionless expressions of ``seconds(m)`` and the states around whose zeros the load changes all
-        at once, such as (t - t0) / width of a pulse or a switch. Steps chosen by the motion alone would pass
-        over it; with them they shorten on the way there.
+        """Arguments around whose zeros the load changes abruptly, such as (t - t0) / width of a pulse or a
+        switch.
+
+        They are dimensionless expressions of ``seconds(m)`` and the states. Steps chosen by the motion alone
+        would
+        pass over such a zero; with them they shorten on the way there.
         """
         return []
 
     def roots(self, m: Kinematics) -> list[Symbolic]:
-        """Expressions that stand under a root and may touch zero, where no step may pass over the kink."""
+        """Radicands that may touch zero, where no step may pass over the kink."""
         return []
 
     # --- estimates, from which units and the scales of drifts are chosen ---------------------------------
 
     def amplitude(self, scene: Scene) -> Any | None:
-        """By how much it may change the energy of rotation (mpf, J).
+        """Largest change of the energy of rotation that it can cause (mpf, J).
 
-        None where nobody knows: it is estimated then, by trying (``rigidsim.model.load_estimate``).
+        None if unknown: it is then estimated by trial (``rigidsim.model.load_estimate``).
         """
         return None
 
@@ -168,17 +175,17 @@ class Load(SceneLoad):
             fed: speed that loads of unknown size are estimated to add, m/s.
 
         Returns:
-            None where it doesn't bound the flight.
+            None if it doesn't bound the flight.
         """
         return None
 
-    # --- words -------------------------------------------------------------------------------------------
+    # --- description -----------------------------------------------------------------------------------
 
     described = "a load given from Python"
 
     @property
     def effect(self) -> str:
-        """What it does, in one sentence for ``rigidsim plan``."""
+        """Its effect, in one sentence for ``rigidsim plan``."""
         return f"{self.title}: given from Python"
 
 

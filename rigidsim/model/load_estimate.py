@@ -1,9 +1,9 @@
-"""How much a load of unknown size can do: an estimate, from which units and drift scales are chosen.
+"""Estimates of loads of unknown size, from which units and drift scales are chosen.
 
 Torques given as expressions, or from Python, are evaluated over the run's time span, at the initial state
 and at others like it: turned by the rotations of a tetrahedron, with rates, position and velocity reversed.
-What the torque is on average over these acts for good, and its impulse adds up; what is left is taken as a
-spring or a swing, which does the work of one turn at most. It is an estimate: it is rounded to powers of
+The mean torque over these states is taken to act for good, its impulse adding up; the rest is taken as a
+spring or a swing, which does the work of one turn at most. The estimate is rounded to powers of
 two, and never enters the equations.
 """
 
@@ -34,29 +34,31 @@ from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
 
 _TIMES = 2048  # over the run
-_LARGEST = 1e100  # of a torque or force in SI that is looked at
+_LARGEST = 1e100  # largest torque or force in SI that is considered
 _TETRAHEDRAL = np.concatenate([np.eye(4), [[0.5, *signs] for signs in product((-0.5, 0.5), repeat=3)]])
 """Rotations of a tetrahedron: over them, functions of first and second order of the attitude average out."""
 _OBLIQUE = np.array([[0.8, 0.4, -0.2, 0.4], [0.5, -0.1, 0.7, -0.5], [0.3, 0.9, 0.1, 0.3]])
 _OBLIQUE /= np.linalg.norm(_OBLIQUE, axis=1)[:, None]
-"""In front of them: charts of the attitude are singular or symmetric in special places."""
+"""Rotations applied before those of the tetrahedron: charts of the attitude are singular or symmetric in
+special places.
+"""
 _STATES = 2 * (1 + len(_TETRAHEDRAL) * len(_OBLIQUE))
-"""The initial one and the turned ones, and each with everything else reversed."""
-_LASTING = 0.3  # of a torque's impulse; less is what an average over few states leaves of nothing
-_TURN = 2 * np.pi  # rad of a swing
-_CYCLE = 8.0  # of 1 / (rate of change): impulse of half a period, and a margin
+"""Number of states: the initial one and the rotated ones, and each with everything else reversed."""
+_LASTING = 0.3  # of a torque's impulse; a mean over few states leaves as much where the true mean is zero
+_TURN = 2 * np.pi  # rad of one swing
+_CYCLE = 8.0  # over the rate of change: impulse of half a period, and a margin
 _NOISE = 4.0  # standard deviations of a mean over the times
-_AROUND = 2.0 ** -np.arange(0, 48, 0.25)  # of the run's length, around what is narrow in time
+_AROUND = 2.0 ** -np.arange(0, 48, 0.25)  # in units of the run's length, around what is narrow in time
 _MOST_PULSES = 16
-_NEWTON = 40  # halvings, at a double zero
+_NEWTON = 40  # iterations, each of which halves the distance to a double zero
 _CLOCK = "t_of_drive"
 
 
 def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requirements) -> Drive | None:
-    """What these loads can add to the motion; None without any.
+    """Estimate of what these loads can add to the motion; None without any.
 
     Args:
-        loads: those of whose size the scene knows nothing.
+        loads: the loads of unknown size.
     """
     if not loads:
         return None
@@ -77,7 +79,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     if m.velocity is not None:
         speeds = samples.of(m.velocity)
         power = power + (pushed.values * speeds).sum(axis=0)
-    if np.any(power != 0) and power.max() <= 0:  # damping, which only takes
+    if np.any(power != 0) and power.max() <= 0:  # damping only removes energy
         return Drive(context.zero, context.zero)
     heaviest = float(np.linalg.norm(inverse, 2))
     by_space = np.einsum("aij,jta->ita", samples.matrices, turned.values)
@@ -100,7 +102,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
 
 
 def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
-    """The scene in double precision and quaternions, in units that know nothing of these loads."""
+    """The scene in double precision with quaternions, in units chosen without these loads."""
     scaling = choose_scaling(scene)
     numbers = scaled_numbers(scene, scaling)
     states = list(hy.make_vars("wx", "wy", "wz"))
@@ -141,11 +143,11 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
 
 @dataclass(frozen=True)
 class _Sampled:
-    """A vector over times and states, shape (3, times, states).
+    """A vector sampled over times and states, shape (3, times, states).
 
     Attributes:
-        most: impulse if it always pointed the same way.
-        period: of its explicit change in time (inverse rate), infinite where it has none.
+        most: impulse that it would give if it always pointed the same way.
+        period: inverse rate of its explicit change in time; infinite if it has none.
     """
 
     values: np.ndarray
@@ -153,7 +155,7 @@ class _Sampled:
     period: float
 
     def peak(self, *, without_mean: bool) -> float:
-        """Largest norm, or that of what the mean over the states leaves."""
+        """Largest norm; with ``without_mean``, of the vector less its mean over the states."""
         values = self.values - self.values.mean(axis=2, keepdims=True) if without_mean else self.values
         return float(np.linalg.norm(values, axis=0).max(initial=0.0))
 
@@ -184,8 +186,8 @@ class _Samples:
         self._uniform = np.searchsorted(self._times, uniform)
 
     def _compiled(self, expressions: Sequence[Symbolic]) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """A function of times (t,) and states (names, s) with values (expressions, t, s); 0 for what is not
-        finite.
+        """Function of times (t,) and states (names, s) that returns values (expressions, t, s), with 0 for
+        values that are not finite.
         """
         function = hy.cfunc(list(expressions), list(hy.make_vars(*self._names)), compact_mode=True)
 
@@ -194,17 +196,17 @@ class _Samples:
             with np.errstate(all="ignore"):
                 found = function(inputs, time=np.repeat(times, states.shape[1]))
             found = np.asarray(found).reshape(len(expressions), len(times), states.shape[1])
-            # what no run survives says nothing of its scale
+            # values that no run survives tell nothing about its scale
             return np.where(np.abs(found) < _LARGEST, found, 0.0)
 
         return evaluated
 
     def of(self, expressions: Sequence[Symbolic]) -> np.ndarray:
-        """Values over all times and states."""
+        """Values of expressions over all times and states."""
         return self._compiled(expressions)(self._times, self._states)
 
     def evaluate(self, terms: Sequence[Term]) -> _Sampled:
-        """The sum of terms."""
+        """Samples of the sum of terms."""
         if not terms:
             return _Sampled(np.zeros((3, len(self._times), _STATES)), 0.0, np.inf)
         sums = [hy.sum([float(vector[i]) * x for vector, x in terms]) for i in range(3)]
@@ -216,8 +218,8 @@ class _Samples:
         return _Sampled(values, most, float(size.max()) / fastest if fastest > 0 else np.inf)
 
     def impulse(self, values: np.ndarray) -> np.ndarray:
-        """Running integral over time of a vector's mean over the states, shape (3, times); zero where it is
-        but noise.
+        """Running integral over time of a vector's mean over the states, shape (3, times); zero if it is only
+        noise.
         """
         means, size = values.mean(axis=2), np.sqrt((values**2).sum(axis=0).mean(axis=1))
         steps = np.diff(self._times)
@@ -230,7 +232,9 @@ class _Samples:
         return total if np.linalg.norm(total, axis=0).max() > noise else np.zeros_like(total)
 
     def _pulses(self, narrow: list[Symbolic], times: np.ndarray) -> list[np.ndarray]:
-        """Times on a logarithmic grid around the zeros of arguments, by Newton's method from all others."""
+        """Times on a logarithmic grid around the zeros of arguments, found by Newton's method from the other
+        times.
+        """
         found = []
         for u in narrow:
             argument, at = self._compiled([u, _by_time(u)]), times
@@ -247,18 +251,18 @@ class _Samples:
 
 
 def _by_time(u: Symbolic) -> Symbolic:
-    """The part of its change that is explicit in time."""
+    """Part of an expression's time derivative that is explicit in time."""
     clock = hy.make_vars(_CLOCK)
     slope = hy.diff(hy.subs(hy.expression(u), {hy.time: clock}), clock)
     return hy.subs(slope, {clock: hy.time})
 
 
 def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Of quaternions, shape (4,)."""
+    """Product of quaternions, shape (4,)."""
     w, v = p[0] * q[0] - p[1:] @ q[1:], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
     return np.array([w, *v])
 
 
 def _matrix(q: np.ndarray) -> np.ndarray:
-    """Body to space."""
+    """Rotation matrix, body to space axes."""
     return np.array([[float(x) for x in row] for row in numeric.rotation_matrix(list(q))])

@@ -18,50 +18,46 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class Mechanics(Kinematics):
-    """Kinematics with all loads that act: what observables and invariants are written against."""
+    """Kinematics together with all acting loads: the quantities observables and invariants are written in."""
 
     loads: list[Load] = field(default_factory=list)
 
     @property
     def turning_rate(self) -> Any | None:
-        """Bound of the rate (mpf, rad/s) at which axes turn where rotations are averaged over
-        (``rigidsim.model.averaged``); None elsewhere.
+        """Bound of the rate (mpf, rad/s) at which axes turn in a motion averaged over rotations
+        (``rigidsim.model.averaged``); None for any other motion.
         """
         return None
 
     @property
     def averaged(self) -> bool:
-        """Whether they are."""
+        """Whether the motion is averaged over rotations."""
         return self.turning_rate is not None
 
     @property
     def kept_by_average(self) -> str | None:
-        """Why the size of the angular momentum is constant where rotations are averaged over; None where it
-        isn't.
-        """
+        """Why averaging over rotations keeps the size of the angular momentum constant; None if it doesn't."""
         return None
 
     @property
     def commensurable_angle(self) -> tuple[Symbolic, Symbolic] | None:
-        """Sine and cosine, times a common size, of the angle that an average over rotations and orbits keeps
-        where the body keeps pace with its source; None elsewhere.
+        """Sine and cosine, times a common size, of the resonant angle that survives an average over rotations
+        and orbits when the body's rotation is commensurable with its source's orbit; None elsewhere.
         """
         return None
 
     def tells(self, name: str) -> bool:
-        """Whether the motion carries as much as an observable of this name takes, as far as ``needs`` can't
-        say.
-        """
+        """Whether the motion carries enough to record this observable, as far as ``needs`` can't tell."""
         return True
 
     @property
     def figure_space(self) -> list[Symbolic]:
-        """A vector along the figure axis, space axes."""
+        """Vector along the figure axis, space axes; not normalized."""
         return apply(self.matrix, [as_factor(self.number(x)) for x in self.scene.figure.pole])
 
     @property
     def spin_space(self) -> list[Symbolic]:
-        """A vector along the angular velocity, space axes."""
+        """Vector along the angular velocity, space axes; not normalized."""
         return apply(self.matrix, self.rates)
 
     @cached_property
@@ -70,29 +66,31 @@ class Mechanics(Kinematics):
 
     @cached_property
     def torque(self) -> list[Term]:
-        """Of all loads, body axes, internal units of energy."""
+        """Terms of the total torque, body axes, internal units of energy."""
         return [term for terms in self._torques for term in terms]
 
     @cached_property
     def turning(self) -> list[Load]:
-        """The loads that have a torque."""
+        """The loads that exert a torque."""
         return [load for load, terms in zip(self.loads, self._torques, strict=True) if terms]
 
     @cached_property
     def force(self) -> list[Term]:
-        """Acceleration of the centre of mass by all loads, space axes."""
+        """Terms of the centre of mass's total acceleration, space axes."""
         return [term for load in self.loads for term in load.force(self)]
 
     @cached_property
     def potential_energy(self) -> Symbolic | None:
-        """Of the loads that are conservative; None where none is."""
+        """Potential energy of all conservative loads, internal units; None if there are none."""
         parts = [load.potential(self) for load in self.loads if load.conservative]
         found = [part for part in parts if part is not None]
         return hy.sum(found) if found else None
 
     @cached_property
     def power(self) -> Symbolic | None:
-        """Of the loads without a potential, internal units of energy over time; None without such loads."""
+        """Power of the loads without a potential, internal units of energy over time; None without such
+        loads.
+        """
         context, terms = self.scene.context, []
         for load in self.loads:
             if load.conservative:
@@ -111,12 +109,12 @@ class Mechanics(Kinematics):
 
     @property
     def conserves_energy(self) -> bool:
-        """Whether every load that acts has a potential that doesn't depend on time."""
+        """Whether every acting load has a time-independent potential."""
         return all(load.conservative or not (load.torque(self) or load.force(self)) for load in self.loads)
 
     @cached_property
     def energy(self) -> Symbolic:
-        """Kinetic (of rotation and of the centre of mass, where it moves) plus potential."""
+        """Kinetic energy (rotation, and translation if the centre of mass moves) plus potential energy."""
         terms = [self.rotational_energy]
         mass = self.scene.body.mass
         if self.velocity is not None and mass is not None:
@@ -129,7 +127,7 @@ class Mechanics(Kinematics):
 
     @property
     def marked(self) -> Vector | None:
-        """See ``Kinematics``: towards the centre of mass of a heavy body, or a dipole of another."""
+        """See ``Kinematics``: points to the centre of mass of a heavy body, or along the dipole of any other."""
         pulled = [load.linear_potential(self.scene) for load in self.loads]
         return self.numbers.arm or next((found[0] for found in pulled if found is not None), None)
 

@@ -1,4 +1,4 @@
-"""What is decided about a scene's equations before any number is rounded: loads, states, units, orbits."""
+"""Decisions about a scene's equations made before any number is rounded: loads, states, units, orbits."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ModelPlan:
-    """The decisions; a system of equations in any precision follows from them.
+    """The modelling decisions from which a system of equations follows in any precision.
 
     Attributes:
-        scene: with the loads that were given from Python among its own.
-        loads: all that act, all uniform fields as one.
-        orbit_tags: of each prescribed orbit, what makes the names of its states unique.
-        frame_orbit: the orbit in whose frame the attitude is carried; None where that is space.
-        paired: whether its equations are those of ``rigidsim.model.paired_products``.
-        surfaces: on which the equations change.
-        plane: that the motion stays in, where its formulation is planar.
-        tables: where the states and parameters of orbits by a table are.
-        average: that the motion is, where rotations are averaged over.
+        scene: the scene, including loads given from Python.
+        loads: all that act, with the uniform fields combined into one.
+        orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
+        frame_orbit: orbit in whose frame the attitude is carried; None if it is carried in space axes.
+        paired: whether the equations are those of ``rigidsim.model.paired_products``.
+        surfaces: switching surfaces on which the equations change.
+        plane: plane that the motion stays in, if the formulation is planar.
+        tables: positions of the states and parameters of tabulated orbits.
+        average: the average that replaces the motion, if rotations are averaged over.
     """
 
     scene: Scene
@@ -74,9 +74,9 @@ def plan_model(
     """Decide on the least system that a scene needs.
 
     Args:
-        extra_loads: given from Python, beside those of the config.
-        scaling: where it is known, from another formulation of the same motion; its loads are in order then.
-        like: of the same scene in plain numbers: what was estimated and checked there holds here.
+        extra_loads: loads given from Python, besides those of the config.
+        scaling: if already known from another formulation of the same motion, whose loads were checked.
+        like: plan of the same scene in plain numbers, whose estimates and checks hold here too.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a load that depends on the
@@ -136,7 +136,7 @@ def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
 
 
 def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
-    """Of a motion averaged over its rotation, and maybe over its sources' orbits."""
+    """Plan a motion averaged over its rotation, and possibly over its sources' orbits."""
     from rigidsim.model.averaged.average import average_of
     from rigidsim.model.averaged.states import WHY, refuse_untold
 
@@ -172,7 +172,7 @@ def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
 def _planar(
     scene: Scene, loads: Sequence[Load], requirements: Requirements
 ) -> tuple[Requirements, PlaneOfMotion | None]:
-    """Two states where a gravity gradient keeps the body in a plane, or where that is asked."""
+    """Reduce to two states if gravity gradients keep the body in a plane, or if the config asks for it."""
     if requirements.formulation == PLANAR:
         return requirements, asked_plane(scene, loads)
     if scene.config.integrator.formulation != "auto" or requirements.formulation != "quaternion":

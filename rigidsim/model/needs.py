@@ -1,4 +1,4 @@
-"""What an observable may need: whether a scene has it, which states it takes, what to say without it."""
+"""Needs of observables: whether a scene meets one, which states it takes, what to say if it is not met."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Need:
     """One thing that observables may need.
 
     Attributes:
-        met: whether the mechanics of a scene has it.
-        states: which states must be carried for it: "attitude", "flight" or None.
+        met: whether the mechanics of a scene meets it.
+        states: states that must be carried for it: "attitude", "flight" or None.
         missing: why a scene in this formulation can't have it, told before anything is built; None where that
             is seen only later.
     """
@@ -45,8 +45,8 @@ class Need:
 
 
 def work_is_needed(m: Mechanics) -> bool:
-    """Whether the energy balance is checked by integrating power: where energy isn't conserved and Jacobi's
-    constant of a single load doesn't stand in for it.
+    """Whether the energy balance is checked by integrating power: where energy isn't conserved and no Jacobi
+    constant of a single load takes its place.
     """
     has_jacobi = m.attitude is not None and len(m.loads) == 1 and m.loads[0].corotating_orbit is not None
     return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
@@ -115,8 +115,8 @@ def _plane_states(scene: Scene) -> str | None:
 
 
 def _isotropic_damping(m: Mechanics) -> bool:
-    """Whether each load with a torque damps, all together in proportion to the inertia tensor, and the body
-    turns.
+    """Whether the body turns and every load that exerts a torque is a damping, with coefficients that add up
+    to a multiple of the inertia tensor.
     """
     found = [load.damping() for load in m.turning]
     if not found or any(c is None for c in found) or all(w == 0 for w in m.scene.angular_velocity):
@@ -157,4 +157,4 @@ NEEDS: dict[str, Need] = {
         lambda m: m.velocity is not None and any(x.attracting_point is not None for x in m.loads)
     ),
 }
-"""By the names that ``Observable.needs`` uses."""
+"""All needs, by the names that ``Observable.needs`` uses."""

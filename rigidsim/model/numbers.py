@@ -14,7 +14,7 @@ from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 Rounder = Callable[[Any], Any]
-"""From an mpf to the working precision's scalar, rounded once."""
+"""Rounds an mpf once to the working precision's scalar."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class ScaledNumbers:
 
     Attributes:
         inertia, inverse_inertia: 3x3.
-        rate_units: the three rates' own units.
+        rate_units: the unit of each of the three body rates.
         arm: M com |g|, body axes: the potential energy is ``arm . vertical``; None without a torque.
         up: unit vector against gravity, space axes; None without gravity.
     """
@@ -57,5 +57,5 @@ def scaled_numbers(scene: Scene, scaling: Scaling) -> ScaledNumbers:
 
 
 def unit_vectors(context: Any) -> Matrix:
-    """The three axes."""
+    """The three unit vectors along the axes."""
     return [[context.one if i == j else context.zero for j in range(3)] for i in range(3)]

@@ -1,4 +1,4 @@
-"""Planes of orbits, of sources or of the body itself: normals as expressions, at the start, how they turn.
+"""Orbital planes of sources or of the body itself: normals as expressions and at the start, and their drift.
 
 A load says which it has (``Load.plane``). The mean ecliptic of date: its pole is (P, -Q, sqrt(1 - P^2 - Q^2))
 in the ecliptic and equinox of J2000, with P = sin(pi_A) sin(Pi_A) and Q = sin(pi_A) cos(Pi_A) from Capitaine,
@@ -26,17 +26,17 @@ _CENTURY = 36525 * 86400
 _ARCSEC = ExactNumber(Fraction(1, 3600 * 180), pi_power=1)
 _P = ("4.199094", "0.1939873", "-0.00022466", "-0.000000912", "0.0000000120")
 _Q = ("-46.811015", "0.0510283", "0.00052413", "-0.000000646", "-0.0000000172")
-"""Arcseconds by powers of centuries (TDB) from J2000, the first on."""
+"""Arcseconds, coefficients of ascending powers of centuries (TDB) from J2000, beginning with the first."""
 _ECLIPTIC_DRIFT = 1e-12  # rad/s; 0.47 arcsec a year are 7e-14
 
 
 class OrbitPlane:
-    """The plane of a load's source; all of the methods' vectors are in space axes.
+    """Plane of a load's source; all vectors returned are in space axes.
 
     Attributes:
-        described: which plane it is, as a plane of reference.
-        called: what its normal is called in a local frame; empty where the source doesn't keep to it.
-        flown: whether it is that of the body's own flight.
+        described: the plane's description when angles are measured from it.
+        called: name of its normal in a local frame; empty if the source doesn't stay in the plane.
+        flown: whether it is the plane of the body's own flight.
     """
 
     described: str
@@ -45,28 +45,28 @@ class OrbitPlane:
 
     @abstractmethod
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        """Unit vector about which the motion goes in the direct sense."""
+        """Unit normal about which the motion is direct (counterclockwise)."""
 
     @abstractmethod
     def at_start(self, scene: Scene) -> Vector:
-        """About where that points at the start (mpf), not of unit length."""
+        """Approximate normal at the start (mpf), not of unit length."""
 
     @abstractmethod
     def drift(self, scene: Scene) -> Any | None:
-        """Bound of the rate (rad/s) at which it turns; None where none is known."""
+        """Bound of the rate (rad/s) at which the normal turns; None if unknown."""
 
     def fixed(self, scene: Scene) -> Vector | None:
-        """The unit normal itself (mpf), where it never turns."""
+        """The unit normal (mpf) if it never turns; None otherwise."""
         return None
 
     def rate(self, scene: Scene) -> Any | None:
-        """Angular rate (mpf, rad/s) of the motion in it, or its mean; None where nobody knows."""
+        """Angular rate (mpf, rad/s) of the motion in the plane, or its mean; None if unknown."""
         return None
 
 
 @dataclass(frozen=True)
 class KeplerPlane(OrbitPlane):
-    """Of a prescribed orbit, whose node may move."""
+    """Plane of a prescribed Kepler orbit, whose node may move."""
 
     orbit: KeplerOrbit
     called = "normal of its orbit"
@@ -90,11 +90,11 @@ class KeplerPlane(OrbitPlane):
         return None if moves else self._at(scene.context, self.orbit.ascending_node)
 
     def drift(self, scene: Scene) -> Any:
-        """Of the node."""
+        """Rate of the node, rad/s."""
         return abs(self.orbit.node_rate)
 
     def rate(self, scene: Scene) -> Any:
-        """The mean motion."""
+        """Mean motion, rad/s."""
         return abs(self.orbit.mean_motion)
 
     def _at(self, context: Any, node: Any) -> Vector:
@@ -104,7 +104,7 @@ class KeplerPlane(OrbitPlane):
 
 @dataclass(frozen=True)
 class TablePlane(OrbitPlane):
-    """Of an orbit by a table."""
+    """Plane of a tabulated orbit."""
 
     table: TabulatedOrbit
     described = "plane of the source's orbit, by its table"
@@ -120,17 +120,17 @@ class TablePlane(OrbitPlane):
         return found
 
     def drift(self, scene: Scene) -> Any:
-        """As neighbouring rows show."""
+        """Bound from the differences of neighbouring rows, rad/s."""
         return self.table.normal_drift
 
     def rate(self, scene: Scene) -> Any:
-        """The mean motion."""
+        """Mean motion, rad/s."""
         return abs(self.table.mean_motion)
 
 
 @dataclass(frozen=True)
 class FlightPlane(OrbitPlane):
-    """Of the body's own flight about an attracting point (mpf, m, space axes): r x v."""
+    """Plane of the body's own flight about an attracting point (mpf, m, space axes): normal r x v."""
 
     point: Vector
     described = "osculating plane of the body's own orbit"
@@ -155,11 +155,11 @@ class FlightPlane(OrbitPlane):
         return cross(self._offset(scene.position), scene.velocity)
 
     def drift(self, scene: Scene) -> None:
-        """Nothing is known."""
+        """None: no bound is known."""
         return None
 
     def rate(self, scene: Scene) -> Any | None:
-        """At the start."""
+        """Angular rate at the start, rad/s."""
         if scene.position is None or scene.velocity is None:
             return None
         place = self._offset(scene.position)
@@ -170,7 +170,7 @@ class FlightPlane(OrbitPlane):
 
 
 class EclipticPlane(OrbitPlane):
-    """The mean ecliptic of date, which the Sun of the series keeps to but for its perturbations."""
+    """Mean ecliptic of date, in which the Sun of the analytic series moves except for perturbations."""
 
     described = "mean ecliptic of date (IAU 2006)"
 
@@ -193,9 +193,9 @@ class EclipticPlane(OrbitPlane):
         return [p, -q, hy.sqrt(1.0 - p * p - q * q)]
 
     def at_start(self, scene: Scene) -> Vector:
-        """Z."""
+        """The Z axis."""
         return [scene.context.zero, scene.context.zero, scene.context.one]
 
     def drift(self, scene: Scene) -> Any:
-        """Of the ecliptic."""
+        """Bound for the ecliptic, rad/s."""
         return scene.context.mpf(_ECLIPTIC_DRIFT)

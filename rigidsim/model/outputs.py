@@ -1,4 +1,6 @@
-"""What of a scene is recorded, what of it is conserved, and the drifts that are watched."""
+"""Outputs of a system: variables that are recorded, quantities that are conserved, and drifts that are
+watched.
+"""
 
 from __future__ import annotations
 
@@ -20,17 +22,17 @@ from rigidsim.scene.registry import OBSERVABLES
 
 @dataclass(frozen=True)
 class Recorded:
-    """One variable of the dataset.
+    """One recorded variable of the dataset.
 
     Attributes:
-        first, count: its components among ``System.outputs``.
+        first, count: position and number of its components in ``System.outputs``.
         exponents: binary exponents that bring the components to SI.
         continuity: how samples are joined: "" (as they are), "wrapped" (angles that are states),
             "unwrap" (angles that are functions of the state), "parity" and "nearest" (quaternion signs).
-        squared_sizes: of angles that are functions of the state what vanishes where each is undefined; none
-            for Euler angles, whose middle one tells it.
-        steady: how these angles advance between samples, where that is known.
-        attributes: beside units, long name and frame.
+        squared_sizes: for angles that are functions of the state, a value that vanishes where each is
+            undefined; none for Euler angles, whose middle angle tells it.
+        steady: how these angles advance between samples, if known.
+        attributes: attributes besides units, long name and frame.
     """
 
     name: str
@@ -50,14 +52,14 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Invariant:
-    """Something that the motion conserves, and the drift that is watched.
+    """A quantity that the motion conserves, and the drift that is watched.
 
     Attributes:
-        why: the reason that it is conserved.
+        why: why it is conserved.
         expressions: its components, in internal units.
         exponents: binary exponents of the components' units.
         scale: what drifts are relative to, SI (mpf); ``scale_name`` says what it is.
-        numerical: True for what only the numerical representation has (a quaternion's norm).
+        numerical: True for an invariant of the numerical representation alone (a quaternion's norm).
     """
 
     name: str
@@ -75,10 +77,10 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
     """The variables of the dataset, and the expressions of all their components.
 
     Args:
-        record: names that were asked for; None for all that a scene of this kind records by default.
+        record: names asked for; None for everything that such a scene records by default.
 
     Raises:
-        ConfigError: something was asked for that the scene hasn't got.
+        ConfigError: a requested variable doesn't exist in this scene.
     """
     recorded: list[Recorded] = []
     outputs: list[Symbolic] = []
@@ -119,7 +121,7 @@ def _observables() -> list[Observable]:
 
 
 def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
-    """All that the scene conserves, with reasons.
+    """All invariants of the scene, with the reasons why they are conserved.
 
     Args:
         norms: expressions that stay 1 by construction (of orbits carried as states).
@@ -167,7 +169,7 @@ def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
 
 
 def drift_outputs(invariants: list[Invariant], context: Any, number: Rounder) -> list[Symbolic]:
-    """(value - initial) / scale; of a vector, the norm of the difference over the scale."""
+    """Relative drifts (value - initial) / scale; for a vector, the norm of the difference over the scale."""
     drifts = []
     first = 0
     for invariant in invariants:

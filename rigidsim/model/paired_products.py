@@ -45,23 +45,24 @@ from rigidsim.scene.scene import Scene
 
 NAMES = ["ux", "uy", "uz", "fx", "fy", "fz"]
 _LOOSE = 1e-13
-"""Tolerance from which on the error of the series is far above that of rounding."""
+"""Tolerance above which the series' truncation error far exceeds rounding."""
 _LEAST = 2.0**-6
-"""s in units of the fastest rate: below, two digits of r and more would be lost."""
+"""Least s in units of the fastest rate; below it r would lose more than two digits."""
 STRIDE = "stride"
 _WHY = "constant: steps are relative to the largest state, and of their order they may be longer"
 _ALIKE = 4
-"""Between s and n, whose quotient scales f: it is the root of three where the period is that of the orbit."""
+"""Largest ratio of s and n, whose quotient scales f: it is sqrt(3) where the motion's period is the orbit's.
+"""
 
 
 def pairs_products(
     scene: Scene, loads: Sequence[Load], orbit: KeplerOrbit | None, scaling: Scaling, numbers: ScaledNumbers
 ) -> bool:
-    """Whether a scene is carried so: a gravity gradient alone, principal body axes, an explicit loose
-    tolerance, and nothing that wants the quaternion itself among the states.
+    """Whether a scene is carried in this form: a gravity gradient alone, principal body axes, an explicit
+    loose tolerance, and nothing that needs the quaternion itself among the states.
 
     Args:
-        orbit: in whose frame the attitude is carried; None where that is space.
+        orbit: orbit in whose frame the attitude is carried; None if it is carried in space axes.
     """
     source = loads[0].gradient_source if len(loads) == 1 else None
     if orbit is None or source is None:
@@ -90,11 +91,11 @@ def _strength(scene: Scene, parameter: Any, orbit: KeplerOrbit, scaling: Scaling
 
 
 def even_order(tolerance: float) -> tuple[float, float]:
-    """A tolerance for which heyoka takes the even order that is due, and what the largest state is to be
-    multiplied by, so that steps are as long as the tolerance allows.
+    """Tolerance for which heyoka takes the intended even order, and the factor on the largest state that
+    makes steps as long as the tolerance allows.
 
-    heyoka's orders and steps are those for an error per step of e^(2 - 2 order) (Jorba & Zou 2005, eq. 11);
-    steps grow by the root of the factor, of the order.
+    heyoka chooses order and step for an error per step of e^(2 - 2 order) (Jorba & Zou 2005, eq. 11);
+    steps grow by the order-th root of the factor.
     """
     due = 1 - math.log(tolerance) / 2
     even = 2 * math.ceil(due / 2)
@@ -102,7 +103,7 @@ def even_order(tolerance: float) -> tuple[float, float]:
 
 
 def _sums(rates: Sequence[Symbolic]) -> tuple[list[Symbolic], list[Symbolic], list[Symbolic]]:
-    """u, and (w_j + u_j)(w_k - u_k) and (w_j - u_j)(w_k + u_k) for each i."""
+    """u, and for each i the products (w_j + u_j)(w_k - u_k) and (w_j - u_j)(w_k + u_k)."""
     u = list(hy.make_vars(*NAMES[:3]))
     plus = [w + x for w, x in zip(rates, u, strict=True)]
     minus = [w - x for w, x in zip(rates, u, strict=True)]
@@ -111,7 +112,7 @@ def _sums(rates: Sequence[Symbolic]) -> tuple[list[Symbolic], list[Symbolic], li
 
 
 def paired_rates(m: Kinematics) -> list[Symbolic]:
-    """Derivatives of the body rates, which include the gradient's torque."""
+    """Derivatives of the body rates, including the gradient's torque."""
     numbers = m.numbers
     _, first, second = _sums(m.rate_states)
     result = []
@@ -130,12 +131,14 @@ def paired_states(
     scaling: Scaling,
     number: Rounder,
 ) -> AttitudeStates:
-    """Six states, u = s r and (s / n) f, and ``stride`` as that of the load. Where the orbital frame is
-    follows from the time: it is recorded and acts on nothing, so that what is lost of n t isn't felt.
+    """Six states, u = s r and (s / n) f, besides ``stride`` as a state of the load.
+
+    The orbital frame follows from the time. It is recorded but acts on nothing, so that the digits lost in
+    n t do not affect the motion.
 
     Args:
-        source: of the only load, on an orbit.
-        rates: angular velocity, body axes, 1 / unit of time; they are states.
+        source: the only load's source, which is on an orbit.
+        rates: angular velocity states, body axes, 1 / unit of time.
     """
     assert source.orbit is not None
     orbit, context = source.orbit, scene.context

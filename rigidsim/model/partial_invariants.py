@@ -1,4 +1,6 @@
-"""Invariants of scenes whose loads spare an axis or a direction, recorded where they hold and only there."""
+"""Invariants of scenes whose loads leave an axis or a direction free of torque; recorded only where they
+hold.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,7 @@ def _free_axis(which: int) -> Callable[[Mechanics], Vector | None]:
 
 
 def _across_its_beginning(m: Mechanics) -> list[Symbolic]:
-    """L - (L . d) d, d the direction of L at the start."""
+    """Component of L perpendicular to its initial direction d, L - (L . d) d."""
     scene, context = m.scene, m.scene.context
     begun = apply(
         attitude.rotation_matrix(scene.quaternion), apply(scene.body.inertia, scene.angular_velocity)

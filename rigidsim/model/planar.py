@@ -1,4 +1,5 @@
-"""Planar motion: a body that turns about a principal axis along which all torques point, in two states.
+"""Planar motion: a body that turns about a principal axis along which all torques point, carried in two
+states.
 
 A spin about a principal axis along an orbit's normal stays there: neither the gyroscopic term I w x w nor the
 torque of a gravity gradient has a part across it. Then the angle about that axis and its rate are the whole
@@ -6,7 +7,7 @@ motion (Goldreich & Peale 1966, Astron. J. 71, 425, eq. 1),
 
     angle' = spin,   I_k spin' = torque . k,
 
-and what happens to a body that is pushed out of the plane isn't examined.
+and the stability of a body that is pushed out of the plane isn't examined.
 """
 
 from __future__ import annotations
@@ -30,24 +31,25 @@ from rigidsim.scene.scene import Scene
 
 ANGLE, SPIN = "angle", "spin"
 ANGLE_UNIT = 20
-"""The angle is carried in units of 2**20 rad: step control is relative to the largest state, which it never
-is then, however often the body has turned."""
+"""The angle is carried in units of 2**20 rad, so that it never becomes the largest state (to which step
+control is relative), however often the body has turned.
+"""
 
 
 class NotPlanar(Exception):
-    """The motion leaves the plane, or nobody knows; says why."""
+    """Raised with a reason if the motion leaves the plane, or can't be shown to stay in it."""
 
 
 @dataclass(frozen=True)
 class PlaneOfMotion:
-    """Where a planar motion takes place.
+    """The plane of a planar motion.
 
     Attributes:
         axis: principal axis that the body turns about, unit, body axes (mpf).
         normal: the same in space axes.
-        quaternion: an attitude that brings the axis there, from which the angle counts; as near to none at
-            all as can be.
-        angle: at the start, rad (mpf).
+        quaternion: attitude that takes the axis to the normal, from which the angle counts; the smallest
+            such rotation.
+        angle: initial angle, rad (mpf).
     """
 
     axis: Vector
@@ -58,11 +60,11 @@ class PlaneOfMotion:
 
 @dataclass(frozen=True)
 class PlanarStates:
-    """The attitude, whose only state is the angle, and what the spin means.
+    """Attitude states of a planar motion (a single angle), and the angular velocity that its spin stands for.
 
     Attributes:
         rates: angular velocity, body axes, in units of 1/time.
-        initial_spin: mpf, internal units.
+        initial_spin: spin at the start (mpf), internal units.
     """
 
     attitude: AttitudeStates
@@ -74,7 +76,7 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     """The plane that a motion stays in.
 
     Raises:
-        NotPlanar: with the reason.
+        NotPlanar: the motion isn't known to stay in a plane; says why.
     """
     if scene.free_flight:
         raise NotPlanar("the body has a position and flies")
@@ -85,7 +87,7 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
         if not load.keeps_plane(scene, axis, normal):
             raise NotPlanar(f"the torque of {load.title} may turn the body out of its plane")
     turned = _least_turn(context, axis, normal)
-    # what is left after it is a turn about the axis, whose half angle the scalar product gives
+    # the remaining rotation is about the axis, and the scalar product gives its half angle
     w, *v = attitude.product([turned[0], *(-x for x in turned[1:])], list(scene.quaternion))
     half = context.atan2(dot(v, axis), w)
     angle = 2 * half
@@ -97,7 +99,7 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
 
 
 def gradient_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion | None:
-    """The plane of a motion under gravity gradients, where it stays in one; None elsewhere."""
+    """The plane of a motion under gravity gradients if it stays in one; None otherwise."""
     if not any(load.has_source for load in loads):
         return None
     try:
@@ -110,7 +112,7 @@ def asked_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     """The plane of a motion for which ``formulation = "planar"`` is given.
 
     Raises:
-        ConfigError: it leaves every plane.
+        ConfigError: the motion stays in no plane.
     """
     try:
         return plane_of(scene, loads)
@@ -125,10 +127,10 @@ def asked_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
 
 
 def planar_states(scene: Scene, plane: PlaneOfMotion, time_exponent: int, number: Rounder) -> PlanarStates:
-    """Set the angle and the spin up.
+    """Set up the angle and the spin.
 
     Args:
-        time_exponent: of the internal unit of time.
+        time_exponent: binary exponent of the internal unit of time in seconds.
         number: from an mpf to the working precision's scalar, rounded once.
     """
     context = scene.context
@@ -160,7 +162,7 @@ def planar_states(scene: Scene, plane: PlaneOfMotion, time_exponent: int, number
 def spin_equation(
     plane: PlaneOfMotion, numbers: ScaledNumbers, torque: list[Term], number: Rounder, context: Any
 ) -> Symbolic:
-    """I_k spin' = torque . k.
+    """Right-hand side of I_k spin' = torque . k, solved for spin'.
 
     Args:
         torque: terms of all loads, body axes, internal units.
@@ -176,7 +178,7 @@ def spin_equation(
 
 
 def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
-    """The axis that the body turns about; at rest, the principal one that lies along an orbit's normal."""
+    """Axis that the body turns about; at rest, the principal axis that lies along an orbit's normal."""
     context, rates = scene.context, scene.angular_velocity
     tiny = negligible(context)
     size = norm(context, rates)
@@ -194,7 +196,7 @@ def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
 
 
 def _least_turn(context: Any, axis: Vector, normal: Vector) -> Vector:
-    """Quaternion of the least turn that brings one unit vector to another; an exact one where it is none."""
+    """Quaternion of the smallest rotation that takes one unit vector to another; exact if they coincide."""
     tiny = negligible(context)
     across, along = cross(axis, normal), dot(axis, normal)
     if norm(context, across) <= tiny:

@@ -1,7 +1,7 @@
-"""Which of a scene's invariants are projected onto their initial values during a run, and why not the rest.
+"""Which invariants of a scene are projected onto their initial values during a run, and why the rest aren't.
 
-An invariant that follows from others would only make the correction ill-determined, so each set is a small
-one: L in space axes stands for its norm, six products of rows for a matrix's orthogonality. Norms are taken
+An invariant that follows from others would only make the correction ill-determined, so each set is minimal:
+L in space axes stands for its norm, six products of rows for a matrix's orthogonality. Norms are taken
 squared, since a root has no gradient where it vanishes.
 """
 
@@ -21,12 +21,12 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class ProjectedScalar:
-    """One scalar that is projected.
+    """One scalar equation of a projected invariant.
 
     Attributes:
-        name: of the invariant that it belongs to.
+        name: name of the invariant that it belongs to.
         expression: of the states, internal units.
-        scale: what its drift is relative to, internal units (mpf).
+        scale: size that its drift is relative to, internal units (mpf).
     """
 
     name: str
@@ -34,7 +34,7 @@ class ProjectedScalar:
     scale: Any
 
 
-# invariant: (present beside it, why it needn't be projected itself)
+# invariant: (another one that stands for it if present, why it needn't be projected itself)
 _FOLLOWS = {
     "angular_momentum_norm": ("angular_momentum", "its three components are projected"),
     "energy": ("rotational_energy", "its rotational part is projected; nothing turns the flight's velocity"),
@@ -65,7 +65,7 @@ def _squared_rows(m: Mechanics) -> list[Symbolic]:
     return [hy.sum([r[i][k] * r[j][k] for k in range(3)]) for i in range(3) for j in range(i + 1)]
 
 
-# What stands for a root that can vanish: its scalars, and their relative drift over the root's
+# squares that stand for roots that can vanish: their scalars, and the relative drift in terms of the root's
 _SQUARES: dict[str, tuple[Callable[[Mechanics], list[Symbolic]], int]] = {
     "angular_momentum_norm": (lambda m: [hy.sum([x * x for x in m.momentum_body])], 2),
     "quaternion_norm": (lambda m: [hy.sum([x * x for x in m.carried(m.attitude).variables])], 2),
@@ -75,12 +75,12 @@ _SQUARES: dict[str, tuple[Callable[[Mechanics], list[Symbolic]], int]] = {
 
 
 def conserves(system: System) -> bool:
-    """Whether any of the invariants that are projected is one of the motion, not of its numbers alone."""
+    """Whether any projected invariant is one of the motion, not just of its numerical representation."""
     return any(not found.numerical and found.name not in _NEVER for found in system.invariants)
 
 
 def projected_invariants(system: System) -> tuple[list[ProjectedScalar], list[tuple[str, str]]]:
-    """The scalars to project, and (invariant, why) for those that are not projected themselves.
+    """Scalars to project, and (invariant, why) for the invariants that are not projected themselves.
 
     Raises:
         ConfigError: nothing is conserved.

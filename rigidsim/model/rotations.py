@@ -1,4 +1,4 @@
-"""Rotations as heyoka expressions: ``rigidsim.scene.rotations`` with heyoka's functions and sums."""
+"""Rotations as heyoka expressions: ``rigidsim.scene.rotations`` applied to heyoka's functions and sums."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _never(_: Symbolic) -> bool:
     return False  # an expression has no value yet: Euler angles are not defined in their singularity
 
 
-# heyoka's sums drop the terms with zeros
+# heyoka's sums drop zero terms
 _HEYOKA = rotations.Rotations(hy.sin, hy.cos, hy.atan2, _length, constant, _never, hy.sum)
 apply = _HEYOKA.apply
 multiply = _HEYOKA.multiply
@@ -40,11 +40,11 @@ quaternion_from_euler = _HEYOKA.quaternion_from_euler
 
 
 def quaternion_from_matrix(r: SymbolicMatrix, *, differentiable: bool = False) -> list[Symbolic]:
-    """Quaternion of R up to sign; the component with the largest square is selected when it is evaluated.
+    """Quaternion of R up to sign; the component with the largest square is selected at evaluation.
 
     Args:
-        differentiable: heyoka's derivative of a selection multiplies what isn't selected by zero, so that it
-            must be finite.
+        differentiable: whether to keep branches that aren't selected finite: heyoka's derivative of a
+            selection multiplies them by zero.
     """
     squares, pairs = rotations.shepperd(r)
     if differentiable:  # the largest is at least 1

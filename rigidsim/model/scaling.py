@@ -1,4 +1,4 @@
-"""Powers of two that bring every quantity of a scene to O(1), so that scaling never rounds anything.
+"""Scaling by powers of two that brings every quantity of a scene to O(1) without rounding.
 
 heyoka's step control is absolute below 1 and relative to the largest component above: a spin of 1e-6 rad/s
 or a component dwarfed by another loses digits. Inside the equations time, inertia, length and each state
@@ -19,11 +19,11 @@ from rigidsim.scene.tracing.whole import binary_exponent
 
 @dataclass(frozen=True)
 class Drive:
-    """What loads of unknown size are estimated to add (see ``rigidsim.model.load_estimate``), mpf.
+    """Estimated effect of loads of unknown size (see ``rigidsim.model.load_estimate``), mpf.
 
     Attributes:
-        energy: of rotation, J.
-        speed: of the centre of mass, m/s.
+        energy: added energy of rotation, J.
+        speed: added speed of the centre of mass, m/s.
     """
 
     energy: Any
@@ -37,7 +37,7 @@ class Scaling:
     Attributes:
         time, inertia, length, speed: exponents.
         rates: exponents of the three body rates relative to ``1 / (unit of time)``.
-        drive: what went into them for loads of unknown size, or None.
+        drive: the estimate used for loads of unknown size, or None.
     """
 
     time: int
@@ -74,14 +74,14 @@ def exponent(context: Any, value: Any) -> int:
 
 
 def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
-    """Upper bounds of the absolute body rates over the whole motion, from energy and momentum, rad/s.
+    """Upper bounds of the absolute body rates over the whole motion from energy and momentum (mpf, rad/s).
 
     For a free body in principal axes both 2 E I_max - L^2 and L^2 - 2 E I_min are sums of squares with
     positive weights, so each bounds two rates and the smaller bound is sharp (Landau & Lifshitz, section 37).
     Otherwise |w_i| <= sqrt(2 E_kin,max (I^-1)_ii).
 
     Args:
-        drive: of loads whose size the scene doesn't know.
+        drive: estimate for loads whose size the scene doesn't know.
     """
     context, body, w = scene.context, scene.body, scene.angular_velocity
     inertia, inverse = body.inertia, scene.inverse_inertia
@@ -89,7 +89,7 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
     weighted = [dot(row, w) for row in inertia]
     twice_energy = dot(w, weighted)
     swing = 4 * potential_amplitude(scene)
-    if scene.loads or drive is not None:  # an orbit feeds it: a bound for the body carried along with it
+    if scene.loads or drive is not None:  # an orbit feeds energy in: bound carried along with it
         carried = source_rate(scene)
         fed = context.sqrt(largest_of([twice_energy, zero]) + swing + 4 * loads_amplitude(scene))
         if drive is not None:
@@ -115,7 +115,9 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
 
 
 def symmetry_axis(scene: Scene) -> int | None:
-    """The body axis about which a diagonal tensor is symmetric and on which the centre of mass lies."""
+    """Body axis about which a diagonal tensor is symmetric and on which the centre of mass lies; None if no
+    such axis.
+    """
     inertia, center = scene.body.inertia, scene.body.center_of_mass
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -134,16 +136,16 @@ def potential_amplitude(scene: Scene) -> Any:
 
 
 class Estimated(Protocol):
-    """What is asked of a load here; see ``rigidsim.model.load.Load``."""
+    """The part of a load's interface used here; see ``rigidsim.model.load.Load``."""
 
     def amplitude(self, scene: Scene) -> Any | None:
-        """By how much it may change the energy of rotation, J; None where nobody knows."""
+        """Largest change of the energy of rotation that it can cause, J; None if unknown."""
 
     def fastest_rate(self, scene: Scene) -> Any:
         """Fastest angular rate of its source, rad/s."""
 
     def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
-        """Largest distance (m) and speed (m/s) under it alone, where it bounds the flight."""
+        """Largest distance (m) and speed (m/s) under this load alone; None if it doesn't bound the flight."""
 
 
 def _loads(scene: Scene) -> Sequence[Estimated]:
@@ -151,7 +153,7 @@ def _loads(scene: Scene) -> Sequence[Estimated]:
 
 
 def loads_amplitude(scene: Scene) -> Any:
-    """By how much all loads of known size, but for uniform gravity, may change the energy of rotation, J."""
+    """Largest change of the energy of rotation, J, by all loads of known size except uniform gravity."""
     known = [load.amplitude(scene) for load in _loads(scene)]
     return sum((size for size in known if size is not None), scene.context.zero)
 
@@ -162,7 +164,7 @@ def source_rate(scene: Scene) -> Any:
 
 
 def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
-    """Largest distance from the origin (m) and speed (m/s) to be expected."""
+    """Expected largest distance from the origin (m) and speed (m/s)."""
     context = scene.context
     assert scene.position is not None
     assert scene.velocity is not None
@@ -177,7 +179,7 @@ def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
 
 
 def _point_mass_rates(scene: Scene) -> list[Any]:
-    """Fastest angular rates of pairs of point masses, rad/s."""
+    """Fastest angular rate of each pair of point masses, rad/s."""
     masses = scene.bodies
     if masses is None:
         return []
@@ -186,7 +188,7 @@ def _point_mass_rates(scene: Scene) -> list[Any]:
 
 
 def _point_mass_scales(scene: Scene) -> tuple[Any, Any]:
-    """Largest distance from the origin (m) and speed (m/s) at the start, of point masses and body."""
+    """Largest distance from the origin (m) and speed (m/s) of point masses and body at the start."""
     context, masses = scene.context, scene.bodies
     assert masses is not None
     places, speeds = list(masses.positions), list(masses.velocities)

@@ -1,4 +1,4 @@
-"""Blocks of states: what a system of equations is put together from."""
+"""Blocks of states from which a system of equations is assembled."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class StateBlock:
-    """Some states that belong together.
+    """A group of states that belong together.
 
     Attributes:
-        names: of the states.
+        names: names of the states.
         derivatives: right-hand sides, in the same order.
-        initial: mpf, in internal units.
+        initial: initial values (mpf), internal units.
         norms: expressions that stay 1 by construction.
-        exponents: binary exponents that bring the states to SI; empty where they are pure numbers.
-        why: the reason why they are carried.
+        exponents: binary exponents that bring the states to SI; empty for pure numbers.
+        why: why they are carried.
     """
 
     names: Sequence[str]
@@ -39,12 +39,12 @@ class StateBlock:
 
     @property
     def unit_exponents(self) -> list[int]:
-        """One for each state."""
+        """Binary exponent of the unit of each state."""
         return list(self.exponents) or [0] * len(self.names)
 
 
 def joined(blocks: Iterable[StateBlock]) -> StateBlock:
-    """Several blocks as one, in their order."""
+    """Several blocks concatenated in order."""
     found = list(blocks)
     return StateBlock(
         [name for block in found for name in block.names],

@@ -1,4 +1,4 @@
-"""Names that users' expressions read, as expressions of the states in SI units."""
+"""Names that users' expressions may read, as expressions of the states in SI units."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_fro
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
 
 TANGENT = "tangent_"
-"""What names of a tangent vector's states begin with."""
+"""Prefix of the names of a tangent vector's states."""
 
 
 def plain_angles(m: Kinematics) -> list[Symbolic]:
-    """Euler angles of the scene's sequence without their turns."""
+    """Euler angles of the scene's sequence within one turn, rad."""
     sequence = m.scene.config.integrator.euler_sequence
     if m.attitude is not None and m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
         return list(hy.make_vars(*m.attitude.names))
@@ -23,15 +23,15 @@ def plain_angles(m: Kinematics) -> list[Symbolic]:
 
 
 def carries_sign(m: Kinematics) -> bool:
-    """Whether the quaternion's sign is a parameter: where it matters, and the formulation loses it."""
+    """Whether the quaternion's sign is a parameter: it matters, and the formulation loses it."""
     return m.surfaces.signed and m.attitude is not None and m.attitude.quaternion_sign != "state"
 
 
 def state_names(m: Kinematics, names: Collection[str]) -> dict[str, Symbolic]:
-    """Expressions in SI units of the names that a user's expression reads.
+    """Expressions in SI units for the names that a user's expression reads.
 
-    Parameters ``par[..]`` stand for what the state doesn't tell where that matters: after the sides of the
-    surfaces the full turns of angles, then the sign of the quaternion.
+    Parameters ``par[..]`` stand for what the state alone doesn't tell: after the sides of the surfaces, the
+    full turns of angles, then the sign of the quaternion.
 
     Raises:
         KeyError: a name that the scene doesn't carry.

@@ -1,6 +1,6 @@
-"""What a scene requires: which states are carried, and the reason for each.
+"""Selection of states: what a scene requires, and the reason for each.
 
-Starts from what is recorded and what the loads read, and adds a state only when something needs it.
+It starts from what is recorded and what the loads read, and adds a state only if something needs it.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ class Requirements:
 
     @property
     def planar(self) -> bool:
-        """Whether an angle and its rate are all."""
+        """Whether an angle and its rate are the only states of the rotation."""
         return self.formulation == PLANAR
 
     def in_plane(self) -> Requirements:
-        """The same for a motion that was found to stay in a plane."""
+        """The same requirements for a motion that was found to stay in a plane."""
         why = {
             **self.why,
             "attitude": f"{self.why['attitude']}; the body turns about a principal axis, along which every "
@@ -62,13 +62,13 @@ class Requirements:
 
 
 def choose_requirements(scene: Scene, loads: Sequence[Load] = ()) -> Requirements:
-    """Decide what is carried.
+    """Decide which states are carried.
 
     Args:
-        loads: of the scene; they say what they read.
+        loads: the scene's loads, which declare what they read.
 
     Raises:
-        ConfigError: something recorded can't be had in the formulation or the scene.
+        ConfigError: the formulation or the scene can't provide something that is to be recorded.
     """
     asked = scene.config.integrator.formulation
     record = scene.config.output.record
@@ -109,7 +109,7 @@ def choose_requirements(scene: Scene, loads: Sequence[Load] = ()) -> Requirement
 def _attitude(
     scene: Scene, asked: str, record: list[str] | None, readers: list[str]
 ) -> tuple[str, str | None]:
-    """The formulation, and why an attitude is carried; None where it isn't."""
+    """The formulation, and why an attitude is carried (None if it isn't)."""
     recorded = [name for name in record or () if _takes(scene, name, "attitude")]
     if asked == "rates":
         return asked, None
@@ -129,7 +129,7 @@ def _read_by(readers: list[str]) -> str:
 
 
 def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str | None:
-    """Why position and velocity are carried; None where they aren't."""
+    """Why position and velocity are carried; None if they aren't."""
     recorded = [name for name in record or () if _takes(scene, name, "flight")]
     if recorded:
         return f"{', '.join(recorded)} is recorded"
@@ -155,7 +155,7 @@ def _why_rates(record: list[str] | None) -> str:
 
 
 def _takes(scene: Scene, name: str, states: str) -> bool:
-    """Whether recording an observable takes these states."""
+    """Whether recording an observable requires these states."""
     return any(NEEDS[need].states(scene) == states for need in OBSERVABLES[name].needs)
 
 

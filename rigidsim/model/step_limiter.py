@@ -1,4 +1,4 @@
-"""A state that makes the step control see pulses and switches ahead.
+"""A state that makes step control see pulses and switches in advance.
 
 heyoka chooses a step from the last Taylor coefficients of the states, and those of a pulse that is flat far
 from its middle vanish: the step would pass over it. Beside the motion the system therefore carries
@@ -7,7 +7,7 @@ from its middle vanish: the step would pass over it. Beside the motion the syste
 
 over the arguments u around whose zeros something happens, such as (t - t0) / width. This function is flat
 nowhere, and its series converge as far as its poles, which lie B widths from the pulse's middle: steps
-shorten in proportion to the distance, and the cost of a pulse grows with the logarithm of its width alone.
+shorten in proportion to the distance, and the cost of a pulse grows only as the logarithm of its width.
 (A pulse of width 1e-4 s in a run of 100 s: 143 steps, where steps capped by the width would be a million.)
 With B = 4 a function of u is seen on its own account by then, so a wide one costs hardly a step.
 
@@ -32,7 +32,7 @@ _CLOCK = "t_of_pace"  # stands in for the time, by which heyoka doesn't differen
 
 
 def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
-    """(of what, argument) of all loads and events."""
+    """(description, argument) for all loads and events."""
     found = [(load.title, u) for load in m.loads for u in load.narrow(m)]
     for event in m.scene.events:
         names = state_names(m, event.reads)
@@ -44,19 +44,19 @@ def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
 
 
 def roots(m: Mechanics) -> list[tuple[str, Symbolic]]:
-    """(of what, what a root is taken of) of all loads."""
+    """(description, radicand) for the roots of all loads."""
     return [(load.title, v) for load in m.loads for v in load.roots(m)]
 
 
 def pace_derivative(
     found: Sequence[Symbolic], under_roots: Sequence[Symbolic], derivatives: Mapping[str, Symbolic]
 ) -> Symbolic:
-    """The state's right-hand side.
+    """Right-hand side of the pace state.
 
     Args:
         found: arguments, dimensionless.
-        under_roots: what roots are taken of.
-        derivatives: of the states that they read.
+        under_roots: radicands.
+        derivatives: right-hand sides of the states that they read.
     """
     terms = [0.5 * (along_the_motion(v, derivatives) / v) for v in under_roots]
     for u in found:
@@ -73,7 +73,7 @@ def along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbol
 
 
 def slopes(u: Symbolic) -> tuple[list[Symbolic], dict[str, Symbolic]]:
-    """Partial derivatives of an expression: by time, where it depends on it, and by states."""
+    """Partial derivatives of an expression: by time, if it depends on it, and by states."""
     clock = hy.make_vars(_CLOCK)
     plain = hy.subs(u, {hy.time: clock})
     found = {

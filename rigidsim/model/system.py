@@ -44,13 +44,13 @@ class Crossing:
 class System:
     """First-order equations with scaled states, and everything recorded as expressions of them.
 
-    Each part is worked out when it is first asked for, and once: a projection reads the invariants alone,
-    coefficients in two parts change the equations alone, and a partner chart is built where it is entered.
+    Each part is worked out once, when it is first needed: a projection reads the invariants alone,
+    two-part coefficients change the equations alone, and a partner chart is built when it is entered.
 
     Attributes:
-        plan: what was decided before anything was rounded.
-        number: from an mpf to the working precision's scalar, rounded once.
-        sequence: of the Euler angles that are states, or that are recorded.
+        plan: decisions made before anything was rounded.
+        number: rounds an mpf once to the working precision's scalar.
+        sequence: sequence of the Euler angles that are states, or that are recorded.
     """
 
     def __init__(
@@ -74,8 +74,10 @@ class System:
         return System(self.plan, number, sequence=self._asked_sequence)
 
     def with_coefficients(self, coefficients: Rounder) -> System:
-        """The same system with the coefficients of its equations rounded otherwise, say in two parts."""
-        other = copy.copy(self)  # with all that is worked out already, but what the coefficients change
+        """The same system with the coefficients of its equations rounded differently, for instance in two
+        parts.
+        """
+        other = copy.copy(self)  # keeps everything already worked out except what the coefficients change
         other._coefficients = coefficients
         other.__dict__.pop("equations", None)
         if other.__dict__.get("partner") is not None:
@@ -84,10 +86,11 @@ class System:
 
     @cached_property
     def partner(self) -> System | None:
-        """The same in the chart that a run changes to near the singularity: the same states but the angles.
+        """The same system in the chart that a run changes to near the singularity; None without a chart.
 
-        Its recorded Euler angles are those of this system's sequence, on the branch that the parameter after
-        the invariants' gives (see ``rigidsim.model.euler_charts``). None without a chart.
+        Its states are the same but for the angles. Its recorded Euler angles are those of this system's
+        sequence, on
+        the branch given by the parameter after the invariants' (see ``rigidsim.model.euler_charts``).
         """
         if self.requirements.formulation != "euler_angles" or self._asked_sequence is not None:
             return None
@@ -98,7 +101,7 @@ class System:
 
     @property
     def scene(self) -> Scene:
-        """With the loads that were given from Python among its own."""
+        """The scene, including loads given from Python."""
         return self.plan.scene
 
     @property
@@ -117,12 +120,12 @@ class System:
         return self.plan.wide
 
     def series_tolerance(self, tolerance: float) -> float:
-        """What the engine is given for a tolerance: it says which order the series have."""
+        """Tolerance handed to the engine, which determines the order of the Taylor series."""
         return even_order(tolerance)[0] if self.plan.paired else tolerance
 
     @cached_property
     def rate_bound(self) -> Any:
-        """Upper bound of the absolute angular velocity, rad/s (mpf); of the momentum's turning where
+        """Upper bound (mpf, rad/s) of the absolute angular velocity; of the momentum's turning rate if
         rotations are averaged over.
         """
         if self.plan.average is not None:
@@ -137,7 +140,7 @@ class System:
 
     @property
     def mechanics(self) -> Mechanics:
-        """The quantities that outputs and invariants are written in."""
+        """The quantities in terms of which outputs and invariants are written."""
         return self._assembled[0]
 
     @property
@@ -151,12 +154,12 @@ class System:
 
     @property
     def states(self) -> list[str]:
-        """Their names."""
+        """Names of the states."""
         return list(self._joined.names)
 
     @property
     def initial(self) -> list[Any]:
-        """mpf, in internal units."""
+        """Initial values (mpf), internal units."""
         return list(self._joined.initial)
 
     @property
@@ -178,7 +181,7 @@ class System:
 
     @property
     def reasons(self) -> list[tuple[str, str]]:
-        """(states, why) for each block, and the chart that is changed to."""
+        """(states, why) for each block, and for the chart that a run may change to."""
         found = [(_label(block), block.why) for block in self.blocks]
         if self.partner is not None:
             angles = " ".join(self.mechanics.carried(self.mechanics.attitude).names)
@@ -189,7 +192,7 @@ class System:
 
     @property
     def angle_states(self) -> tuple[int, ...]:
-        """Positions of states that are angles growing without bound."""
+        """Indices of states that are angles growing without bound."""
         attitude = self.mechanics.attitude
         if attitude is None:
             return ()
@@ -198,12 +201,12 @@ class System:
 
     @property
     def angle_unit(self) -> int:
-        """Binary exponent of the unit that those are carried in, rad."""
+        """Binary exponent of the unit in which growing angles are carried, rad."""
         return 0 if self.mechanics.attitude is None else self.mechanics.attitude.angle_unit
 
     @property
     def singular_factor(self) -> Symbolic | None:
-        """Expression that vanishes where the formulation breaks down, or None."""
+        """Expression that vanishes where the formulation is singular; None if it is regular everywhere."""
         attitude = self.mechanics.attitude
         return None if attitude is None else attitude.singular_factor
 
@@ -215,7 +218,7 @@ class System:
         drifts = drift_outputs(self.invariants, self.scene.context, self.number)
         attitude = self.mechanics.attitude
         if attitude is not None and self._asked_sequence is not None:
-            # in the partner chart the asked sequence's angles stand in the place of its own
+            # in the partner chart the angles of the requested sequence replace its own
             branch = hy.par[sum(len(invariant.expressions) for invariant in self.invariants)]
             angles = list(hy.make_vars(*attitude.names))
             for variable in recorded:
@@ -231,8 +234,8 @@ class System:
 
     @property
     def outputs(self) -> list[Symbolic]:
-        """Components of all recorded variables, then one drift per invariant, whose initial values are
-        ``par[..]`` in the order of the invariants' components.
+        """Components of all recorded variables, then one drift per invariant; initial values of the
+        invariants are ``par[..]`` in the order of their components.
         """
         return self._recorded[1]
 
@@ -243,29 +246,31 @@ class System:
 
     @cached_property
     def crossings(self) -> list[Crossing]:
-        """Events to be found along the way."""
+        """Events to be located along the motion."""
         return _crossings(self.mechanics)
 
     # --- what changes at given times ------------------------------------------------------------------------
 
     @cached_property
     def pieces(self) -> Pieces | None:
-        """Parameters and states that are set at given times, where steps end; None where there are none."""
+        """Tabulated parameters and states that are reset at given times, where steps must end; None without
+        tables.
+        """
         if not self.plan.tables:
             return None
         return Pieces(self.plan.tables, self.scaling.time, self.scene.start, self.number)
 
     @property
     def stepwise(self) -> bool:
-        """Whether its steps need care, so that it takes a stepper and not the bare engine to follow it."""
+        """Whether it needs a stepper rather than the bare engine, because something happens between steps."""
         return self.switches or self.pieces is not None
 
     # --- what it switches on --------------------------------------------------------------------------------
 
     @cached_property
     def surfaces(self) -> list[Symbolic]:
-        """The arguments whose zeros are switching surfaces; on which side the motion is, +1 or -1, says the
-        equations' parameter of the same number.
+        """Arguments whose zeros are switching surfaces; the parameter of the same number holds the side, +1
+        or -1.
         """
         m = self.mechanics
         return [
@@ -281,25 +286,27 @@ class System:
 
     @cached_property
     def turning(self) -> list[Symbolic]:
-        """Euler angles whose full turns are parameters, after the sides; here without them."""
+        """Euler angles whose full turns are parameters after the sides; the angles here are without those
+        turns.
+        """
         names = self.plan.surfaces.turning
         angles = dict(zip(ATTITUDE_NAMES[4:], plain_angles(self.mechanics), strict=True)) if names else {}
         return [angles[name] for name in names]
 
     @cached_property
     def signed(self) -> list[Symbolic]:
-        """The quaternion where its sign is the last parameter; here without it. Empty elsewhere."""
+        """The quaternion, without its sign, if that sign is the last parameter; empty otherwise."""
         m = self.mechanics
         return list(m.carried(m.attitude).quaternion) if carries_sign(m) else []
 
     @property
     def parameters(self) -> int:
-        """How many the equations and events may have."""
+        """Number of parameters that equations and events may use."""
         return len(self.surfaces) + len(self.turning) + bool(self.signed)
 
     @property
     def switches(self) -> bool:
-        """Whether there are any."""
+        """Whether there are any switching surfaces."""
         return self.parameters > 0
 
 
@@ -309,9 +316,9 @@ def build_system(
     """Build the least system that the scene needs.
 
     Args:
-        number: from an mpf to the working precision's scalar, rounded once.
-        extra_loads: beside those of the config.
-        scaling: where it is known (``plan_model``).
+        number: rounds an mpf once to the working precision's scalar.
+        extra_loads: loads besides those of the config.
+        scaling: if already known (see ``plan_model``).
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.

@@ -1,6 +1,6 @@
-"""A tangent vector carried along with a motion: how much a small displacement has grown.
+"""A tangent vector carried along with a motion: the growth of a small displacement.
 
-Its equations are the motion's variational ones (Benettin et al. 1980, Meccanica 15, 9; what is made of its
+Its equations are the variational ones (Benettin et al. 1980, Meccanica 15, 9; for the use of its
 length: ``rigidsim.solve.indicators``). It is carried 2**-900 of its size: step control is relative to the
 largest state, of which it is never a part, so that the motion takes the same steps with and without it. Where
 equations are compiled in compact mode (beyond double precision) no bit of the motion moves; elsewhere the
@@ -34,7 +34,7 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def own_names(m: Mechanics) -> list[str]:
-    """States of the body itself, as far as they are carried: rates, attitude or vertical, place and speed."""
+    """States of the body itself that are carried: rates, attitude or vertical, position and velocity."""
     names = list(m.attitude.names) if m.attitude is not None else []
     if m.attitude is not None and m.attitude.kind == "planar":
         return [*names, SPIN]
@@ -44,11 +44,11 @@ def own_names(m: Mechanics) -> list[str]:
 
 
 def moving_names(own: Iterable[str], reads: Mapping[str, set[str]]) -> set[str]:
-    """States whose offsets are offsets of the motion: the body's own, and those that act on it and feel it as
-    well (such as a load with a memory).
+    """States whose offsets are offsets of the motion: the body's own, and those coupled to it both ways (such
+    as a load with a memory).
 
     Args:
-        reads: of each state the names in its derivative.
+        reads: for each state, the names in its derivative.
     """
     own = set(own)
     acting = _reached(own, reads)
@@ -58,7 +58,7 @@ def moving_names(own: Iterable[str], reads: Mapping[str, set[str]]) -> set[str]:
 
 
 def _reached(start: set[str], ways: Mapping[str, set[str]]) -> set[str]:
-    """All names that ways lead to, in any number of steps."""
+    """All names reachable from the start in any number of steps."""
     found: set[str] = set()
     ahead = {name for name in start if name in ways}
     while ahead:
@@ -68,7 +68,7 @@ def _reached(start: set[str], ways: Mapping[str, set[str]]) -> set[str]:
 
 
 def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
-    """The tangent vector of a motion, whose states are those of the blocks before."""
+    """The tangent vector of a motion whose states are those of the preceding blocks."""
     whole = joined(before)
     variables = whole.variables
     own = own_names(m)
@@ -76,7 +76,8 @@ def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
         name: set(hy.get_variables(right)) for name, right in zip(whole.names, whole.derivatives, strict=True)
     }
     moving = moving_names(own, reads)
-    # what the offset doesn't reach is constant to it: an orbit's place, numbers that differ between members
+    # what the offset doesn't reach is constant for it: an orbit's position, numbers that differ between
+    # members
     places = [n for n, name in enumerate(whole.names) if name in moving]
     others = sorted({name for n in places for name in reads[whole.names[n]]} - moving)
     constants = {hy.make_vars(name): hy.par[n] for n, name in enumerate(others)}
@@ -117,7 +118,7 @@ def _weights(m: Mechanics, names: Sequence[str]) -> list[int]:
 
 
 def _direction(m: Mechanics, names: Sequence[str]) -> dict[str, object]:
-    """Where the vector points at the start: no special direction, always the same one. mpf."""
+    """Initial direction of the vector (mpf): no special one, and always the same."""
     context = m.scene.context
     parts = [math.copysign(0.5 + (n * _GOLDEN) % 1.0, (-1) ** n) for n in range(1, len(names) + 1)]
     length = math.sqrt(math.fsum(x * x for x in parts))
@@ -142,7 +143,7 @@ def _growth(m: Mechanics) -> list[Symbolic]:
 
 
 def _absent(m: Mechanics) -> str | None:
-    """Why a scene can't have a tangent vector."""
+    """Why a scene can't have a tangent vector; None if it can."""
     integrator = m.scene.config.integrator
     if m.attitude is not None and m.attitude.kind == "euler_angles":
         return f'formulation = "{integrator.formulation}" has singularities that the vector would feel'

@@ -1,6 +1,6 @@
-"""Coefficients in two parts: what the working precision can't hold of them is not lost.
+"""Coefficients in two parts, which keep the digits that the working precision can't hold.
 
-A coefficient rounded once is wrong to one side, and so are the motion's frequencies: its phase by some eps t.
+A coefficient rounded once has a fixed error, and so have the motion's frequencies: its phase errs by eps t.
 Where invariants are projected nothing else grows as fast, so there each product c x becomes hi x + lo x.
 
 ``hi`` has half the digits, not all: beside a product rounded to the last bit a part below half of that bit
@@ -21,11 +21,11 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class TwoPart:
-    """A constant that is written out in two parts wherever it multiplies an expression.
+    """A constant that is split into two parts wherever it multiplies an expression.
 
     Attributes:
         high, low: the parts.
-        single: the nearest scalar, for sums: these are rounded to either side each time anyway.
+        single: the nearest scalar, for sums, whose own rounding varies from time to time anyway.
     """
 
     high: Any
@@ -55,24 +55,26 @@ class TwoPart:
 
 
 def as_factor(constant: Any) -> Any:
-    """A constant that only ever multiplies: in two parts, or an expression (0 and 1 vanish from products)."""
+    """A constant that is only ever used as a factor: in two parts, or an expression (0 and 1 vanish from
+    products).
+    """
     return constant if isinstance(constant, TwoPart) else hy.expression(constant)
 
 
 def rounded(constant: Any) -> Any:
-    """A constant of any use, as one scalar."""
+    """A constant for any use, as one scalar."""
     return constant.single if isinstance(constant, TwoPart) else constant
 
 
 def in_two_parts(
     number: Callable[[Any], Any], exact: Callable[[Any], Any], bits: int, context: Any
 ) -> Callable[[Any], Any]:
-    """``number`` for coefficients in two parts; what it holds exactly stays a plain scalar.
+    """``number`` extended to two-part coefficients; a constant that it holds exactly stays a plain scalar.
 
     Args:
-        number: from an mpf to the working precision's scalar, rounded once.
-        exact: from such a scalar to the mpf of the same value.
-        bits: of the working precision.
+        number: rounds an mpf once to the working precision's scalar.
+        exact: converts such a scalar to the mpf of the same value.
+        bits: number of bits of the working precision.
         context: arithmetic with more than twice the working precision's digits.
     """
 

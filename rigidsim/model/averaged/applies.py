@@ -1,4 +1,4 @@
-"""Whether an average applies: what kinds of scenes have one, and which frequencies forbid it.
+"""Whether an average applies: the kinds of scenes that have one, and the frequencies that forbid it.
 
 Averaging over the rotation fails where a combination i g + j l + k n of the body's precession and wobble (see
 ``free_motion``) with a source's mean motion is slow enough for its angle to librate or to dwell. With the
@@ -24,23 +24,26 @@ from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.scene import Scene
 
 LIBRATION = 2.0
-"""Times the half-width of libration that a combination of frequencies must stay from zero: motions near the
-separatrix dwell, and the widths of neighbouring resonances add up."""
+"""Least distance of a frequency combination from zero, in half-widths of libration: motions near the
+separatrix dwell, and the widths of neighbouring resonances add up.
+"""
 AXIAL = 0.1
-"""Angle (rad) between momentum and the circled axis up to which the latter is said to point somewhere: its
-mean is along the momentum, and the whole angle is part of what averaging leaves out."""
+"""Angle (rad) between momentum and circled axis up to which that axis has a mean direction: it is along the
+momentum, and the whole angle is part of what averaging leaves out.
+"""
 SWING = 0.05
-"""Largest angle (rad) by which what is averaged away may swing the momentum or the figure axis: errors are of
-second order in it, so that a percent of the precession is the most that can be hoped for beyond."""
+"""Largest angle (rad) by which the terms averaged away may swing the momentum or the figure axis: errors are
+of second order in it, and beyond it a percent of the precession would be the best to hope for.
+"""
 _ASKS = re.compile(": (leave it out|set it to false|remove them)$")
 _WEAK = 1e-7  # of the largest harmonic
 
 
 def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
-    """Look whether a scene is of the kind that has averages.
+    """Refuse a scene that is of no kind that has averages.
 
     Raises:
-        ConfigError: with what stands against it.
+        ConfigError: no average applies; says why.
     """
     config, level = scene.config, scene.config.model.level
     integrator = config.integrator
@@ -79,13 +82,13 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
 
 
 def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source]) -> Resonance | None:
-    """Look whether the motion's frequencies are far enough apart.
+    """Refuse a motion whose frequencies aren't far enough apart.
 
     Returns:
-        The resonance of spin and orbit that an average over the orbits can keep; None without one.
+        The spin-orbit resonance that an average over the orbits can keep; None without one.
 
     Raises:
-        ConfigError: names a resonance that it can't, or what is too fast.
+        ConfigError: names a resonance that no average can keep, or what is too fast.
     """
     found = [_refuse_resonance(scene, spectrum, source) for source in sources]
     kept = [resonance for resonance in found if resonance is not None]
@@ -107,7 +110,7 @@ def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[S
 
 
 def separatrix_refused(level: str) -> ConfigError:
-    """For a body about its intermediate axis."""
+    """The error for a body that turns about its intermediate axis."""
     return _refused(
         level,
         "the body turns about its intermediate axis, where its wobble takes forever and nothing averages",
@@ -115,7 +118,7 @@ def separatrix_refused(level: str) -> ConfigError:
 
 
 def swing_of(spectrum: BodySpectrum, source: Source) -> float:
-    """By how much what averaging over the rotation leaves out swings the momentum, rad."""
+    """Angle (rad) by which the terms removed by averaging over the rotation swing the momentum."""
     sizes = np.where(spectrum.oscillating, np.abs(spectrum.harmonics), 0.0)
     rates = np.where(spectrum.oscillating, np.abs(spectrum.frequencies), 1.0)
     strongest = float(source.strength) * source.nearest
@@ -123,7 +126,7 @@ def swing_of(spectrum: BodySpectrum, source: Source) -> float:
 
 
 def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance | None:
-    """The one that can be kept, where there is no other."""
+    """Refuse resonances; return the one that can be kept, if it is the only one."""
     found = np.flatnonzero(spectrum.oscillating.ravel())
     if not len(found):
         return None
@@ -172,8 +175,8 @@ def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> R
 
 
 def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance | None:
-    """The nearest resonance of the spin with a source on a Kepler orbit, of a body that turns about its axis
-    of largest moment.
+    """Nearest spin-orbit resonance with a source on a Kepler orbit, for a body that turns about its axis of
+    largest moment; None for any other.
     """
     motion = spectrum.motion
     least, middle, most = motion.moments
@@ -185,7 +188,9 @@ def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance 
 
 
 def _combination(spectrum: BodySpectrum, orders: tuple[int, int, int], body: float) -> str:
-    """Of frequencies, such as "2 g - 2 l - 3 n"; for a symmetric body g alone turns its tensor."""
+    """A combination of frequencies as text, such as "2 g - 2 l - 3 n"; in a symmetric body g alone turns the
+    tensor.
+    """
     i, j, k = orders
     signed = -k if body > 0 else k
     terms = [(i, "g"), (j, "l"), (signed, "n")]
@@ -194,7 +199,9 @@ def _combination(spectrum: BodySpectrum, orders: tuple[int, int, int], body: flo
 
 
 def _refuse_forced(scene: Scene, spectrum: BodySpectrum, source: Source) -> None:
-    """The figure axis follows the momentum only if the torque changes slowly beside the free motion."""
+    """Refuse a torque that changes too fast, beside the free motion, for the figure axis to follow the
+    momentum.
+    """
     motion, orbit = spectrum.motion, source.harmonics
     k = np.arange(len(orbit))
     g = spectrum.rates[0]

@@ -1,9 +1,9 @@
-"""An averaged motion: what it averages over, its constants, and where it starts.
+"""An averaged motion: what it averages over, its constants, and its start.
 
-The start of the full motion is a point of a nodding, wobbling curve, and the averaged one starts on the
-curve's middle: what averaging leaves out is taken from it, to first order. Otherwise an offset of the
-nutation's size would stay, and change the rate of precession with it (the osculating and mean elements of
-Kinoshita 1977).
+The full motion starts at a point of a nodding, wobbling curve, and the averaged one on the middle of that
+curve: the terms removed by averaging are subtracted to first order. Otherwise an offset of the nutation's
+size would remain, and change the rate of precession with it (the osculating and mean elements of Kinoshita
+1977).
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
-_ROUNDS = 4  # each gains a factor of the nutation's size
+_ROUNDS = 4  # iterations; each gains a factor of the nutation's size
 
 DIRECTION = ["sx", "sy", "sz"]
-"""States: the momentum's direction, space axes; its mean where nothing is added back."""
+"""States: direction of the momentum, space axes; its mean if nothing is added back."""
 TOLD = (
     "angular_momentum",
     "angular_momentum_norm",
@@ -50,7 +50,7 @@ TOLD = (
     "obliquity",
     "node_longitude",
 )
-"""Observables that an averaged motion has."""
+"""Observables that an averaged motion can provide."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,13 @@ class Average:
     Attributes:
         level: "spin_averaged" or "orbit_averaged".
         short_period: whether what averaging removed is added back.
-        start: direction of the momentum that it starts with, unit, space axes.
-        energy: of the free rotation, J.
-        swing: angle (rad) by which what averaging over the rotation leaves out swings the momentum.
-        figure: +1 or -1 where the figure axis is the circled one or its opposite and stays near the momentum,
+        start: initial direction of the momentum, unit vector, space axes.
+        energy: energy of the free rotation, J.
+        swing: angle (rad) by which the terms removed by averaging over the rotation swing the momentum.
+        figure: +1 or -1 if the figure axis is the circled one or its opposite and stays near the momentum,
             0 elsewhere.
-        resonance: of spin and orbit, whose angle is kept; None without one.
-        slow: where that motion starts.
+        resonance: spin-orbit resonance whose angle is kept; None without one.
+        slow: start of the resonant motion; None without a resonance.
     """
 
     level: str
@@ -87,28 +87,30 @@ class Average:
 
     @property
     def longitude(self) -> Carried:
-        """What of the place on an orbit by a table it takes."""
+        """Which longitude along a tabulated orbit the average needs."""
         if not self.over_orbits:
             return Carried.ECCENTRIC
         return Carried.MEAN if self.short_period else Carried.NEITHER
 
     def slow_states(self, exponent: int) -> Vector | None:
-        """Of a resonant average at its start; None of others.
+        """Initial slow states of a resonant average; None without a resonance.
 
         Args:
-            exponent: binary, of the internal unit of angular momentum.
+            exponent: binary exponent of the internal unit of angular momentum.
         """
         if self.resonance is None or self.slow is None:
             return None
         return [*self.slow.quaternion, self.resonance.context.ldexp(self.slow.excess, -exponent)]
 
     def rate(self, source: Source) -> Any:
-        """3 (G M / a^3) excess / L (mpf, 1/s): see ``rigidsim.model.averaged.orbit_terms``."""
+        """Precession constant k = 3 (G M / a^3) excess / L (mpf, 1/s) of a source; see
+        ``rigidsim.model.averaged.orbit_terms``.
+        """
         return source.strength * self.motion.excess / self.motion.momentum
 
     @property
     def rate_bound(self) -> Any:
-        """Of the momentum's turning, rad/s (mpf)."""
+        """Bound of the rate at which the momentum turns, rad/s (mpf)."""
         found = sum(abs(self.rate(source)) * source.nearest for source in self.sources)
         if self.resonance is not None:
             assert self.slow is not None
@@ -117,8 +119,8 @@ class Average:
         return found
 
     def shear(self, context: Any, time: Any) -> Any:
-        """By how much an angle across the precession changes the rate along it, 1/s (mpf), at the start
-        ``time``: of k/2 (1 - e^2)^(-3/2) |n x s|^2 summed over the sources.
+        """Change of the precession rate per radian of tilt across it (mpf, 1/s), at the start ``time``: the
+        sum of k/2 (1 - e^2)^(-3/2) |n x s|^2 over the sources.
         """
         total = context.zero
         for source in self.sources:
@@ -209,7 +211,7 @@ def _figure(scene: Scene, motion: FreeMotion) -> int:
 def _left_out_at_start(
     scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source], direction: Vector
 ) -> np.ndarray:
-    """What averaging over the rotation leaves out of the momentum at the start, kg m^2/s, space axes."""
+    """Part of the initial momentum that averaging over the rotation removes, kg m^2/s, space axes."""
     space = _frame(np.array([float(x) for x in direction]))
     body = np.array([[float(x) for x in row] for row in attitude.rotation_matrix(scene.quaternion)])
     principal = np.array([[float(x) for x in axis] for axis in spectrum.motion.axes]).T
@@ -221,7 +223,7 @@ def _left_out_at_start(
         pull = source.pull(scene.context, scene.start)
         if pull is not None:
             product = float(source.strength) * pull @ integral
-            # r x (I r) summed over a, b of r_a r_b e_a x I e_b
+            # r x (I r) is the sum over a, b of r_a r_b e_a x I e_b
             total += [
                 product[1, 2] - product[2, 1],
                 product[2, 0] - product[0, 2],
@@ -231,7 +233,7 @@ def _left_out_at_start(
 
 
 def _frame(z: np.ndarray) -> np.ndarray:
-    """Rows: right-handed axes with z last."""
+    """Right-handed orthonormal axes as rows, z last."""
     z = z / np.linalg.norm(z)
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
     x /= np.linalg.norm(x)
@@ -239,10 +241,10 @@ def _frame(z: np.ndarray) -> np.ndarray:
 
 
 def osculating(scene: Scene, average: Average, mean: Sequence[Any], time: Any) -> Vector:
-    """The momentum's direction with the nutation of the orbits' periods, unit (mpf).
+    """Unit direction (mpf) of the momentum including the nutation with the orbits' periods.
 
     Args:
-        mean: as the averaged motion carries it.
+        mean: direction that the averaged motion carries.
         time: seconds (mpf).
     """
     context = scene.context
@@ -258,7 +260,7 @@ def osculating(scene: Scene, average: Average, mean: Sequence[Any], time: Any) -
 
 
 def _mean_over_orbits(scene: Scene, average: Average) -> Vector:
-    """The mean direction s of which s + nutation(s) is the start."""
+    """Mean direction s for which s + nutation(s) is the start."""
     context, start = scene.context, average.start
     mean = start
     for _ in range(_ROUNDS):

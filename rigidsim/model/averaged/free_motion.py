@@ -1,7 +1,7 @@
-"""The free rotation that a torque is averaged over: its mean inertia tensor and its two frequencies.
+"""Free rotation over which torques are averaged: its mean inertia tensor and its two frequencies.
 
-A free body's angular momentum L rests in space while the body turns about it: one of its principal axes, the
-one that L circles in the body, precesses about L with the mean rate g and nods with the polhode's period
+A free body's angular momentum L is fixed in space while the body turns about it. One of its principal axes,
+the one that L circles in the body, precesses about L at the mean rate g and nods with the polhode's period
 2 pi / l. With I3 the moment of that axis, I2 the intermediate moment and I1 the remaining one,
 
     m = L / |L| = (M1 cn u, M2 sn u, M3 dn u),  u = p (t - t0),  parameter k^2
@@ -25,7 +25,7 @@ from rigidsim.scene.records import dataclass
 
 
 class Separatrix(Exception):
-    """The body turns about its intermediate axis, or on the way from and to it."""
+    """Raised if the body turns about its intermediate axis, or on the separatrix through it."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class FreeMotion:
     """A free rotation; numbers are mpf, SI.
 
     Attributes:
-        momentum: size of the angular momentum.
+        momentum: size of the angular momentum, kg m^2/s.
         moments: I1, I2, I3 as above.
-        axes: their axes, unit, body axes, right-handed, with a positive part of L along the third.
+        axes: the axes of these moments: unit, right-handed, body axes, with L . third positive.
         parameter: k^2; 0 for a symmetric body, and for a rotation about a principal axis.
-        squares: means of the squared parts of m along the axes.
+        squares: means of the squared components of m along the axes.
         amplitudes: |M1|, |M2|, |M3|.
-        precession_rate, wobble_rate: g and l, rad/s; l is 0 where the tensor doesn't show it.
+        precession_rate, wobble_rate: g and l, rad/s; l is 0 if the tensor doesn't depend on its angle.
     """
 
     momentum: Any
@@ -53,12 +53,14 @@ class FreeMotion:
 
     @property
     def symmetric(self) -> bool:
-        """Whether the first two moments are the same."""
+        """Whether the first two moments are equal."""
         return bool(self.wobble_rate == 0)
 
     @property
     def excess(self) -> Any:
-        """(3 <m . I m> - tr I) / 2, which stands for C - A of an axisymmetric body in principal rotation."""
+        """(3 <m . I m> - tr I) / 2, which takes the place of C - A of an axisymmetric body in principal
+        rotation.
+        """
         mean = dot(self.moments, self.squares)
         return (3 * mean - sum(self.moments[1:], self.moments[0])) / 2
 
@@ -69,11 +71,13 @@ class FreeMotion:
 
     @property
     def transverse(self) -> Any:
-        """The moment that says how far the third axis stands from L under a steady torque N: that times
-        (s x N) / L^2 (see ``offset``), for rotations near that axis.
+        """Moment that sets how far the third axis stands off from L under a steady torque N.
 
-        A for a symmetric body; else from I1 w1' = (I2 - I3) w2 w3 + N1 and so on with a torque that turns
-        backwards in the body, averaged over the turn.
+        The offset is that moment times (s x N) / L^2 (see ``offset``), for rotations near that axis. The
+        moment is A
+        for a symmetric body; otherwise it follows from I1 w1' = (I2 - I3) w2 w3 + N1 and so on, with a torque
+        that
+        turns backwards in the body, averaged over the turn.
         """
         a, b, c = self.moments
         if a == b:
@@ -86,10 +90,10 @@ def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = Non
 
     Args:
         momentum: angular momentum, body axes (mpf); not zero.
-        size: of the momentum where it is to be another one, in the same direction in the body.
+        size: another size of the momentum, in the same direction in the body; None keeps its own.
 
     Raises:
-        Separatrix: neither of the axes of extreme moment is circled by L.
+        Separatrix: L circles neither axis of extreme moment.
     """
     tiny = negligible(context)
     length = context.sqrt(dot(momentum, momentum))
@@ -142,7 +146,7 @@ def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tu
         picked = (1, 2, 0)
     else:
         along = [dot(axis, momentum) / length for axis in axes]
-        # L^2 - 2 E I2, whose sign says which axis is circled
+        # the sign of L^2 - 2 E I2 tells which axis is circled
         beyond = along[0] ** 2 * (1 - middle / least) + along[2] ** 2 * (1 - middle / most)
         if abs(beyond) <= negligible(context):
             raise Separatrix
@@ -172,7 +176,7 @@ def _symmetric(context: Any, moments: Vector, axes: Matrix, parts: Vector, size:
 
 
 def _means(context: Any, parameter: Any) -> tuple[Any, Any, Any, Any]:
-    """K, <cn^2>, <sn^2>, <dn^2>; (K - E) / k^2 loses as many digits as k^2 is small."""
+    """K, <cn^2>, <sn^2>, <dn^2>; with more digits inside, since (K - E) / k^2 loses some for small k^2."""
     before = context.prec
     try:
         if parameter != 0:

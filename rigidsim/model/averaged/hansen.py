@@ -1,4 +1,4 @@
-"""Hansen coefficients: what a harmonic of an orbit's mean anomaly has of the tide raised along it.
+"""Hansen coefficients: harmonics in the mean anomaly of the tide along a Kepler orbit.
 
     X_k^{-3,m}(e) = <(a/r)^3 exp i (m f - k M)> = (1/2 pi) integral of cos(m f - k M) / (1 - e cos E)^2 dE
 
@@ -36,7 +36,7 @@ def hansen(context: Any, eccentricity: Any, multiple: int, order: int) -> Any:
 
 
 def _sum(context: Any, e: Any, multiple: int, order: int, points: int, half: int) -> Any:
-    """Mean over equally spaced points, or over those in the middle between them."""
+    """Mean over equally spaced points, or over the midpoints between them."""
     root, total = context.sqrt(1 - e * e), context.zero
     for i in range(points):
         anomaly = 2 * context.pi * (2 * i + half) / (2 * points)

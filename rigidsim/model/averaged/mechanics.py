@@ -1,4 +1,4 @@
-"""What an averaged motion tells of a body: directions of its axes in space, and no rotation about them."""
+"""Mechanics of an averaged motion: directions of the body's axes in space, but no rotation about them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class AveragedMechanics(SourcesSeen):
-    """Mechanics of an averaged motion; ``rates`` are those at which the momentum turns, in space axes."""
+    """Mechanics of an averaged motion; ``rates`` is the rate at which the momentum turns, in space axes."""
 
     @property
     def turning_rate(self) -> Any:
@@ -39,19 +39,21 @@ class AveragedMechanics(SourcesSeen):
 
     @property
     def conserves_energy(self) -> bool:
-        """It is no question here: the energy of the free rotation is a constant."""
+        """Whether energy is conserved; the question doesn't arise, as the energy of the free rotation is a
+        constant.
+        """
         return False
 
     # --- equations ------------------------------------------------------------------------------------------
 
     @property
     def direction(self) -> list[Symbolic]:
-        """The states."""
+        """Direction of the momentum: the states themselves, space axes."""
         return list(hy.make_vars(*DIRECTION))
 
     @cached_property
     def derivatives(self) -> list[Symbolic]:
-        """Of the states, per internal unit of time."""
+        """Derivatives of the states, per internal unit of time."""
         s = self.direction
         if self.of.over_orbits:
             parts = [self._secular(source) for source in self.of.sources]
@@ -59,8 +61,8 @@ class AveragedMechanics(SourcesSeen):
         pull = self._pull(s)
         if self.of.figure == 0:
             return cross(pull, s)
-        # the torque acts on the circled axis, which stands off from the momentum by d = -a s x s': to second
-        # order that is (G - a G^2 + 2 a (s . G s) G) s x s for a pull G s
+        # the torque acts on the circled axis, which is offset from the momentum by d = -a s x s'; to second
+        # order this gives (G - a G^2 + 2 a (s . G s) G) s x s for a pull G s
         context = self.scene.context
         moment = self.of.motion.transverse / self.of.motion.momentum
         a = as_factor(self.number(context.ldexp(moment, -self.scaling.time)))
@@ -69,7 +71,9 @@ class AveragedMechanics(SourcesSeen):
         return cross(bent, s)
 
     def _secular(self, source: Source) -> list[Symbolic]:
-        """-(k/2) (1 - e^2)^(-3/2) (n . s) n and what second order adds, or the pull of a source at rest."""
+        """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n plus the second-order term, or the pull of a source
+        at rest.
+        """
         context, s = self.scene.context, self.direction
         if source.table is not None:
             unit = self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
@@ -84,7 +88,7 @@ class AveragedMechanics(SourcesSeen):
         return [factor * x + y for x, y in zip(normal, second, strict=True)]
 
     def _second_order(self, source: Source, normal: list[Symbolic], unit: Any) -> list[Symbolic]:
-        """grad K of ``rigidsim.model.averaged.orbit_terms``."""
+        """Second-order term grad K of ``rigidsim.model.averaged.orbit_terms``."""
         orbit, s = source.orbit, self.direction
         assert orbit is not None
         context = self.scene.context
@@ -103,7 +107,9 @@ class AveragedMechanics(SourcesSeen):
         return [g + more * ((x * x - y * y) * n + 2.0 * (z * (x * a - y * b))) for g, n, a, b in towards]
 
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
-        """The sum of k (a/r)^3 (s . r) r over the sources, per internal unit of time: s' is that times s."""
+        """Sum G s of k (a/r)^3 (s . r) r over the sources, per internal unit of time; s' is its cross product
+        with s.
+        """
         parts = [self._pull_of(source, s) for source in self.of.sources]
         return [hy.sum([part[i] for part in parts]) for i in range(3)]
 
@@ -122,7 +128,7 @@ class AveragedMechanics(SourcesSeen):
         return as_factor(self.number(self.of.rate(source) * context.ldexp(context.one, self.scaling.time)))
 
     def _pull_in_plane(self, source: Source, orbit: KeplerOrbit, s: list[Symbolic]) -> list[Symbolic]:
-        """The same in the orbit's plane, whose node may turn: fewer products."""
+        """The same pull from components in the orbit's plane, whose node may turn, with fewer products."""
         tilt_c, tilt_s = self._turned(orbit.inclination, 0)
         node_c, node_s = self._turned(orbit.ascending_node, orbit.node_rate)
         first = node_c * s[0] + node_s * s[1]
@@ -137,7 +143,7 @@ class AveragedMechanics(SourcesSeen):
         return [node_c * along - node_s * level, node_s * along + node_c * level, tilt_s * up]
 
     def _offset(self, s: list[Symbolic], turning: list[Symbolic]) -> list[Symbolic]:
-        """Of the circled axis from the momentum; ``turning`` per internal unit of time."""
+        """Offset of the circled axis from the momentum, rad; ``turning`` is s' per internal unit of time."""
         context = self.scene.context
         moment = self.of.motion.transverse / self.of.motion.momentum
         factor = as_factor(self.number(context.ldexp(-moment, -self.scaling.time)))
@@ -147,7 +153,7 @@ class AveragedMechanics(SourcesSeen):
 
     @cached_property
     def _axes(self) -> tuple[list[Symbolic], list[Symbolic], list[Symbolic]]:
-        """Directions of momentum, figure and spin axis, about of unit length, space axes."""
+        """Directions of momentum, figure and spin axis, of unit length to first order, space axes."""
         mean = self.direction
         lost = [hy.expression(float("nan"))] * 3
         momentum, sign = mean, self.of.figure
@@ -169,7 +175,7 @@ class AveragedMechanics(SourcesSeen):
         return momentum, figure, spin
 
     def _nutation(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
-        """With the period of a source's orbit, rad."""
+        """Nutation with the period of a source's orbit, rad."""
         context, rate = self.scene.context, self.of.rate(source)
         if source.table is not None:
             unit = context.ldexp(context.one, self.scaling.time)
@@ -188,14 +194,14 @@ class AveragedMechanics(SourcesSeen):
 
     @cached_property
     def momentum_body(self) -> list[Symbolic]:
-        """As ``momentum_space`` without what is added back, of which nothing but the size is told."""
+        """Angular momentum without the terms added back; only its size is recorded."""
         context = self.scene.context
         size = self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
         return [size * x for x in self.direction]
 
     @property
     def figure_space(self) -> list[Symbolic]:
-        """See ``Mechanics``; NaN where the figure axis points nowhere on average."""
+        """See ``Mechanics``; NaN if the figure axis has no mean direction."""
         return self._axes[1]
 
     @property
@@ -205,12 +211,12 @@ class AveragedMechanics(SourcesSeen):
 
     @cached_property
     def rates(self) -> list[Symbolic]:
-        """At which the momentum turns, space axes."""
+        """Angular velocity at which the momentum turns, space axes."""
         return self.derivatives
 
     @cached_property
     def rotational_energy(self) -> Symbolic:
-        """Of the free rotation: a constant."""
+        """Energy of the free rotation, a constant."""
         context = self.scene.context
         return hy.expression(self.number(context.ldexp(self.of.energy, -self.scaling.energy)))
 
@@ -218,20 +224,20 @@ class AveragedMechanics(SourcesSeen):
 
     @cached_property
     def torque(self) -> list[Term]:
-        """None that body axes would tell."""
+        """Empty: an averaged motion has no torque along body axes."""
         return []
 
     @cached_property
     def turning(self) -> list[Load]:
-        """All of them."""
+        """All loads."""
         return list(self.loads)
 
     @cached_property
     def potential_energy(self) -> Symbolic | None:
-        """None is told."""
+        """None: an averaged motion doesn't record potential energy."""
         return None
 
     @cached_property
     def power(self) -> Symbolic | None:
-        """On average there is none."""
+        """None: the mean power is zero."""
         return None

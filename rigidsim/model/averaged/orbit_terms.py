@@ -1,4 +1,4 @@
-"""The torque of a source averaged over its Kepler orbit, and what that leaves out to first order.
+"""The torque of a source averaged over its Kepler orbit, and the terms removed, to first order.
 
 With k = 3 (G M / a^3) (excess / L) the direction s of the momentum changes as
 
@@ -44,7 +44,7 @@ _POINTS = 4096
 
 
 class Functions(Protocol):
-    """Of numbers, or of expressions."""
+    """Elementary functions of numbers or of expressions."""
 
     def cos(self, x: Any) -> Any:
         """Cosine."""
@@ -53,16 +53,16 @@ class Functions(Protocol):
         """Sine."""
 
     def atan2(self, y: Any, x: Any) -> Any:
-        """Angle of a point."""
+        """Angle of the point (x, y)."""
 
 
 @dataclass(frozen=True)
 class OrbitPlace:
-    """Where a source is on its orbit, as numbers or expressions.
+    """Position of a source on its orbit, as numbers or expressions.
 
     Attributes:
-        cosine, sine: of the eccentric anomaly.
-        pericentre, across: P and T.
+        cosine, sine: cosine and sine of the eccentric anomaly.
+        pericentre, across: unit vectors P and T.
     """
 
     cosine: Any
@@ -73,7 +73,7 @@ class OrbitPlace:
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Shape and pace of an orbit, as numbers (mpf) or expressions.
+    """Shape and mean motion of an orbit, as numbers (mpf) or expressions.
 
     Attributes:
         square: e^2.
@@ -90,18 +90,18 @@ class Ellipse:
 
     @classmethod
     def of(cls, context: Any, orbit: KeplerOrbit) -> Ellipse:
-        """Of constant elements (mpf, rad/s)."""
+        """The ellipse of an orbit with constant elements (mpf, rad/s)."""
         e = orbit.eccentricity
         return cls(e, e * e, context.sqrt(1 - e * e), orbit.mean_motion, orbit.circular)
 
     @property
     def secular_factor(self) -> Any:
-        """(1 - e^2)^(-3/2) / 2."""
+        """Factor (1 - e^2)^(-3/2) / 2 of the secular torque."""
         return 1 / (2 * (1 - self.square) * self.root)
 
     @property
     def across(self) -> Any:
-        """-n c1."""
+        """-n c1, the second-order coefficient of the module's formula."""
         rest = 1 - self.square
         return (0.25 + self.square / 6) / (rest * rest * rest)
 
@@ -123,17 +123,17 @@ def second_order(eccentricity: float) -> tuple[float, float]:
 def nutation(
     functions: Functions, ellipse: Ellipse, place: OrbitPlace, size: Any, s: Vector, number: Any
 ) -> Vector:
-    """k (J s) x s.
+    """Nutation k (J s) x s.
 
     Args:
         size: k / (2 n) (1 - e^2)^(-3/2).
-        number: from what the ellipse is given in to the factor that it is to be.
+        number: converts the ellipse's values to factors.
     """
     e, root = ellipse.eccentricity, ellipse.root
     b = e / (1 + root)
     mean = -_cosines(lambda k: (-b) ** k * (1 + k * root), e)
     c, sn = place.cosine, place.sine
-    # true less eccentric anomaly, and the true one itself
+    # the true minus the eccentric anomaly, then the true anomaly
     ahead = 0 if ellipse.circular else 2 * functions.atan2(number(b) * sn, 1 - number(b) * c)
     inverse = 1 if ellipse.circular else 1 / (1 - number(e) * c)
     cf = c if ellipse.circular else (c - number(e)) * inverse
@@ -174,15 +174,15 @@ def plane_vectors(
 
 
 def equinoctial_axes(q: Any, p: Any, chi: Any) -> tuple[Vector, Vector]:
-    """Unit vectors in an orbit's plane that longitudes count from, and across, from its elements (see
-    ``rigidsim.scene.orbit_tables.pieces``) and chi = sqrt(1 - p^2 - q^2).
+    """Unit vectors in the orbit's plane, from which longitudes count and across, from the elements q and p
+    (see ``rigidsim.scene.orbit_tables.pieces``) and chi = sqrt(1 - p^2 - q^2).
     """
     product = 2 * p * q
     return [1 - 2 * p * p, product, -2 * p * chi], [product, 1 - 2 * q * q, 2 * q * chi]
 
 
 def turned(axes: tuple[Vector, Vector], turn: tuple[Any, Any]) -> tuple[Vector, Vector]:
-    """Two unit vectors turned within their plane, by the cosine and sine of an angle."""
+    """Two unit vectors rotated within their plane by an angle given as cosine and sine."""
     (first, second), (c, s) = axes, turn
     along = [c * x + s * y for x, y in zip(first, second, strict=True)]
     return along, [c * y - s * x for x, y in zip(first, second, strict=True)]

@@ -1,4 +1,4 @@
-"""A body whose rotation keeps pace with its source: p turns to a revolution, 2 p = k a whole number.
+"""Spin-orbit resonance: p turns of the body to one revolution of its source, 2 p = k a whole number.
 
 The body turns about its axis of largest moment, which is along the angular momentum L s. Turned back by p
 times the mean anomaly M about s, its axes of least and middle moment, a and b, move slowly, and with P and T
@@ -8,7 +8,7 @@ the directions of the orbit's pericentre and across, averaged over M,
     h = X_0 (Pa^2 - Pb^2 + Ta^2 - Tb^2) / 2
         + X_2 ((Pa + Tb)^2 - (Pb - Ta)^2) / 4 + X_-2 ((Pa - Tb)^2 - (Pb + Ta)^2) / 4,
 
-Pa = P . a and so on, with Hansen's coefficients X_m = X_k^{-3,m}(e): all of the commensurable harmonic, at
+Pa = P . a and so on, with Hansen's coefficients X_m = X_k^{-3,m}(e): the whole commensurable harmonic, at
 any obliquity and eccentricity. For spin and orbit about the same axis h = X_2 cos 2 gamma, the potential of
 Goldreich & Peale 1966; with a moving node it has Colombo's top and Cassini's states (Colombo 1966; Peale
 1969, Astronomical Journal 74, 483) besides.
@@ -31,15 +31,15 @@ from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
-_POINTS = {True: 512, False: 8192}  # of a turn, by whether the eccentricity is below 0.6
+_POINTS = {True: 512, False: 8192}  # points per turn, by whether the eccentricity is below 0.6
 
 
 @dataclass(frozen=True)
 class SlowStart:
-    """Where a resonant average starts; mpf.
+    """Initial state of a resonant average; mpf.
 
     Attributes:
-        quaternion: of a, b, s against the space axes.
+        quaternion: attitude of the axes a, b, s, to space axes.
         excess: angular momentum beyond that of exactly p turns to a revolution, kg m^2/s.
     """
 
@@ -49,7 +49,7 @@ class SlowStart:
 
 @dataclass(frozen=True)
 class Resonance:
-    """Which it is.
+    """A spin-orbit resonance of a body with one of its sources.
 
     Attributes:
         multiple: k = 2 p.
@@ -62,47 +62,47 @@ class Resonance:
 
     @property
     def orbit(self) -> KeplerOrbit:
-        """Of the source."""
+        """The source's orbit."""
         assert self.source.orbit is not None
         return self.source.orbit
 
     @property
     def name(self) -> str:
-        """Such as "3:2": turns to revolutions."""
+        """Name of the resonance, turns to revolutions, such as "3:2"."""
         return f"{self.multiple}:2" if self.multiple % 2 else f"{self.multiple // 2}:1"
 
     @cached_property
     def coefficients(self) -> tuple[Any, Any, Any]:
-        """X_0, X_2, X_-2 (mpf)."""
+        """Hansen coefficients X_0, X_2, X_-2 (mpf)."""
         e = self.orbit.eccentricity
         zero, plus, minus = (hansen(self.context, e, self.multiple, m) for m in (0, 2, -2))
         return zero, plus, minus
 
     @cached_property
     def strength(self) -> Any:
-        """(3 G M / 2 a^3) (B - A) / 2, J (mpf)."""
+        """Strength (3 G M / 2 a^3) (B - A) / 2, J (mpf)."""
         least, middle, _ = self.motion.moments
         return self.source.strength * (middle - least) / 4
 
     @property
     def pace(self) -> Any:
-        """p n, rad/s (mpf)."""
+        """Rotation rate p n, rad/s (mpf)."""
         return self.multiple * self.orbit.mean_motion / 2
 
     @property
     def libration_rate(self) -> float:
-        """Of small librations in longitude where obliquity is small, rad/s: n sqrt(3 H (B - A) / C)."""
+        """Rate of small librations in longitude at small obliquity, n sqrt(3 H (B - A) / C), rad/s."""
         zero, plus, minus = (abs(float(x)) for x in self.coefficients)
         return math.sqrt(4 * float(self.strength) * max(zero, plus, minus) / float(self.motion.moments[2]))
 
     # --- between the full motion and the slow one ---------------------------------------------------------
 
     def anomaly(self, time: Any) -> Any:
-        """M, rad (mpf)."""
+        """Mean anomaly M, rad (mpf)."""
         return self.orbit.mean_anomaly + self.orbit.mean_motion * time
 
     def start(self, scene: Scene) -> SlowStart:
-        """The slow motion that a scene's start belongs to, without what goes round with the orbit."""
+        """The slow motion at the scene's start, without the terms that go round with the orbit."""
         context, body = scene.context, scene.body
         matrix = attitude.rotation_matrix(scene.quaternion)
         principal = multiply(matrix, transpose(self.motion.axes))
@@ -115,7 +115,7 @@ class Resonance:
         return self._slow(principal, momentum, scene.start)
 
     def osculating(self, slow: SlowStart, scene: Scene, time: Any) -> tuple[Vector, Vector]:
-        """Quaternion and angular velocity (body axes, rad/s) of the full motion at a time, seconds."""
+        """Quaternion and angular velocity (body axes, rad/s) of the full motion at a time in seconds."""
         context = self.context
         principal = attitude.rotation_matrix(slow.quaternion)
         axis = [row[2] for row in principal]
@@ -131,7 +131,9 @@ class Resonance:
         return attitude.unit_quaternion(context, attitude.quaternion_from_matrix(context, matrix)), velocity
 
     def _slow(self, principal: Matrix, momentum: Vector, time: Any) -> SlowStart:
-        """From the principal axes (columns, space axes), the third of which is brought to the momentum."""
+        """Slow state from the principal axes (columns, space axes) and the momentum, to which the third axis
+        is brought.
+        """
         context = self.context
         axis = [row[2] for row in principal]
         principal = multiply(_shortest(context, axis, momentum), principal)
@@ -142,8 +144,8 @@ class Resonance:
         return SlowStart(quaternion, excess)
 
     def _left_out(self, slow: SlowStart, time: Any) -> tuple[np.ndarray, float]:
-        """Of the momentum (space axes, kg m^2/s) and of the angle about it (rad): the integrals over time,
-        without their means, of the torque less its mean.
+        """Terms removed from the momentum (space axes, kg m^2/s) and from the angle about it (rad): the
+        integrals over time, without their means, of the torque less its mean.
         """
         e, n = float(self.orbit.eccentricity), float(self.orbit.mean_motion)
         count = _POINTS[e < 0.6]
@@ -178,13 +180,13 @@ class Resonance:
 
 
 def _about(context: Any, axis: Vector, angle: Any) -> Matrix:
-    """Rotation matrix (mpf)."""
+    """Rotation matrix (mpf) about a unit axis."""
     s = context.sin(angle / 2)
     return attitude.rotation_matrix([context.cos(angle / 2), *(s * x for x in axis)])
 
 
 def _shortest(context: Any, before: Vector, after: Vector) -> Matrix:
-    """The least rotation of one direction to another that isn't its opposite."""
+    """Smallest rotation of one direction to another, which must not be its opposite."""
     size = norm(context, before) * norm(context, after)
     quaternion = [size + dot(before, after), *cross(before, after)]
     return attitude.rotation_matrix(attitude.unit_quaternion(context, quaternion))

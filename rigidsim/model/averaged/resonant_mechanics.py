@@ -1,4 +1,4 @@
-"""The equations of a body that keeps pace with its source (see ``rigidsim.model.averaged.resonance``).
+"""Equations of a body in spin-orbit resonance (see ``rigidsim.model.averaged.resonance``).
 
 With N the torque of the averaged potential, in the frame of a, b, s, and l the momentum beyond p turns to a
 revolution, so that L = l + p n C,
@@ -28,13 +28,13 @@ from rigidsim.scene.arithmetic import cross, dot, transpose
 from rigidsim.scene.records import dataclass
 
 SLOW = ["rw", "rx", "ry", "rz", "excess"]
-"""States: the quaternion of a, b, s, and l."""
+"""States: the quaternion of the axes a, b, s, and l."""
 RESONANT_ANGLE = "resonant_angle"
 
 
 @dataclass(frozen=True)
 class ResonantMechanics(AveragedMechanics):
-    """Mechanics of an average that keeps a commensurable angle."""
+    """Mechanics of an average that keeps the resonant angle."""
 
     def tells(self, name: str) -> bool:
         """See ``Mechanics``."""
@@ -47,29 +47,29 @@ class ResonantMechanics(AveragedMechanics):
 
     @property
     def resonance(self) -> Resonance:
-        """Which it is."""
+        """The resonance that is kept."""
         return self.carried(self.of.resonance)
 
     @cached_property
     def slow_matrix(self) -> list[list[Symbolic]]:
-        """Columns a, b, s in space axes."""
+        """Rotation matrix whose columns are a, b, s in space axes."""
         return quaternion_matrix(list(hy.make_vars(*SLOW[:4])))
 
     @property
     def direction(self) -> list[Symbolic]:
-        """s."""
+        """Direction s of the momentum, space axes."""
         return [row[2] for row in self.slow_matrix]
 
     @cached_property
     def momentum_size(self) -> Symbolic:
-        """L, internal units."""
+        """Size L of the angular momentum, internal units."""
         context, motion = self.scene.context, self.of.motion
         whole = context.ldexp(self.resonance.pace * motion.moments[2], -self.scaling.momentum)
         return hy.make_vars(SLOW[4]) + self.number(whole)
 
     @cached_property
     def orbit_seen(self) -> tuple[list[Symbolic], list[Symbolic]]:
-        """P and T along a, b, s."""
+        """Unit vectors P and T of the source's orbit, components along a, b, s."""
         orbit = self.resonance.orbit
         vectors = plane_vectors(
             self._turned(orbit.inclination, 0),
@@ -88,7 +88,7 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def resonant_torque(self) -> list[Symbolic]:
-        """Along a, b, s, internal units of energy."""
+        """Torque of the commensurable harmonic along a, b, s, internal units of energy."""
         (pa, pb, ps), (ta, tb, ts) = self.orbit_seen
         context = self.scene.context
         zero, plus, minus = (as_factor(self.number(x)) for x in self.resonance.coefficients)
@@ -104,7 +104,7 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def slow_rates(self) -> list[Symbolic]:
-        """W, along a, b, s, per internal unit of time."""
+        """Angular velocity W of the axes a, b, s, along themselves, per internal unit of time."""
         context, motion = self.scene.context, self.of.motion
         torque, size = self.resonant_torque, self.momentum_size
         parts = [self._other(source) for source in self.of.sources]
@@ -118,7 +118,7 @@ class ResonantMechanics(AveragedMechanics):
         ]
 
     def _other(self, source: Source) -> list[Symbolic]:
-        """The pull that isn't commensurable; of the source that the body keeps pace with to first order."""
+        """Pull without the commensurable harmonic; to first order only for the resonant source."""
         if source is not self.resonance.source:
             return self._secular(source)
         context, normal = self.scene.context, self.orbit(self.resonance.orbit).normal
@@ -129,13 +129,13 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def slow_derivatives(self) -> list[Symbolic]:
-        """Of the states."""
+        """Derivatives of the slow states."""
         turning = quaternion_kinematics(list(hy.make_vars(*SLOW[:4])), self.slow_rates)
         return [*turning, self.resonant_torque[2]]
 
     @cached_property
     def derivatives(self) -> list[Symbolic]:
-        """Of the momentum's direction, per internal unit of time."""
+        """Derivative of the momentum's direction, per internal unit of time."""
         p, q, _ = self.slow_rates
         return apply(self.slow_matrix, [q, -p, hy.expression(0.0)])
 
@@ -146,12 +146,12 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def momentum_body(self) -> list[Symbolic]:
-        """As ``momentum_space``."""
+        """The same as ``momentum_space``; only its size is recorded."""
         return self.momentum_space
 
     @cached_property
     def rotational_energy(self) -> Symbolic:
-        """L^2 / (2 C)."""
+        """Rotational energy L^2 / (2 C)."""
         context = self.scene.context
         twice: Any = 2 * context.ldexp(self.of.motion.moments[2], -self.scaling.inertia)
         return as_factor(self.number(1 / twice)) * (self.momentum_size * self.momentum_size)

@@ -1,4 +1,4 @@
-"""The sources of an averaged torque: on Kepler orbits, by a table, at fixed places, or of an ephemeris."""
+"""Sources of averaged torques: on Kepler or tabulated orbits, at fixed positions, or from an ephemeris."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from rigidsim.scene.scene import Scene
 
 _DAY = 86400.0
 _SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
-"""Sidereal period (days) and eccentricity, by which averages over the Earth's spin are judged."""
+"""Sidereal period (days) and eccentricity, used to judge whether averages over the Earth's spin apply."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """One of them.
+    """The source of one gravity gradient.
 
     Attributes:
-        number: of its ``[[loads]]``, from 1.
-        of: where it is.
-        strength: 3 G M / a^3 (mpf, 1/s^2), a being the semi-major axis, the distance, or the mean one.
+        number: position of its ``[[loads]]`` table, from 1.
+        of: its orbit, table, position or ephemeris.
+        strength: 3 G M / a^3 (mpf, 1/s^2), a being the semi-major axis or the (mean) distance.
     """
 
     number: int
@@ -46,17 +46,17 @@ class Source:
 
     @property
     def orbit(self) -> KeplerOrbit | None:
-        """That it moves on; None for others."""
+        """Kepler orbit on which the source moves, or None."""
         return self.of.orbit
 
     @property
     def table(self) -> TabulatedOrbit | None:
-        """That its orbit goes by; None for others."""
+        """Table that gives the source's orbit, or None."""
         return self.of.table
 
     @property
     def has_elements(self) -> bool:
-        """Whether there is an orbit to average over."""
+        """Whether the source has an orbit to average over."""
         return self.orbit is not None or self.table is not None
 
     @property
@@ -70,7 +70,7 @@ class Source:
 
     @property
     def eccentricity(self) -> float:
-        """Of its orbit, the largest; 0 for a source at rest."""
+        """Eccentricity of the source's orbit, the largest in a table; 0 for a source at rest."""
         if self.of.ephemeris is not None:
             return _SERIES[self.of.ephemeris][1]
         if self.table is not None:
@@ -79,7 +79,7 @@ class Source:
 
     @property
     def slow_rate(self) -> float:
-        """Of node and periapsis together, rad/s."""
+        """Bound of the rate of node and periapsis together, rad/s."""
         if self.table is not None:
             return float(self.table.normal_drift + self.table.shape_drift)
         if self.orbit is None:
@@ -88,12 +88,12 @@ class Source:
 
     @property
     def harmonics(self) -> np.ndarray:
-        """Sizes of (a/r)^3 r r^T's harmonics of the mean motion, the mean first."""
+        """Sizes of the harmonics of (a/r)^3 r r^T in the mean motion, the mean first."""
         return np.ones(1) if self.motion == 0 else orbit_harmonics(self.eccentricity)
 
     @property
     def nearest(self) -> float:
-        """(a/r)^3 where it is nearest."""
+        """(a/r)^3 at the closest approach."""
         if self.table is not None:
             return float(self.table.semi_major_axis / self.table.pericentre) ** 3
         return float((1 - self.eccentricity) ** -3)
@@ -106,7 +106,7 @@ class Source:
         return self.strength if axis == 1 else self.strength / axis**3
 
     def ellipse(self, context: Any, time: Any) -> Ellipse:
-        """Shape and mean motion of its orbit at a time, numbers (mpf)."""
+        """Shape and mean motion of the source's orbit at a time, numbers (mpf)."""
         if self.table is not None:
             found = self.table.at(time)
             square = found["k"] ** 2 + found["h"] ** 2
@@ -116,7 +116,7 @@ class Source:
         return Ellipse.of(context, self.orbit)
 
     def secular_strength(self, context: Any) -> Any:
-        """3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2), of an orbit; the largest that a table gives."""
+        """Secular strength 3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2) of an orbit, the largest in a table."""
         if self.table is not None:
             rest = 1 - self.table.largest_eccentricity**2
             size = self.strength * (self.table.semi_major_axis / self.table.smallest_axis) ** 3
@@ -125,14 +125,14 @@ class Source:
         return self.strength * Ellipse.of(context, self.orbit).secular_factor
 
     def normal(self, context: Any, time: Any) -> Vector:
-        """Of its orbit's plane at a time (of a node that moves uniformly, at time zero), unit, space axes."""
+        """Unit normal of the orbit's plane at a time, space axes; at time zero if the node moves uniformly."""
         if self.table is not None:
             return self.table.normal(time)
         assert self.orbit is not None
         return self.orbit.normal(context)
 
     def place(self, context: Any, time: Any) -> OrbitPlace:
-        """Where it is on its orbit, numbers (mpf)."""
+        """Position on the orbit at a time, numbers (mpf)."""
         if self.table is not None:
             return self._place_by_table(context, self.table, time)
         orbit = self.orbit
@@ -157,7 +157,7 @@ class Source:
         return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *turned(axes, turn))
 
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
-        """(a/r)^3 r r^T (3, 3) at a time; None where only a series tells it."""
+        """(a/r)^3 r r^T, (3, 3), at a time; None if only an ephemeris gives it."""
         if self.of.position is not None:
             length = norm(context, self.of.position)
             direction = np.array([float(x / length) for x in self.of.position])
@@ -175,7 +175,7 @@ class Source:
 
 
 def sources_of(scene: Scene, loads: Sequence[Load]) -> list[Source]:
-    """Those of all gravity gradients of a scene, with their strengths."""
+    """Sources of all gravity gradients of a scene, with their strengths."""
     context, found = scene.context, []
     for number, load in enumerate(loads, start=1):
         source = load.gradient_source
@@ -186,6 +186,6 @@ def sources_of(scene: Scene, loads: Sequence[Load]) -> list[Source]:
 
 
 def unit(context: Any, vector: Vector) -> Vector:
-    """Divided by its length."""
+    """The vector divided by its length."""
     length = norm(context, vector)
     return [x / length for x in vector]

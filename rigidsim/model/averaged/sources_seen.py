@@ -1,4 +1,6 @@
-"""Where the sources of an averaged motion are: Kepler orbits by time, tables by their elements."""
+"""Positions of the sources of an averaged motion: Kepler orbits as functions of time, tables by their
+elements.
+"""
 
 from __future__ import annotations
 
@@ -28,18 +30,21 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class SourcesSeen(Mechanics):
-    """The part of an averaged motion that turns no axis."""
+    """The part of an averaged motion's mechanics that locates the sources."""
 
     average: Average | None = None
 
     @property
     def of(self) -> Average:
-        """What is averaged."""
+        """The average that is carried."""
         return self.carried(self.average)
 
     def orbit(self, orbit: KeplerOrbit) -> OrbitStates:
-        """As functions of time: a phase that loses digits as time goes on moves the direction by that times
-        the nutation, and a torque without states of its own lets steps be longer by a factor of two.
+        """See ``Kinematics``; here a function of time, without states.
+
+        The digits that the phase loses as time goes on shift the direction only in proportion to the
+        nutation, and a
+        torque without states of its own allows steps twice as long.
         """
         at = self._place(orbit)
         if orbit.circular:
@@ -53,7 +58,7 @@ class SourcesSeen(Mechanics):
         return OrbitStates(StateBlock([], [], []), direction, self._normal(orbit), inverse)
 
     def _place(self, orbit: KeplerOrbit) -> OrbitPlace:
-        """Where a source is on its orbit."""
+        """Position of a source on its orbit."""
         mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
         e = hy.expression(self.number(orbit.eccentricity))
         anomaly = mean if orbit.circular else hy.kepE(e, mean)
@@ -70,7 +75,7 @@ class SourcesSeen(Mechanics):
         return [node_s * s, -(node_c * s), c]
 
     def _in_plane(self, orbit: KeplerOrbit) -> tuple[Symbolic, Symbolic, Symbolic | None]:
-        """Position over a, from the node, and a/r where it varies."""
+        """Position over a, from the node, and a/r if it varies."""
         mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
         if orbit.circular:
             return hy.cos(mean), hy.sin(mean), None
@@ -82,7 +87,7 @@ class SourcesSeen(Mechanics):
         return w_c * x - w_s * y, w_s * x + w_c * y, 1.0 / (1.0 - self.number(e) * c)
 
     def _turned(self, angle: Any, rate: Any) -> tuple[Symbolic, Symbolic]:
-        """Its cosine and sine."""
+        """Cosine and sine of an angle that advances uniformly."""
         if rate == 0:
             context = self.scene.context
             return as_factor(self.number(context.cos(angle))), as_factor(self.number(context.sin(angle)))
@@ -99,22 +104,24 @@ class SourcesSeen(Mechanics):
 
     @cached_property
     def _by_table(self) -> dict[TabulatedOrbit, TableTerms]:
-        """For each table its part in an average over orbits."""
+        """For each table, its contribution to an average over orbits."""
         return {
             table: TableTerms.of(table, place, self.scaling.time, self.scene.start, self.number)
             for table, place in self.tables.items()
         }
 
     def table(self, orbit: TabulatedOrbit) -> OrbitStates:
-        """As of ``Kinematics``; averaged over, without a direction unless the mean longitude is carried."""
+        """See ``Kinematics``; averaged over the orbit, without a direction unless the mean longitude is
+        carried.
+        """
         return self._by_table[orbit].seen if self.of.over_orbits else super().table(orbit)
 
     def table_block(self, table: TabulatedOrbit) -> StateBlock:
-        """The states of an orbit by a table."""
+        """The states of a tabulated orbit."""
         return self.table(table).block
 
     def _seen(self, source: Source) -> tuple[list[Symbolic], Symbolic | None]:
-        """Unit vector to a source, space axes, and a/r where it varies."""
+        """Unit vector to a source, space axes, and a/r if it varies."""
         context, of = self.scene.context, source.of
         if of.position is not None:
             length = context.sqrt(dot(of.position, of.position))

@@ -1,4 +1,4 @@
-"""What averaging leaves out, as harmonics: of the inertia tensor of a freely turning body, and of an orbit.
+"""Harmonics that averaging removes: of the inertia tensor of a freely turning body, and of an orbit.
 
 In a frame whose z axis is along the angular momentum the tensor is R_z(g t) T(l t) R_z(g t)^T with the rates
 g and l of ``free_motion``; its parts of order i = 0, 1, 2 about z,
@@ -25,11 +25,11 @@ _LEAST = 1e-12  # of the largest harmonic
 
 @dataclass(frozen=True)
 class BodySpectrum:
-    """Harmonics of a freely turning body's tensor.
+    """Harmonics of the inertia tensor of a freely turning body.
 
     Attributes:
         rates: g and l, rad/s.
-        harmonics: (3, points) complex, c_ij in kg m^2 by order and by j as of ``numpy.fft.fftfreq``.
+        harmonics: (3, points) complex, c_ij in kg m^2 by order i and by j as in ``numpy.fft.fftfreq``.
         turns: (points, 3, 3), T's rotation from the principal axes at equal steps of the wobble.
     """
 
@@ -52,17 +52,17 @@ class BodySpectrum:
 
     @cached_property
     def oscillating(self) -> np.ndarray:
-        """Which harmonics averaging leaves out and are there, (3, points)."""
+        """Mask of the nonzero harmonics that averaging removes, (3, points)."""
         sizes = np.abs(self.harmonics)
         found = sizes > _LEAST * max(float(sizes.max()), float(max(self.motion.moments)) * 1e-6)
         found[0, 0] = False
         return np.asarray(found)
 
     def phases(self, matrix: np.ndarray) -> tuple[float, float]:
-        """Of both angles, rad, of an attitude.
+        """Phases of precession and wobble, rad, for an attitude.
 
         Args:
-            matrix: from the principal axes of ``motion`` to a frame with z along the momentum.
+            matrix: rotation from the principal axes of ``motion`` to a frame with z along the momentum.
         """
         m = matrix[2]
         first, second, _ = (float(x) for x in self.motion.amplitudes)
@@ -73,7 +73,7 @@ class BodySpectrum:
         at = np.array([self._at(entry, wobble) for entry in self.turns.reshape(_POINTS, 9).T]).reshape(3, 3)
         if self.motion.symmetric:
             at = self.turns[0]
-            # turns about the symmetry axis don't show: the azimuth of that axis is all
+            # turns about the symmetry axis have no effect: only the azimuth of that axis counts
             own, seen = at[:, 2], matrix[:, 2]
             if math.hypot(seen[0], seen[1]) < 1e-300:
                 return 0.0, 0.0
@@ -87,14 +87,14 @@ class BodySpectrum:
 
     @staticmethod
     def _at(values: np.ndarray, angle: float) -> float:
-        """A periodic function between its points."""
+        """Trigonometric interpolation of a periodic function between its points."""
         coefficients = np.fft.fft(values) / _POINTS
         j = np.fft.fftfreq(_POINTS, 1 / _POINTS)
         return float((coefficients * np.exp(1j * j * angle)).sum().real)
 
     def tensors(self, precession: float, wobble: float) -> tuple[np.ndarray, np.ndarray]:
-        """The oscillating part of the tensor (3, 3), kg m^2, and its integral over time without a mean, at
-        phases of both angles, in the momentum's frame.
+        """Oscillating part of the tensor (3, 3), kg m^2, and its integral over time without a mean, at given
+        phases of precession and wobble, in the momentum's frame.
         """
         i, j = self.orders
         waves = np.where(self.oscillating, self.harmonics, 0.0) * np.exp(1j * (i * precession + j * wobble))
@@ -154,7 +154,7 @@ def body_spectrum(motion: FreeMotion) -> BodySpectrum:
 
 
 def orbit_harmonics(eccentricity: float) -> np.ndarray:
-    """Sizes (Frobenius norms) of the harmonics of (a/r)^3 r r^T by k >= 0, the mean first."""
+    """Sizes (Frobenius norms) of the harmonics k >= 0 of (a/r)^3 r r^T, the mean first."""
     points = 512 if eccentricity < 0.6 else 4096
     mean = 2 * np.pi * np.arange(points) / points
     anomaly = mean + eccentricity * np.sin(mean)
@@ -169,7 +169,7 @@ def orbit_harmonics(eccentricity: float) -> np.ndarray:
 
 
 def _turned(precession: np.ndarray, nodding: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """R_z R_x R_z, (n, 3, 3)."""
+    """Rotation matrices R_z R_x R_z, (n, 3, 3)."""
     return np.asarray(_about_z(precession) @ _about_x(nodding) @ _about_z(own))
 
 
@@ -184,7 +184,7 @@ def _about_x(angle: np.ndarray) -> np.ndarray:
 
 
 def _means(parameter: float) -> list[tuple[float, float]]:
-    """The arithmetic-geometric means of 1 and k', with their differences (Abramowitz & Stegun 16.4)."""
+    """Arithmetic-geometric means of 1 and k', with their differences (Abramowitz & Stegun 16.4)."""
     a, b, found = 1.0, math.sqrt(1 - parameter), []
     for _ in range(40):
         found.append((a, (a - b) / 2))
@@ -206,7 +206,7 @@ def _elliptic(angle: np.ndarray, parameter: float) -> tuple[np.ndarray, np.ndarr
 
 
 def _wobble_angle(amplitude: float, parameter: float) -> float:
-    """pi F(amplitude) / (2 K): the angle that grows uniformly."""
+    """Uniformly growing angle pi F(amplitude) / (2 K), rad."""
     nodes, weights = np.polynomial.legendre.leggauss(32)
 
     def integral(end: float) -> float:

@@ -1,4 +1,4 @@
-"""The states of an averaged motion, and what it can and can't tell."""
+"""States of an averaged motion, and which observables it can provide."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _resonant_states(
     orbit_tags: Mapping[KeplerOrbit, str],
     number: Rounder,
 ) -> tuple[AveragedMechanics, list[StateBlock]]:
-    """Of a body that keeps pace with its source."""
+    """States of a body in spin-orbit resonance."""
     resonance, initial = average.resonance, average.slow_states(scaling.momentum)
     assert resonance is not None
     assert initial is not None
@@ -62,10 +62,10 @@ def _resonant_states(
 
 
 def refuse_untold(average: Average, record: Sequence[str] | None) -> None:
-    """Look whether what is recorded can be had.
+    """Refuse observables that an averaged motion can't provide.
 
     Raises:
-        ConfigError: names what needs every rotation.
+        ConfigError: names a recorded variable that needs every rotation resolved.
     """
     for name in record or ():
         if name in _OF_FIGURE and not average.figure:

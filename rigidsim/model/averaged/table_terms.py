@@ -1,7 +1,7 @@
-"""The torque of a source whose orbit goes by a table, averaged over the orbit.
+"""The torque of a source on a tabulated orbit, averaged over the orbit.
 
-As of ``orbit_terms``, with axis, eccentricity and plane of the moment. Where the pericentre goes round, what
-of the second order goes with it is periodic and left out.
+The terms are those of ``orbit_terms`` with the instantaneous axis, eccentricity and plane. If the pericentre
+goes round, second-order terms that go round with it are periodic and left out.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class TableTerms:
-    """An orbit by a table as an average takes it."""
+    """A tabulated orbit as an average uses it."""
 
     states: ElementStates
     number: Rounder
@@ -33,7 +33,7 @@ class TableTerms:
     def of(
         cls, table: TabulatedOrbit, place: TablePlace, time_exponent: int, start: Any, number: Rounder
     ) -> TableTerms:
-        """Carry its elements: see ``element_states``."""
+        """Carry the orbit's elements: see ``element_states``."""
         return cls(element_states(table, place, time_exponent, start, number), number)
 
     def _value(self, element: str) -> Symbolic:
@@ -47,14 +47,14 @@ class TableTerms:
 
     @cached_property
     def ellipse(self) -> Ellipse:
-        """Its mean motion per internal unit of time."""
+        """Ellipse of the moment, its mean motion per internal unit of time."""
         k, h = self._value("k"), self._value("h")
         square = k * k + h * h
         return Ellipse(hy.sqrt(square), square, hy.sqrt(1.0 - square), rounded(self.states.pace), False)
 
     @cached_property
     def place(self) -> OrbitPlace | None:
-        """Where the source is; None where the mean longitude isn't carried."""
+        """Position of the source; None if the mean longitude isn't carried."""
         longitude = self.states.mean_longitude
         if longitude is None:
             return None
@@ -67,7 +67,9 @@ class TableTerms:
 
     @cached_property
     def seen(self) -> OrbitStates:
-        """As of a motion that resolves the orbit; without a direction where the place isn't known."""
+        """Orbit states like those of a motion that resolves the orbit; without a direction if the position is
+        unknown.
+        """
         at, states = self.place, self.states
         if at is None:
             return OrbitStates(states.block, [], states.normal, hy.expression(1.0))
@@ -78,7 +80,7 @@ class TableTerms:
         return OrbitStates(states.block, direction, states.normal, inverse / self._value(AXIS))
 
     def secular(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:
-        """The vector that, times s, is s' to second order.
+        """Vector whose cross product with s is s', to second order.
 
         Args:
             rate: k at the mean axis, per internal unit of time (mpf).

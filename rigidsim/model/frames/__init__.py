@@ -1,1 +1,1 @@
-"""Frames beside the space and body axes: local, rotating and orbital ones, and planes of reference."""
+"""Frames besides the space and body axes: local, rotating and orbital ones, and reference planes."""

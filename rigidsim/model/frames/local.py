@@ -1,4 +1,4 @@
-"""The local frame of a body with a source: z to the source, y against the orbit's normal, x horizontal.
+"""The local frame of a body and its source: z to the source, y against the orbit's normal, x horizontal.
 
 On a circular orbit x points forward. The normal is that of
 
@@ -7,8 +7,8 @@ On a circular orbit x points forward. The normal is that of
 - an ephemeris: the pole of the ecliptic (space Z), less its part along z;
 - a source at rest, which has no orbit: space Z in the same way, or X where the source lies along Z.
 
-Of several sources the first in the config counts. (Hughes, Spacecraft Attitude Dynamics, 1986, ch. 9; Wertz,
-Spacecraft Attitude Determination and Control, 1978, ch. 2.)
+If there are several sources, the first in the config counts. (Hughes, Spacecraft Attitude Dynamics, 1986,
+ch. 9; Wertz, Spacecraft Attitude Determination and Control, 1978, ch. 2.)
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _SLOW = 2
-"""Turns per revolution up to which a scene is about the attitude in orbit: a spin or tumble is faster."""
+"""Turns per revolution up to which a scene is taken to be about the attitude in orbit."""
 
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Unit vectors in body axes.
+    """Axes of the local frame as unit vectors in body axes.
 
     Attributes:
         down: z, towards the source.
-        normal: of the orbit, -y.
+        normal: the orbit's normal, -y.
         described: what the source and the normal are.
     """
 
@@ -44,13 +44,13 @@ class LocalFrame:
 
     @property
     def forward(self) -> list[Symbolic]:
-        """x = y x z."""
+        """Forward axis x = y x z."""
         x: list[Symbolic] = cross(self.down, self.normal)
         return x
 
 
 def first_source(loads: Iterable[Load]) -> Load | None:
-    """The load whose source angles speak of; None where no load has one."""
+    """The load whose source defines the local frame; None if no load has a source."""
     return next((load for load in loads if load.has_source), None)
 
 
@@ -61,7 +61,7 @@ def flies_about_source(scene: Scene) -> bool:
 
 
 def local_frame(m: Mechanics) -> LocalFrame:
-    """Of the first source."""
+    """The local frame of the first source."""
     load = m.carried(first_source(m.loads))
     down = m.carried(load.source_direction(m))
     normal, described = _normal(m, load, down)

@@ -31,8 +31,8 @@ from rigidsim.scene.scene import Scene
 
 
 def corotating_orbit(scene: Scene, loads: Sequence[Load], formulation: str) -> KeplerOrbit | None:
-    """The orbit in whose frame the attitude is best carried: a circle in a fixed plane, if the load that
-    moves on it alone reads the attitude and that is a quaternion; else None.
+    """Orbit in whose frame the attitude is best carried: a circle in a fixed plane, if the load on it is the
+    only one that reads the attitude, which is a quaternion; None otherwise.
     """
     readers = [load for load in loads if {"attitude", "vertical"} & load.reads]
     if formulation != "quaternion" or scene.torque_arm is not None or len(readers) != 1:
@@ -53,7 +53,7 @@ def orbital_states(
     Args:
         rates: angular velocity, body axes, 1 / ``time_unit``.
         orbit: see ``corotating_orbit``.
-        tag: makes the names of the orbit's states unique.
+        tag: suffix that makes the names of the orbit's states unique.
         time_unit: internal unit of time, seconds (mpf).
     """
     names = ["pw", "px", "py", "pz"]
@@ -135,7 +135,7 @@ def in_space(
 
 
 def _plane(context: Any, orbit: KeplerOrbit) -> list[Any]:
-    """Quaternion of the orbit's plane."""
+    """Quaternion of the orbit's plane, from orbital to space axes."""
     return attitude.product(_turn(context, orbit.ascending_node, 3), _turn(context, orbit.inclination, 1))
 
 
@@ -146,7 +146,7 @@ def _start(scene: Scene, orbit: KeplerOrbit) -> tuple[Any, Any]:
 
 
 def _turn(context: Any, angle: Any, axis: int) -> list[Any]:
-    """Quaternion of a turn about axis 1 or 3, exact where it is none."""
+    """Quaternion of a turn about axis 1 or 3; exact for no turn."""
     if angle == 0:
         return [context.one, context.zero, context.zero, context.zero]
     turn = [context.cos(angle / 2)] + [context.zero] * 3

@@ -1,4 +1,4 @@
-"""The plane that obliquity and longitudes count from, as expressions: fixed in space, or a source's own.
+"""Reference plane of obliquities and longitudes, as expressions: fixed in space, or a source's orbital plane.
 
 Longitudes count from X turned by the smallest rotation that takes Z to the plane's normal n,
 
@@ -29,11 +29,11 @@ from rigidsim.scene.scene import Scene
 
 @dataclass(frozen=True)
 class ReferencePlane:
-    """Right-handed unit vectors, space axes.
+    """Reference plane as right-handed unit vectors, space axes.
 
     Attributes:
-        first: from which longitudes count.
-        normal: from which obliquities count.
+        first: direction from which longitudes count.
+        normal: direction from which obliquities count.
         described: which plane it is.
     """
 
@@ -43,7 +43,7 @@ class ReferencePlane:
     described: str
 
     def components(self, vector: list[Symbolic]) -> list[Symbolic]:
-        """Of a vector in space axes, along the plane's own."""
+        """Components along the plane's axes of a vector in space axes."""
         return [
             hy.sum([a * b for a, b in zip(axis, vector, strict=True)])
             for axis in (self.first, self.second, self.normal)
@@ -51,7 +51,7 @@ class ReferencePlane:
 
 
 def refuse_without_plane(scene: Scene, loads: Sequence[Load]) -> None:
-    """Look whether there is the plane that ``[frame] reference`` names.
+    """Refuse a scene that lacks the plane named by ``[frame] reference``.
 
     Raises:
         ConfigError: "orbit" in a scene without one.
@@ -66,7 +66,7 @@ def flies_in_plane(scene: Scene, loads: Sequence[Load]) -> bool:
 
 
 def reference_plane(m: Mechanics) -> ReferencePlane:
-    """The plane that ``[frame] reference`` names, see above.
+    """The plane named by ``[frame] reference``.
 
     Raises:
         ConfigError: "orbit" in a scene without one.
@@ -86,17 +86,17 @@ def reference_plane(m: Mechanics) -> ReferencePlane:
 
 
 def initial_normal(scene: Scene, loads: Sequence[Load]) -> Vector:
-    """About where the normal points at the start (mpf, space axes), not of unit length."""
+    """Approximate normal at the start (mpf, space axes), not of unit length."""
     return scene.reference if scene.reference is not None else _orbit_plane(loads).at_start(scene)
 
 
 def plane_drift(scene: Scene, loads: Sequence[Load]) -> Any | None:
-    """Bound of the rate (rad/s) at which the plane turns; None where none is known."""
+    """Bound of the rate (rad/s) at which the plane turns; None if unknown."""
     return scene.context.zero if scene.reference is not None else _orbit_plane(loads).drift(scene)
 
 
 def _orbit_plane(loads: Sequence[Load]) -> OrbitPlane:
-    """Of the first load that has one."""
+    """Plane of the first load that has one."""
     for load in loads:
         if load.plane is not None:
             return load.plane
@@ -107,7 +107,7 @@ def _orbit_plane(loads: Sequence[Load]) -> OrbitPlane:
 
 
 def fixed_plane(m: Mechanics, normal: Vector, described: str) -> ReferencePlane:
-    """The plane with a fixed unit normal (mpf, space axes); worked out exactly, and rounded once."""
+    """A plane with a fixed unit normal (mpf, space axes); worked out exactly and rounded once."""
     context = m.scene.context
     x, y, z = normal
     one, zero = context.one, context.zero

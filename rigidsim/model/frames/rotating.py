@@ -1,8 +1,8 @@
-"""Jacobi's constant: all torques come from potentials that rest in a frame that turns with a circular orbit.
+"""Jacobi's constant, for torques from potentials at rest in a frame that turns with a circular orbit.
 
 H = w . I w / 2 - n o . I w + U is conserved, o the orbit's normal and n its mean motion (Hughes 1986, ch. 9).
-U may be that of any number of sources on circles of one plane and one period, and beside them of what the
-turning of the frame doesn't change, such as a uniform field along o.
+U may be that of any number of sources on circles of one plane and one period, plus any potential that the
+frame's turning doesn't change, such as that of a uniform field along o.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _same_frame(m: Mechanics, a: KeplerOrbit, b: KeplerOrbit) -> bool:
 
 
 def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
-    """An orbit with whose frame all potentials turn; None where there isn't one."""
+    """An orbit with whose frame all potentials turn; None if there is none."""
     orbits = [load.corotating_orbit for load in m.turning if load.corotating_orbit is not None]
     if not orbits or not all(_same_frame(m, orbits[0], orbit) for orbit in orbits[1:]):
         return None

@@ -1,4 +1,4 @@
-"""The loads, one file each; importing this package enters all of them into the registry of kinds."""
+"""The loads, one file each; importing this package registers all of their kinds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rigidsim.model.state_blocks import StateBlock
 __all__ = ["ExtraStates", "Load", "LoadModel", "StateBlock", "Term", "seconds"]
 
 LoadModel = Load
-"""The name by which loads of one's own were first derived."""
+"""Former name of ``Load``, kept for loads written in Python."""
 
 ExtraStates = StateBlock
-"""The name by which their states were first given."""
+"""Former name of ``StateBlock``, kept for loads written in Python."""

@@ -33,7 +33,7 @@ from rigidsim.scene.validation_messages import shown
 
 
 def _component(value: Any) -> str:
-    """An expression; a bare number is one too."""
+    """The component as an expression's text; a bare number is one too."""
     if isinstance(value, bool) or not isinstance(value, str | int | Decimal | float):
         raise refuse(f'given {shown(value)}; an expression in quotes is allowed, such as "k*sin(t)^2"')
     return value if isinstance(value, str) else str(value)
@@ -80,11 +80,11 @@ class Applied(Load):
     """A torque or a force given by expressions; its work is integrated, since it need have no potential.
 
     Attributes:
-        unit: of the components in SI.
-        components: of the torque (N m) or force (N).
-        frame: "body" or "space", of the components.
-        arm: from the reference point to where a force acts, body axes, m (mpf).
-        pushes: whether it moves the centre of mass.
+        unit: SI unit of the components.
+        components: components of the torque (N m) or force (N).
+        frame: axes of the components, "body" or "space".
+        arm: from the reference point to the force's point of application, body axes, m (mpf).
+        pushes: whether it accelerates the centre of mass.
         number: place in the config, for messages.
     """
 
@@ -112,7 +112,7 @@ class Applied(Load):
         return cls((first, second, third), fields.frame, arm, pushes, around.number)
 
     def acts(self) -> bool:
-        """Unless all components are zero."""
+        """Whether any component isn't zero."""
         return not all(_vanishes(component) for component in self.components)
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
@@ -122,12 +122,12 @@ class Applied(Load):
 
     @property
     def names(self) -> frozenset[str]:
-        """That the expressions use."""
+        """Names that the expressions use."""
         return frozenset().union(*(names_used(c) for c in self.components))
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        """What the expressions name, and what turns the components."""
+        """States that the expressions name, and those that rotate the components."""
         turns = self.title == "torque" or any(x != 0 for x in self.arm)
         crosses = (turns and self.frame == "space") or (self.pushes and self.frame == "body")
         attitude = {"attitude"} if crosses or self.names & set(ATTITUDE_NAMES) else set()
@@ -155,7 +155,7 @@ class Applied(Load):
         return apply(transpose(m.matrix), found) if self.frame == "space" else found
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
-        """The arm and the force, where that is constant in space."""
+        """Arm and force, if the force is constant in space; None otherwise."""
         roots = [component.root for component in self.components]
         if self.title != "force" or self.frame != "space":
             return None
@@ -164,8 +164,8 @@ class Applied(Load):
         return self.arm, [root.value.at(scene.context) for root in roots]  # type: ignore[union-attr]
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Unless the components in space axes say that it doesn't: a torque has none along the axis, a force
-        has no other.
+        """Whether it may have a torque about the axis, as far as components in space axes tell: a torque has
+        none if it has no component along the axis, a force if it has no other.
         """
         if self.frame != "space":
             return True
@@ -181,7 +181,7 @@ class Applied(Load):
         return [to_heyoka(p, variables, m.number, m.scene.context, m.sides) for p in parts.values()]
 
     def roots(self, m: Kinematics) -> list[Symbolic]:
-        """What roots in the components are taken of."""
+        """Radicands in the components."""
         variables = state_names(m, self.names)
         parts = {part.root: part for c in self.components for part in root_parts(c)}
         return [to_heyoka(p, variables, m.number, m.scene.context, m.sides) for p in parts.values()]
@@ -200,7 +200,7 @@ class Torque(Applied):
     unit = "N m"
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Where only the component along the axis isn't zero."""
+        """Whether only the component along the axis is nonzero."""
         along = axis if self.frame == "body" else normal
         return all(
             _vanishes(component) or parallel(scene.context, unit, along)
@@ -222,7 +222,7 @@ class Force(Applied):
     unit = "N"
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """arm x force."""
+        """Torque arm x force."""
         if all(x == 0 for x in self.arm):
             return []
         size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)
@@ -230,7 +230,7 @@ class Force(Applied):
         return list(zip(arms, self._in_body(m), strict=True))
 
     def force(self, m: Kinematics) -> list[Term]:
-        """Of a freely flying body, over its mass."""
+        """Acceleration of a freely flying body: the force over its mass."""
         if m.velocity is None:
             return []
         context = m.scene.context

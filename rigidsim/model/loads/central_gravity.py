@@ -49,7 +49,7 @@ class CentralGravity(Load):
     """A point that attracts a free body: U = -GMm/r - (GM/2r^3)(tr I - 3 c . I c), c = R^T r/|r|.
 
     Attributes:
-        position: of the point, space axes, m (mpf).
+        position: position of the point, space axes, m (mpf).
     """
 
     gravitational_parameter: Any
@@ -76,13 +76,13 @@ class CentralGravity(Load):
         return cls(strength, [x.at(around.context) for x in fields.position])
 
     def pictured(self) -> dict[str, Any]:
-        """The attracting point."""
+        """The attracting point, for drawing."""
         place = [float(x) for x in self.position]
         strength = float(self.gravitational_parameter)
         return {"what": "attractor", "gravitational_parameter": strength, "position": place}
 
     def check(self, number: int, position: Vector | None) -> None:
-        """The body must have a position, and not start where the point is."""
+        """Require that the body has a position and doesn't start at the point."""
         where = f"[[loads]] number {number + 1} kind"
         if position is None:
             raise ConfigError(
@@ -97,7 +97,7 @@ class CentralGravity(Load):
 
     @property
     def attracting_point(self) -> Vector:  # type: ignore[override]
-        """The force points to it but for the body's own shape."""
+        """The point to which the force points, except for the effect of the body's own shape."""
         return self.position
 
     def geometry(self, m: Kinematics) -> tuple[list[Symbolic], list[Symbolic], Symbolic]:
@@ -117,12 +117,12 @@ class CentralGravity(Load):
         return [-x for x in self.geometry(m)[1]]
 
     def _strength(self, m: Kinematics, length_power: int, extra: int) -> Any:
-        """G M over length^power, times 2^extra."""
+        """G M over length^power times 2^extra, internal units."""
         exponent = extra - length_power * m.scaling.length
         return m.scene.context.ldexp(self.gravitational_parameter, exponent)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """(3 G M / r^3) c x (I c)."""
+        """Torque (3 G M / r^3) c x (I c)."""
         _, body, inverse = self.geometry(m)
         return gradient_terms(m, body, self._strength(m, 3, 2 * m.scaling.time), inverse**3)
 
@@ -143,7 +143,7 @@ class CentralGravity(Load):
         return terms
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """To second degree."""
+        """Potential energy to second degree."""
         scaling = m.scaling
         _, body, inverse = self.geometry(m)
         point = self._strength(m, 1, -scaling.energy) * m.scene.body.mass
@@ -153,7 +153,7 @@ class CentralGravity(Load):
         return -(m.number(point) * inverse) - m.number(second) * inverse**3 * bracket
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
-        """c x (I c) has no part along an axis of symmetry."""
+        """True: c x (I c) has no component along an axis of symmetry."""
         return True
 
     # --- estimates, from the Kepler orbit through the initial state --------------------------------------
@@ -179,11 +179,11 @@ class CentralGravity(Load):
         return max(min(pericentre, distance), distance / 1000)
 
     def amplitude(self, scene: Scene) -> Any:
-        """As of ``tidal_range`` at the nearest approach."""
+        """``tidal_range`` at the nearest approach, J."""
         return tidal_range(scene, self.gravitational_parameter, self.nearest_approach(scene))
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """At the nearest approach."""
+        """Angular rate at the nearest approach, rad/s."""
         offset, _ = self._relative(scene)
         assert scene.velocity is not None
         momentum = norm(scene.context, cross(offset, scene.velocity))

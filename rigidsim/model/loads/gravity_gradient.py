@@ -32,7 +32,7 @@ from rigidsim.scene.space_axes import ECLIPTIC
 
 
 class GravityGradientFields(LoadFields):
-    """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
+    """Config fields of the torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]
     gravitational_parameter: GravitationalParameter | None = Field(
@@ -107,7 +107,7 @@ class GravityGradient(Load):
         return cls(strength, position=position)
 
     def pictured(self) -> dict[str, Any]:
-        """A source, and where it is."""
+        """The source's kind and position, for drawing."""
         strength = float(self.gravitational_parameter)
         shown: dict[str, Any] = {"what": "source", "gravitational_parameter": strength}
         if self.orbit is not None:
@@ -121,30 +121,30 @@ class GravityGradient(Load):
 
     @property
     def gradient_source(self) -> GradientSource:  # type: ignore[override]
-        """Its own."""
+        """The source of this gradient."""
         return GradientSource(
             self.gravitational_parameter, self.orbit, self.table, self.position, self.ephemeris, self.epoch
         )
 
     @property
     def conservative(self) -> bool:  # type: ignore[override]
-        """Where the source rests."""
+        """Whether the source is at rest."""
         return self.position is not None
 
     @property
     def wide(self) -> bool:  # type: ignore[override]
-        """The analytic series have thousands of terms."""
+        """Whether an analytic series, which has thousands of terms, gives the source's position."""
         return self.ephemeris is not None
 
     @property
     def corotating_orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
-        """A circular orbit in a fixed plane."""
+        """The source's orbit, if it is circular and in a fixed plane."""
         orbit = self.orbit
         return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
 
     @property
     def plane(self) -> OrbitPlane | None:
-        """Of the orbit; of the Sun's series the ecliptic."""
+        """Plane of the source's orbit, or the ecliptic for the Sun's series."""
         return EclipticPlane() if self.ephemeris == "sun" else super().plane
 
     @property
@@ -176,7 +176,9 @@ class GravityGradient(Load):
         return apply(transpose(m.matrix), fixed)
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
-        """G M / R^3 in internal units: at a constant distance (mpf), and what it varies by."""
+        """G M / R^3 in internal units: the value at a constant distance (mpf), and the factor by which it
+        varies.
+        """
         context = m.scene.context
         factor = None
         if self.orbit is not None:
@@ -190,21 +192,21 @@ class GravityGradient(Load):
         return value, factor
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """(3 G M / R^3) c x (I c)."""
+        """Torque (3 G M / R^3) c x (I c)."""
         return gradient_terms(m, self.source_direction(m), *self.strength(m))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """(3 G M / 2 R^3) c . I c (the part that doesn't depend on the attitude is left out)."""
+        """Potential energy (3 G M / 2 R^3) c . I c, without the part that doesn't depend on the attitude."""
         strength, factor = self.strength(m)
         potential = as_factor(m.number(3 * strength / 2)) * quadratic_form(m, self.source_direction(m))
         return potential if factor is None else factor * potential
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
-        """c x (I c) has no part along an axis of symmetry."""
+        """True: c x (I c) has no component along an axis of symmetry."""
         return True
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """c x (I c) is along a principal axis if c is across it, and zero if c is along it."""
+        """Whether c stays perpendicular to or along the axis: c x (I c) is then along the axis or zero."""
         if self.orbit is not None:
             return self.orbit.node_rate == 0 and parallel(
                 scene.context, self.orbit.normal(scene.context), normal
@@ -217,14 +219,14 @@ class GravityGradient(Load):
         return across or parallel(scene.context, direction, normal)
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
-        """Where the source rests."""
+        """See ``Load``: the source, if it is at rest."""
         if self.position is None:
             return None
         distance = norm(scene.context, self.position)
         return 3 * self.gravitational_parameter / distance**3, [x / distance for x in self.position]
 
     def amplitude(self, scene: Scene) -> Any:
-        """As of ``tidal_range`` at the least distance."""
+        """``tidal_range`` at the least distance, J."""
         if self.orbit is not None:
             distance = self.orbit.pericentre
         elif self.table is not None:
@@ -234,7 +236,7 @@ class GravityGradient(Load):
         return tidal_range(scene, self.gravitational_parameter, distance)
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """At pericentre."""
+        """Angular rate at pericentre, rad/s."""
         if self.table is not None:
             return self.table.fastest_rate()
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
@@ -255,7 +257,7 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
     """A gravitational parameter, m^3/s^2 (mpf).
 
     Raises:
-        ConfigError: it isn't there, or isn't positive.
+        ConfigError: it is missing or isn't positive.
     """
     if given is None:
         raise around.fault("gravitational_parameter", "missing; it is needed")

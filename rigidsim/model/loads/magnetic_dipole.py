@@ -1,4 +1,6 @@
-"""Magnetic dipole: a moment of the body, in a uniform field or in that of a centred dipole along an orbit."""
+"""Magnetic dipole: a moment of the body in a uniform field, or in the field of a centred dipole along an
+orbit.
+"""
 
 from __future__ import annotations
 
@@ -62,8 +64,8 @@ class MagneticDipole(Load):
 
     Attributes:
         moment: m, body axes, A m^2 (mpf).
-        source: the field itself (T), or M (A m^2) where there is an orbit; space axes.
-        orbit: of the source as seen from the body, which only changes the sign of c; shared with other loads.
+        source: the field itself (T), or M (A m^2) if there is an orbit; space axes.
+        orbit: orbit of the source seen from the body (which only reverses c); shared with other loads.
     """
 
     moment: Vector
@@ -101,32 +103,32 @@ class MagneticDipole(Load):
         return cls(moment, _numbers(fields.source_moment or [], around), orbit)
 
     def acts(self) -> bool:
-        """Unless a moment or the field is zero."""
+        """Whether both moment and field are nonzero."""
         return any(x != 0 for x in self.moment) and any(x != 0 for x in self.source)
 
     @property
     def conservative(self) -> bool:  # type: ignore[override]
-        """In a uniform field."""
+        """Whether the field is uniform."""
         return self.orbit is None
 
     @property
     def has_source(self) -> bool:  # type: ignore[override]
-        """Along an orbit."""
+        """Whether the body moves along an orbit about the dipole."""
         return self.orbit is not None
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
-        """Of the centred dipole."""
+        """Unit vector to the centred dipole, body axes."""
         return None if self.orbit is None else apply(transpose(m.matrix), m.orbit(self.orbit).direction)
 
     def _size(self, scene: Scene) -> Any:
-        """Of the field, T: at the semi-major axis over the source's equator, where there is an orbit."""
+        """Size of the field, T; with an orbit, its size at the semi-major axis over the source's equator."""
         size = norm(scene.context, self.source)
         if self.orbit is None:
             return size
         return scene.context.mpf(_FIELD_CONSTANT) * size / self.orbit.semi_major_axis**3
 
     def _field(self, m: Kinematics) -> list[Symbolic]:
-        """B over its size, body axes."""
+        """Field B divided by ``_size``, body axes."""
         length = norm(m.scene.context, self.source)
         unit = [as_factor(m.number(x / length)) for x in self.source]
         if self.orbit is None:
@@ -144,13 +146,13 @@ class MagneticDipole(Load):
         return [m.scene.context.ldexp(x * size, -m.scaling.energy) for x in self.moment]
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """m x B."""
+        """Torque m x B."""
         moment = self._moment(m)
         axes = diagonal([m.scene.context.one] * 3)
         return [(cross(moment, axis), b) for axis, b in zip(axes, self._field(m), strict=True)]
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """A needle across the axis in a uniform field across it."""
+        """Whether moment and field are both perpendicular to the axis, in a uniform field."""
         context = scene.context
         if self.orbit is not None:
             return False
@@ -159,23 +161,23 @@ class MagneticDipole(Load):
         return bool(across and abs(dot(self.source, normal)) <= tiny * norm(context, self.source))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """-m . B."""
+        """Potential energy -m . B."""
         pairs = zip(self._moment(m), self._field(m), strict=True)
         return -hy.sum([m.number(x) * b for x, b in pairs if x != 0])
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
-        """m and B, in a uniform field."""
+        """Moment m and field B, if the field is uniform."""
         return (self.moment, self.source) if self.orbit is None else None
 
     def amplitude(self, scene: Scene) -> Any:
-        """2 m B at its largest: over the source's poles at pericentre, where there is an orbit."""
+        """Largest 2 m B: over the source's poles at pericentre, if there is an orbit."""
         size = 2 * norm(scene.context, self.moment) * self._size(scene)
         if self.orbit is None:
             return size
         return 2 * size * (self.orbit.semi_major_axis / self.orbit.pericentre) ** 3
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """At pericentre."""
+        """Angular rate at pericentre, rad/s."""
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
     @property

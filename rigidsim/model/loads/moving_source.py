@@ -1,10 +1,10 @@
-"""The gravity of one of the point masses that move beside the body: torque, and force of a body that flies.
+"""Gravity of a point mass that moves besides the body: its torque, and its force if the body flies.
 
 What a ``gravity_gradient`` or ``central_gravity`` with ``orbit = {body = ..}`` becomes (MacCullagh):
 
     U = -G M m / r - (G M / 2 r^3) (tr I - 3 c . I c),   c = R^T r/|r| from the mass to the body,
 
-without the first term where the body is one of the point masses itself, whose own gravity that is.
+without the first term if the body itself is one of the point masses, whose mutual gravity includes it.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class MovingSource(Load):
     """A point mass that attracts the body.
 
     Attributes:
-        masses: all of them.
-        number: of the one that attracts.
+        masses: all point masses.
+        number: index of the one that attracts.
         pulls: whether the body has a position of its own and is pulled (``central_gravity``).
     """
 
@@ -46,7 +46,7 @@ class MovingSource(Load):
 
     @property
     def title(self) -> str:  # type: ignore[override]
-        """The kind that it was given as."""
+        """The kind of load in the config."""
         return "central_gravity" if self.pulls else "gravity_gradient"
 
     @property
@@ -66,7 +66,9 @@ class MovingSource(Load):
 
     @property
     def wide(self) -> bool:  # type: ignore[override]
-        """From three masses on, whose equations take ten seconds to compile unrolled, and one rolled."""
+        """Whether there are three or more masses: their equations take ten seconds to compile unrolled, one
+        otherwise.
+        """
         return len(self.masses.names) > _UNROLLED
 
     @property
@@ -75,7 +77,7 @@ class MovingSource(Load):
         return self.masses.strengths[self.number]
 
     def check(self, number: int, position: Vector | None) -> None:
-        """Force and torque must fit how the body moves."""
+        """Require that force and torque fit the way the body moves."""
         where = f"[[loads]] number {number + 1} kind"
         if self.pulls and self.masses.host is not None:
             what = 'given "central_gravity", but [body] host makes the body one of [[bodies]], which attract '
@@ -87,7 +89,7 @@ class MovingSource(Load):
     # --- equations ---------------------------------------------------------------------------------------
 
     def place(self, m: Kinematics) -> list[Symbolic]:
-        """From the mass to the body, space axes, units of length."""
+        """Vector from the mass to the body, space axes, units of length."""
         states = m.carried(m.point_masses)
         if self.masses.host is not None:
             return states.between(self.number, self.masses.host)
@@ -102,7 +104,7 @@ class MovingSource(Load):
 
     @property
     def plane(self) -> OrbitPlane:
-        """The osculating one."""
+        """The osculating plane of the body's motion about the mass."""
         return _OsculatingPlane(self)
 
     def geometry(self, m: Kinematics) -> tuple[list[Symbolic], list[Symbolic], Symbolic]:
@@ -120,12 +122,12 @@ class MovingSource(Load):
         return m.scene.context.ldexp(self.strength, extra - length_power * m.scaling.length)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """(3 G M / r^3) c x (I c)."""
+        """Torque (3 G M / r^3) c x (I c)."""
         _, body, inverse = self.geometry(m)
         return gradient_terms(m, body, self._scaled(m, 3, 2 * m.scaling.time), inverse**3)
 
     def pull(self, m: Kinematics) -> list[Symbolic]:
-        """Acceleration of the body: by its shape, and by the point where the body flies by itself."""
+        """Acceleration of the body: by its shape, and by the point attraction if the body flies by itself."""
         scaling = m.scaling
         space, body, inverse = self.geometry(m)
         shift = scaling.time - scaling.speed
@@ -139,13 +141,13 @@ class MovingSource(Load):
         return [-(radial * x) - 2.0 * second * y for x, y in zip(space, turned, strict=True)]
 
     def force(self, m: Kinematics) -> list[Term]:
-        """Of a body that flies by itself."""
+        """Acceleration of the centre of mass of a body that flies by itself."""
         if not self.pulls:
             return []
         return list(zip(unit_vectors(m.scene.context), self.pull(m), strict=True))
 
     def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
-        """What the point masses feel of the body: as of ``PointMassStates.react``."""
+        """Accelerations of the point masses by the body, as ``PointMassStates.react`` takes them."""
         if not self.masses.full:
             return []
         pull, host, context = self.pull(m), self.masses.host, m.scene.context
@@ -156,7 +158,7 @@ class MovingSource(Load):
         return [(host, context.one, pull), (self.number, -ratio, pull)]
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """To second degree."""
+        """Potential energy to second degree."""
         scaling = m.scaling
         _, body, inverse = self.geometry(m)
         second = self._scaled(m, 3, scaling.inertia - scaling.energy) / 2
@@ -168,13 +170,13 @@ class MovingSource(Load):
         return found
 
     def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
-        """c x (I c) has no part along an axis of symmetry."""
+        """True: c x (I c) has no component along an axis of symmetry."""
         return True
 
-    # --- estimates, from the Kepler orbit of the two left to themselves ----------------------------------
+    # --- estimates, from the Kepler orbit of the body and this mass alone ---------------------------------
 
     def encounter(self, scene: Scene) -> tuple[Any, Any]:
-        """Least distance (m), and angular rate there (rad/s)."""
+        """Least distance (m), and the angular rate there (rad/s)."""
         masses, own = self.masses, scene.context.zero
         if masses.host is not None:
             own = masses.strengths[masses.host]
@@ -192,11 +194,11 @@ class MovingSource(Load):
         return place, moving
 
     def amplitude(self, scene: Scene) -> Any:
-        """As of ``tidal_range`` at the least distance."""
+        """``tidal_range`` at the least distance, J."""
         return tidal_range(scene, self.strength, self.encounter(scene)[0])
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """At the least distance."""
+        """Angular rate at the least distance, rad/s."""
         return self.encounter(scene)[1]
 
     @property
@@ -212,7 +214,7 @@ class MovingSource(Load):
 
 @dataclass(frozen=True)
 class _OsculatingPlane(OrbitPlane):
-    """Of the body's motion about a point mass that moves."""
+    """Osculating plane of the body's motion about a moving point mass."""
 
     source: MovingSource
     described = "osculating plane of the source's orbit"
@@ -229,9 +231,9 @@ class _OsculatingPlane(OrbitPlane):
         return cross(*self.source.start(scene))
 
     def drift(self, scene: Scene) -> None:
-        """Nothing is known."""
+        """None: no bound is known."""
         return None
 
     def rate(self, scene: Scene) -> Any:
-        """At the least distance."""
+        """Angular rate at the least distance, rad/s."""
         return self.source.encounter(scene)[1]

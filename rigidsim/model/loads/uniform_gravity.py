@@ -1,4 +1,4 @@
-"""Uniform gravity: a torque about a fixed point, or free fall."""
+"""Uniform gravity: a torque about a fixed point, or free fall of a body that moves."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ def _standard_gravity() -> list[ExactNumber]:
 
 
 class UniformGravityFields(LoadFields):
-    """A uniform field; a torque about the fixed point, or free fall in a scene with a position."""
+    """Config fields of a uniform field: a torque about the fixed point, or free fall in a scene with a
+    position.
+    """
 
     kind: Literal["uniform_gravity"]
     acceleration: Triple[Acceleration] = Field(
@@ -59,35 +61,37 @@ class UniformGravity(Load):
 
     @classmethod
     def of(cls, scene: Scene) -> list[UniformGravity]:
-        """All uniform fields of a scene as one load; none where it has none."""
+        """All uniform fields of a scene combined into one load; an empty list if the scene has none."""
         return [] if scene.gravity is None else [cls(scene.gravity, scene.torque_arm is not None)]
 
     @property
     def uniform_field(self) -> Vector:  # type: ignore[override]
-        """Space axes, m/s^2."""
+        """Gravitational acceleration, space axes, m/s^2."""
         return self.acceleration
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        """The vertical, about a fixed point."""
+        """The vertical about a fixed point; nothing in free fall."""
         return frozenset({"vertical"} if self.pivoted else ())
 
     def amplitude(self, scene: Scene) -> Any:
-        """M g l: half the range of the potential energy about a fixed point; free fall turns nothing."""
+        """M g l, half the range of the potential energy about a fixed point; zero in free fall, which exerts
+        no torque.
+        """
         arm = scene.torque_arm
         if arm is None:
             return scene.context.zero
         return norm(scene.context, arm) * norm(scene.context, self.acceleration)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """vertical x arm: the weight pulls the centre of mass down."""
+        """Torque of the weight about the fixed point, vertical x arm."""
         if m.vertical is None or m.numbers.arm is None:
             return []
         units = unit_vectors(m.scene.context)
         return [(cross(units[a], m.numbers.arm), m.vertical[a]) for a in range(3)]
 
     def force(self, m: Kinematics) -> list[Term]:
-        """Free fall."""
+        """Free-fall acceleration of the centre of mass."""
         if m.velocity is None or m.scene.gravity is None:
             return []
         context, scaling = m.scene.context, m.scaling
@@ -95,7 +99,7 @@ class UniformGravity(Load):
         return [(pull, hy.expression(1.0))]
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """M g l above the fixed point, or -M g . x in free flight."""
+        """Potential energy: M g times the height above the fixed point, or -M g . x in free flight."""
         context, scene, scaling = m.scene.context, m.scene, m.scaling
         if m.vertical is not None and m.numbers.arm is not None:
             return hy.sum([m.number(a) * v for a, v in zip(m.numbers.arm, m.vertical, strict=True) if a])
@@ -107,7 +111,9 @@ class UniformGravity(Load):
         return hy.sum(terms) if terms else None
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """A pendulum's pull is across the axis, and so is its arm; none of them has a torque along it."""
+        """Whether both the pull and its arm are perpendicular to the axis, so that the torque points along
+        it.
+        """
         context, arm = scene.context, scene.torque_arm
         if arm is None or all(x == 0 for x in arm):
             return True
@@ -119,7 +125,7 @@ class UniformGravity(Load):
         return bool(across and abs(dot(self.acceleration, normal)) <= tiny * strength)
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
-        """M com and g, about a fixed point."""
+        """M com (body axes) and g (space axes) about a fixed point; None in free fall."""
         return None if scene.torque_arm is None else (scene.torque_arm, self.acceleration)
 
     @property

@@ -16,7 +16,7 @@ from rigidsim.scene.scene import Scene
 
 
 class ViscousTorqueFields(LoadFields):
-    """A torque -c_i w_i about each body axis."""
+    """Config fields of a torque -c_i w_i about each body axis."""
 
     kind: Literal["viscous_torque"]
     coefficients: Triple[Damping] = Field(
@@ -45,7 +45,7 @@ class ViscousTorque(Load):
         return cls([c.at(around.context) for c in fields.coefficients])
 
     def acts(self) -> bool:
-        """Where any coefficient isn't zero."""
+        """Whether any coefficient is nonzero."""
         return any(c != 0 for c in self.coefficients)
 
     def damping(self) -> Vector | None:
@@ -53,16 +53,16 @@ class ViscousTorque(Load):
         return self.coefficients
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Where the damping of a spin about the axis is along it."""
+        """Whether damping a spin about the axis gives a torque along that axis."""
         context, damped = scene.context, [c * x for c, x in zip(self.coefficients, axis, strict=True)]
         return bool(norm(context, cross(damped, axis)) <= negligible(context) * max(self.coefficients))
 
     def amplitude(self, scene: Scene) -> Any:
-        """It only takes."""
+        """Zero: damping only removes energy."""
         return scene.context.zero
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """One term for each axis with damping."""
+        """One torque term for each damped axis."""
         context = m.scene.context
         terms: list[Term] = []
         for i, coefficient in enumerate(self.coefficients):

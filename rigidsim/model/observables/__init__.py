@@ -1,7 +1,6 @@
 """Observables and invariants: everything that can be recorded, as expressions of the state.
 
-One module per subject; what they define enters the registry when this package is imported, in the order in
-which a dataset holds it.
+One module per subject. Importing this package registers the observables in the order of the dataset.
 """
 
 from rigidsim.model.observables import mechanical  # noqa: F401, I001  (enters what it defines)

@@ -39,27 +39,27 @@ AXIS = ("axis",)
 
 
 def figure_axis(m: Mechanics) -> list[Symbolic]:
-    """Unit vector, space axes."""
+    """Unit vector along the figure axis, space axes."""
     return unit(m.figure_space)
 
 
 def spin_axis(m: Mechanics) -> list[Symbolic]:
-    """w / |w|, space axes."""
+    """Unit vector w / |w| along the angular velocity, space axes."""
     return unit(m.spin_space)
 
 
 def momentum_axis(m: Mechanics) -> list[Symbolic]:
-    """L / |L|, space axes."""
+    """Unit vector L / |L| along the angular momentum, space axes."""
     return unit(m.momentum_space)
 
 
 def three_axes(m: Mechanics) -> list[list[Symbolic]]:
-    """In the order of the labels of ``axis``."""
+    """Unit vectors in the order of the labels of the dimension ``axis``."""
     return [figure_axis(m), spin_axis(m), momentum_axis(m)]
 
 
 def obliquities(m: Mechanics) -> list[Symbolic]:
-    """Of each axis, from 0 to pi."""
+    """Obliquity of each axis, 0 to pi."""
     plane = reference_plane(m)
     found = []
     for axis in three_axes(m):
@@ -69,7 +69,7 @@ def obliquities(m: Mechanics) -> list[Symbolic]:
 
 
 def node_longitudes(m: Mechanics) -> list[Angle]:
-    """Of each axis."""
+    """Node longitude of each axis."""
     plane = reference_plane(m)
     found = []
     for axis in three_axes(m):
@@ -79,7 +79,9 @@ def node_longitudes(m: Mechanics) -> list[Angle]:
 
 
 def equatorial(m: Mechanics, vector: list[Symbolic]) -> list[Symbolic]:
-    """A vector in space axes along those of the equator: the same, but for those of the ecliptic."""
+    """A vector in space axes resolved along equatorial axes; unchanged unless the space axes are the
+    ecliptic's.
+    """
     if m.scene.axes != ECLIPTIC:
         return vector
     context = m.scene.context
@@ -105,13 +107,13 @@ def _declinations(m: Mechanics) -> list[Symbolic]:
     return found
 
 
-# --- what readers are told ----------------------------------------------------------------------------------
+# --- attributes shown to readers ------------------------------------------------------------------------
 
 
 def _told(
     convention: str, *, figure: bool = False, plane: bool = False
 ) -> Callable[[Mechanics], Mapping[str, str]]:
-    """Attributes of a variable."""
+    """Attributes of a variable: its convention, and the figure axis and reference plane if it uses them."""
 
     def attributes(m: Mechanics) -> dict[str, str]:
         found = {"convention": convention}

@@ -1,4 +1,4 @@
-"""What mechanics calls its own: states, momenta, energies, and the constants of the motion."""
+"""Mechanical quantities: states, momenta, energies and constants of the motion."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _central(m: Mechanics) -> str | None:
 
 
 def total_momentum(m: Mechanics) -> list[Symbolic]:
-    """M r x v + R I w about the (first) attracting point."""
+    """Total angular momentum M r x v + R I w about the (first) attracting point."""
     context, scaling = m.scene.context, m.scaling
     offset = []
     for x, a in zip(m.carried(m.position), attracting_point(m), strict=True):
@@ -119,7 +119,7 @@ def _euler(m: Mechanics) -> list[Symbolic]:
 
 
 def linear_momentum(m: Mechanics) -> list[Symbolic]:
-    """M v, in units of speed times 2^``mass_exponent``."""
+    """Linear momentum M v, in units of speed times 2^``mass_exponent``."""
     assert m.velocity is not None
     context = m.scene.context
     mass = context.ldexp(m.scene.body.mass, -mass_exponent(m))
@@ -127,7 +127,7 @@ def linear_momentum(m: Mechanics) -> list[Symbolic]:
 
 
 def mass_exponent(m: Mechanics) -> int:
-    """Of the mass, binary."""
+    """Binary exponent of the mass in kg."""
     return binary_magnitude(m.scene.context, m.scene.body.mass)
 
 

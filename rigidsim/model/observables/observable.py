@@ -1,8 +1,8 @@
-"""What an observable is: one entry from its name to its expressions, and how its samples are joined.
+"""Observables: one entry from a name to its expressions, and how its samples are joined.
 
-A new observable is one ``Observable`` in a list of this package; a new invariant one whose ``conserved`` says
-when and why it holds; angles that may turn around are ``continuous_angles``. Each then shows up in the
-dataset, the summary, the plots and the timeline.
+A new observable is one ``Observable`` in a list of this package. A new invariant is an observable whose
+``conserved`` says when and why it holds. Angles that may turn around are ``continuous_angles``. Each then
+shows up in the dataset, the summary, the plots and the timeline.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ def _nothing(_: Mechanics) -> Mapping[str, str]:
 
 
 def always(_: Mechanics) -> bool:
-    """Recorded wherever a scene has it, unless the config names what to record."""
+    """Record wherever a scene has the quantity, unless the config names what to record."""
     return True
 
 
 def only_when_named(_: Mechanics) -> bool:
-    """Recorded only where ``[output] record`` names it."""
+    """Record only if ``[output] record`` names the quantity."""
     return False
 
 
@@ -49,8 +49,8 @@ class Angle:
     """atan2(across, along), an angle that may turn around; it is undefined where both vanish.
 
     Attributes:
-        across, along: sine and cosine times a common size, which is of order 1 where the angle is well
-            defined: below ``rigidsim.solve.turns.UNDEFINED`` rounding errors of it, NaN is recorded.
+        across, along: sine and cosine times a common size, of order 1 where the angle is well
+            defined; NaN is recorded if it is below ``rigidsim.solve.turns.UNDEFINED`` rounding errors.
     """
 
     across: Symbolic
@@ -58,22 +58,22 @@ class Angle:
 
     @property
     def value(self) -> Symbolic:
-        """Within half a turn, rad."""
+        """The angle within half a turn, rad."""
         return hy.atan2(self.across, self.along)
 
     @property
     def squared_size(self) -> Symbolic:
-        """What vanishes where it is undefined."""
+        """Squared common size, which vanishes where the angle is undefined."""
         return self.across * self.across + self.along * self.along
 
 
 @dataclass(frozen=True)
 class Steady:
-    """How angles advance between samples, where that tells their turns without following the motion.
+    """How angles advance between samples, if that tells their full turns without following the motion.
 
     Attributes:
-        rates: of each angle as expressions of the state, rad per internal unit of time.
-        uncertainty: by which these may change between samples, rad/s.
+        rates: rate of each angle as an expression of the state, rad per internal unit of time.
+        uncertainty: by how much the rates may change between samples, rad/s.
         excursion: by which the angles may be off besides, rad. Both count for an angle whose sine and cosine
             have size 1, and are divided by a smaller one.
     """
@@ -89,25 +89,25 @@ def _unsteady(_: Mechanics) -> Steady | None:
 
 @dataclass(frozen=True)
 class Observable:
-    """One recordable quantity; one of your own enters by ``rigidsim.scene.registry.register_observable``.
+    """One recordable quantity; register your own with ``rigidsim.scene.registry.register_observable``.
 
     Attributes:
-        name: of the dataset's variable.
-        dims: beside time; keys of ``rigidsim.store.variables.LABELS``.
+        name: name of the dataset's variable.
+        dims: dimensions besides time; keys of ``rigidsim.store.variables.LABELS``.
         units: SI.
-        long_name: for readers.
+        long_name: description for readers.
         frame: "body axes", "space axes" or "".
         expressions: components as expressions of the state, in internal units (see ``Kinematics``).
         exponents: binary exponents of the components' internal units; None where they are in SI.
-        needs: what the scene must have, names of ``rigidsim.model.needs.NEEDS``.
+        needs: what the scene must have; names in ``rigidsim.model.needs.NEEDS``.
         conserved: why it is an invariant of this scene, or None where it isn't.
-        drift_scale: scale of its drift in SI (mpf), with a name for it.
-        by_default: whether it is recorded where the config names nothing.
+        drift_scale: scale of its drift in SI (mpf), and the name of that scale.
+        by_default: whether it is recorded if the config names nothing.
         continuity: how samples are joined, see ``rigidsim.model.outputs.Recorded``.
-        angles: where it is made of angles whose turns are counted (``continuous_angles``).
-        steady: how its angles advance between samples; None where they have to be followed.
+        angles: the angles whose full turns are counted (``continuous_angles``), if it consists of such.
+        steady: how its angles advance between samples; None if the motion has to be followed.
         attributes: further attributes of the variable: convention, reference plane, ...
-        absent: why this scene can't have it although it has all that it needs; None where it can.
+        absent: why this scene can't have it although it meets all needs; None if it can.
     """
 
     name: str
@@ -128,7 +128,7 @@ class Observable:
     absent: Callable[[Mechanics], str | None] = _never
 
     def available(self, m: Mechanics) -> bool:
-        """Whether the scene has all that it needs."""
+        """Whether the scene meets all needs and nothing else makes the quantity absent."""
         return m.tells(self.name) and self.needed(m) and self.absent(m) is None
 
     def needed(self, m: Mechanics) -> bool:
@@ -136,7 +136,7 @@ class Observable:
         return all(NEEDS[need].met(m) for need in self.needs)
 
     def unit_exponents(self, m: Mechanics, count: int) -> list[int]:
-        """One for each of ``count`` components."""
+        """Binary exponents of the units of ``count`` components."""
         return [0] * count if self.exponents is None else self.exponents(m)
 
 
@@ -158,7 +158,7 @@ def continuous_angles(
 
     Args:
         angles: one for each component.
-        steady: how they advance, where that is known well enough to tell turns between sparse samples.
+        steady: how they advance, if known well enough to tell turns between sparse samples.
     """
     return Observable(
         name,
@@ -178,7 +178,7 @@ def continuous_angles(
 
 
 def same_unit(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mechanics], list[int]]:
-    """``Observable.exponents`` of components that have one unit."""
+    """``Observable.exponents`` for components that share one unit."""
     return lambda m: [exponent(m)] * count
 
 

@@ -1,4 +1,4 @@
-"""The attitude in orbit: roll, pitch and yaw, libration, and where the source is (``local_frame``).
+"""Attitude relative to an orbit: roll, pitch and yaw, libration, and the direction of the source.
 
 With c the direction to the source and o the orbit's normal in body axes, and R the matrix whose rows are the
 local frame's axes in body axes,
@@ -38,7 +38,7 @@ LIBRATION = ("libration_angle",)
 
 
 def nadir(m: Mechanics) -> list[Symbolic]:
-    """Unit vector to the source, body axes."""
+    """Unit vector towards the source, body axes."""
     return local_frame(m).down
 
 
@@ -51,7 +51,7 @@ def roll_pitch_yaw(m: Mechanics) -> list[Angle]:
 
 
 def libration(m: Mechanics) -> list[Angle]:
-    """Of the long axis, in the orbit's plane and out of it."""
+    """Libration angles of the long axis, in the orbit's plane and out of it."""
     frame = local_frame(m)
     axis = in_body(m, m.carried(smallest_axis(m.scene.body, m.scene.context)))
     x, z = along(axis, frame.forward), along(axis, frame.down)

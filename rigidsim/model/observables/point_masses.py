@@ -1,8 +1,8 @@
-"""Point masses that move beside the body: where they are, and what their motion keeps.
+"""Point masses that move besides the body: positions, velocities, and what their motion conserves.
 
-Left to themselves (coupling "one_way") they keep energy, momentum and angular momentum; where they feel the
-body ("full") the whole does. Masses in kg are G M / G, with G such that the host's is the body's own, or
-CODATA's.
+On their own (coupling "one_way") they conserve energy, momentum and angular momentum; if they feel the body
+("full"), the whole system does. Masses in kg are G M / G, where G is chosen so that the host's mass is the
+body's own, or is CODATA's.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ def _masses(m: Mechanics) -> PointMasses:
 
 
 def _kilograms(m: Mechanics) -> Vector:
-    """Mass of each."""
+    """Mass of each point mass, kg."""
     masses = _masses(m)
     constant = masses.constant(m.scene.context, m.scene.body.mass)
     return [x / constant for x in masses.strengths]
 
 
 def _moving(m: Mechanics) -> list[tuple[Any, list[Symbolic], list[Symbolic], Vector, Vector]]:
-    """Mass, position and velocity (expressions, and at the start) of all that move: the body too, where it
-    flies by itself and is felt.
+    """Mass, position and velocity (as expressions, and at the start) of everything that moves, including the
+    body if it flies and the masses feel it.
     """
     states, masses = m.carried(m.point_masses), _masses(m)
     found = list(

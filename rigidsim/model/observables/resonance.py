@@ -1,4 +1,4 @@
-"""The angle that a body keeps with its source where it goes round in step with it, averaged over orbits."""
+"""Resonant angle between the body's rotation and its source's orbit, for motions averaged over both."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def _andoyer_angles(m: Mechanics) -> list[Angle]:
     figure, plane = m.scene.figure, reference_plane(m)
     k = unit(m.momentum_body)
     u, v, s = plane.components(apply(m.matrix, k))
-    # k x e3, taken in the body: small there, it keeps its digits
+    # k x e3 from body components: they are small there, so it keeps its digits
     q0, q1, q2 = plane.components(apply(m.matrix, cross(k, in_body(m, figure.pole))))
     across = (u * u + v * v) * q2 - s * (u * q0 + v * q1)
     return [
@@ -53,7 +53,7 @@ def _andoyer_angles(m: Mechanics) -> list[Angle]:
 
 
 def _senses(m: Mechanics) -> tuple[int, int]:
-    """On which side of the reference plane, and of the figure's equator, the momentum starts: +1 or -1."""
+    """Side of the reference plane, and of the figure's equator, on which the momentum starts: +1 or -1."""
     scene = m.scene
     momentum = apply_numbers(scene.body.inertia, scene.angular_velocity)
     in_space = apply_numbers(attitude.rotation_matrix(scene.quaternion), momentum)
@@ -66,7 +66,9 @@ def _rotation_angle(m: Mechanics) -> list[Angle]:
     north, upright = _senses(m)
 
     def seen(vector: list[Symbolic], sign: int = 1) -> list[Symbolic]:
-        """Along X', Y' and n, or X', -Y' and -n: with the momentum on the side of the last."""
+        """Components along X', Y', n, or along X', -Y', -n for sign -1, so that the momentum's last one is
+        positive.
+        """
         x, y, z = plane.components(vector)
         signs = (sign, sign * north, sign * north)
         return [a if s > 0 else -a for a, s in zip((x, y, z), signs, strict=True)]

@@ -1,4 +1,4 @@
-"""What a scene is about, as far as that decides what is recorded where a config names nothing.
+"""The kind of scene (planet, nearly axial rotator or other) that decides what is recorded by default.
 
 A planet that precesses has directions and their angles; one that turns nearly about its figure axis has polar
 motion, wobble and a rotation angle. Tops and tumbling bodies have neither by default.
@@ -13,11 +13,11 @@ from rigidsim.scene.arithmetic import apply, cross, dot, norm
 _AXIAL = 0.1
 """Angle (rad) between spin and figure axis up to which a body turns nearly about it."""
 _FAST = 10
-"""Times that a planet's spin is faster than its sources: below that it librates or tumbles with them."""
+"""Ratio of a planet's spin to its sources' rates; a slower body librates or tumbles with its source."""
 
 
 def _turns_about_its_figure(m: Mechanics) -> bool:
-    """Whether the body starts nearly about its figure axis: that of largest moment, or of symmetry."""
+    """Whether the body starts turning nearly about its figure axis (that of largest moment, or of symmetry)."""
     scene, context = m.scene, m.scene.context
     spin, pole = scene.angular_velocity, scene.figure.pole
     if all(w == 0 for w in spin):
@@ -29,7 +29,9 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
 
 
 def is_planet(m: Mechanics) -> bool:
-    """Whether a fast spin precesses under the gravity gradient of a body on an orbit, or of an ephemeris."""
+    """Whether the scene is a fast spin that precesses under the gravity gradient of an orbiting or ephemeris
+    body.
+    """
     if m.attitude is None or not m.turning:
         return False
     distant = [
@@ -42,7 +44,7 @@ def is_planet(m: Mechanics) -> bool:
 
 
 def is_nearly_axial(m: Mechanics) -> bool:
-    """Whether a body free of torques, or a planet, turns nearly but not just about its figure axis."""
+    """Whether a torque-free body or a planet turns nearly, but not exactly, about its figure axis."""
     if m.torque and not is_planet(m):
         return False
     scene, pole = m.scene, m.scene.figure.pole

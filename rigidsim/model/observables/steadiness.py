@@ -34,12 +34,12 @@ _SPARE = 4
 
 @dataclass(frozen=True)
 class _Bounds:
-    """Of a steady rotation; moments in kg m^2, rates in rad/s (mpf).
+    """Bounds of a steady rotation; moments in kg m^2, rates in rad/s (mpf).
 
     Attributes:
         wobble: largest angle between momentum and figure axis, rad.
-        drift: of the momentum's direction, and of a rate.
-        polar: the moment about the figure axis; equatorial: the others.
+        drift: bound of the rate at which the momentum's direction turns, and of a rate's change.
+        polar, equatorial: the moment about the figure axis, and the two others.
     """
 
     wobble: Any
@@ -49,7 +49,7 @@ class _Bounds:
 
 
 def _bounds(m: Mechanics) -> _Bounds | None:
-    """None where the motion isn't known to be steady."""
+    """Bounds of the scene's rotation; None if the motion isn't known to be steady."""
     scene, context = m.scene, m.scene.context
     body, pole = scene.body, scene.figure.pole
     momentum = apply(body.inertia, scene.angular_velocity)
@@ -73,7 +73,7 @@ def _bounds(m: Mechanics) -> _Bounds | None:
 
 
 def steady_directions(m: Mechanics) -> Steady | None:
-    """Of angles of the figure, spin and momentum axes, which advance by nothing."""
+    """Steadiness of the angles of the figure, spin and momentum axes, whose rates are taken as zero."""
     found, away = _bounds(m), plane_drift(m.scene, m.loads)
     if m.turning_rate is not None and away is not None:
         return Steady([constant(0.0)] * 3, float(m.turning_rate + away), 0.0)
@@ -86,8 +86,10 @@ def steady_directions(m: Mechanics) -> Steady | None:
 
 
 def steady_rotation(m: Mechanics) -> Steady | None:
-    """Of the rotation angle: with L the momentum along the axis it advances by (G - L)/A + L/C, 1/A being the
-    mean of both equatorial moments' inverses (Deprit 1967, eq. 25: dK/dG + dK/dL).
+    """Steadiness of the rotation angle.
+
+    With L the momentum along the axis it advances by (G - L)/A + L/C, 1/A being the mean of both equatorial
+    moments' inverses (Deprit 1967, eq. 25: dK/dG + dK/dL).
     """
     found, away = _bounds(m), plane_drift(m.scene, m.loads)
     if found is None or away is None or 0 in found.equatorial:

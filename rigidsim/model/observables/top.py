@@ -1,4 +1,4 @@
-"""A top: tilt, precession and spin of its figure axis against the vertical, and the path of a point of it.
+"""Tops: tilt, precession and spin of the figure axis against the vertical, and the path of a tip point.
 
 With p the figure axis and v the upward vertical (against gravity) in body axes, e and f the axes of the
 figure's equator, and p_X, p_Y the figure axis along the horizontal axes,
@@ -34,7 +34,7 @@ from rigidsim.scene.registry import register_observable
 
 
 def _vertical(m: Mechanics) -> list[Symbolic]:
-    """The upward vertical along the figure's equator (two) and the figure axis."""
+    """Components of the upward vertical along the figure's equator (two) and the figure axis."""
     figure = m.scene.figure
     up = m.carried(m.vertical)
     return [along(in_body(m, axis), up) for axis in (figure.first, figure.second, figure.pole)]
@@ -47,20 +47,20 @@ def tilt(m: Mechanics) -> list[Symbolic]:
 
 
 def spin_angle(m: Mechanics) -> list[Angle]:
-    """Of the body about its figure axis, from the line of nodes."""
+    """Rotation angle of the body about its figure axis, from the line of nodes."""
     e, f, _ = _vertical(m)
     return [Angle(e, f)]
 
 
 def precession_angle(m: Mechanics) -> list[Angle]:
-    """Of the figure axis about the vertical: of the line of nodes from the horizontal X."""
+    """Precession angle of the figure axis about the vertical: line of nodes from the horizontal X."""
     plane = fixed_plane(m, m.carried(m.numbers.up), "horizontal plane")
     u, v, _ = plane.components(figure_axis(m))
     return [Angle(u, -v)]
 
 
 def tip_point(m: Mechanics) -> Vector | None:
-    """The point whose path is recorded, body axes from the reference point, m (mpf): ``[output] tip``, or the
+    """Body-fixed point whose path is recorded, from the reference point (mpf, m): ``[output] tip``, or the
     centre of mass of a body that turns about another point; None without either.
     """
     given = m.scene.config.output.tip
@@ -71,7 +71,7 @@ def tip_point(m: Mechanics) -> Vector | None:
 
 
 def tip(m: Mechanics) -> list[Symbolic]:
-    """Where it is in space."""
+    """Position of the tip point, space axes."""
     context, length = m.scene.context, _tip_exponent(m)
     point = [context.ldexp(x, -length) for x in m.carried(tip_point(m))]
     turned = apply(m.matrix, in_body(m, point))

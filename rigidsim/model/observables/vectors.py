@@ -1,4 +1,4 @@
-"""Vectors and angles that several observables are made of, and what readers are told of them."""
+"""Vector algebra and shared attributes for observables."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from rigidsim.scene.arithmetic import Vector, cross
 
 
 def in_body(m: Mechanics, direction: Vector) -> list[Symbolic]:
-    """A fixed direction (mpf, body axes) as expressions."""
+    """A fixed body-axes direction (mpf) as expressions."""
     return [as_factor(m.number(x)) for x in direction]
 
 
 def along(a: list[Symbolic], b: list[Symbolic]) -> Symbolic:
-    """a . b."""
+    """Scalar product a . b."""
     return hy.sum([x * y for x, y in zip(a, b, strict=True)])
 
 
 def length(vector: list[Symbolic]) -> Symbolic:
-    """Euclidean."""
+    """Euclidean length."""
     return hy.sqrt(hy.sum([x * x for x in vector]))
 
 
 def unit(vector: list[Symbolic]) -> list[Symbolic]:
-    """Divided by its length; NaN for zero."""
+    """The vector divided by its length; NaN for zero."""
     size = length(vector)
     return [x / size for x in vector]
 
 
 def angle_between(a: list[Symbolic], b: list[Symbolic]) -> Symbolic:
-    """atan2(|a x b|, a . b), 0 to pi: no digits are lost at any angle; NaN where one is zero."""
+    """Angle atan2(|a x b|, a . b), 0 to pi, which loses no digits anywhere; NaN if either vector is zero."""
     aligned = along(a, b)
     across = length(cross(a, b))
     size = hy.sqrt(aligned * aligned + across * across)
@@ -41,11 +41,11 @@ def angle_between(a: list[Symbolic], b: list[Symbolic]) -> Symbolic:
 
 
 def figure_told(m: Mechanics) -> dict[str, str]:
-    """Which axis the figure axis is."""
+    """Attributes that tell which axis the figure axis is."""
     pole = ", ".join(m.scene.context.nstr(x, 17) for x in m.scene.figure.pole)
     return {"figure_axis": f"{m.scene.figure.described}: [{pole}] in body axes"}
 
 
 def plane_told(m: Mechanics) -> dict[str, str]:
-    """Which plane angles count from."""
+    """Attributes that tell the reference plane from which angles are measured."""
     return {"reference_plane": reference_plane(m).described}

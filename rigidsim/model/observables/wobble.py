@@ -1,4 +1,4 @@
-"""How the spin and the momentum of a body stand to its figure axis, seen from the body.
+"""Spin and angular momentum relative to the figure axis, seen from the body.
 
 Polar motion: m1 = w1 / w3, m2 = w2 / w3 along the figure's equator (Munk & MacDonald 1960, The Rotation of
 the Earth, eq. 6.1.1; IERS: x_p = m1, y_p = -m2).
@@ -33,7 +33,9 @@ def _polar_motion(m: Mechanics) -> list[Symbolic]:
 
 
 def _no_polar_motion(m: Mechanics) -> str | None:
-    """Where the spin starts outside the cone about the figure axis that polar motion is recorded in."""
+    """Why there is no polar motion: the spin starts outside the cone about the figure axis where it is
+    recorded.
+    """
     context, figure = m.scene.context, m.scene.figure
     along = abs(dot(m.scene.angular_velocity, figure.pole))
     across = norm(context, [dot(m.scene.angular_velocity, e) for e in (figure.first, figure.second)])

@@ -1,1 +1,1 @@
-"""Paths of sources as states of the system: Kepler orbits, tables and point masses."""
+"""Paths of sources carried as states of the system: Kepler orbits, tables and point masses."""

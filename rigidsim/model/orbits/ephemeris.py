@@ -1,4 +1,4 @@
-"""Where the Sun and the Moon are, from heyoka's analytic series.
+"""Positions of the Sun and the Moon from heyoka's analytic series.
 
 The Sun from VSOP2013 (Simon et al. 2013, A&A 557, A49: the heliocentric place of the barycentre of Earth and
 Moon, reversed: it stands for the Earth's, 4,670 km or 3e-5 of the distance away), the Moon from ELP2000
@@ -34,15 +34,15 @@ class SourcePosition:
 
 
 MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}
-"""Metres; the unit of ``SourcePosition.inverse_distance``."""
+"""Metres; the mean distance that ``SourcePosition.inverse_distance`` is relative to."""
 
 
 def source_position(body: str, seconds: Symbolic) -> SourcePosition:
-    """Where the Sun or the Moon is.
+    """Position of the Sun or the Moon.
 
     Args:
         body: "sun" or "moon".
-        seconds: since J2000, as an expression of the engine's time.
+        seconds: time since J2000, as an expression of the engine's time.
     """
     if body == "sun":
         millennia = seconds * (1.0 / (_DAY * 365250.0))

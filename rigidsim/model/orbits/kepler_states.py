@@ -24,12 +24,12 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class OrbitStates:
-    """The part of a system that carries an orbit.
+    """The part of a system of equations that carries an orbit.
 
     Attributes:
         block: the states; its norms stay 1, since each pair of states is a cosine and a sine.
         direction: unit vector towards the attracting body, space axes.
-        normal: of the orbit's plane, space axes; the attracting body goes around it in the direct sense.
+        normal: unit normal of the orbit's plane, space axes; the attracting body moves about it directly.
         inverse_distance: semi-major axis over distance, 1 for a circle.
     """
 
@@ -42,10 +42,10 @@ class OrbitStates:
 def orbit_states(
     orbit: KeplerOrbit, tag: str, time_unit: Any, start: Any, context: Any, number: Rounder
 ) -> OrbitStates:
-    """Carry an orbit.
+    """Carry a Kepler orbit as states.
 
     Args:
-        tag: makes the states' names unique, such as "1".
+        tag: suffix that makes the states' names unique, such as "1".
         time_unit: internal unit of time, seconds (mpf).
         start: time of the run's start, seconds (mpf).
     """
@@ -55,7 +55,7 @@ def orbit_states(
     norms: list[Symbolic] = []
 
     def pair(name: str, angle: Any, rate: Symbolic | None) -> tuple[Symbolic, Symbolic]:
-        """Cosine and sine of an angle: constants where it rests, two states where it moves."""
+        """Cosine and sine of an angle: constants if it is fixed, two states if it moves."""
         if rate is None:
             return _constant(context.cos(angle), number), _constant(context.sin(angle), number)
         c, s = hy.make_vars(f"cos_{name}{tag}", f"sin_{name}{tag}")

@@ -23,10 +23,10 @@ _AXES = "xyz"
 
 
 class PointMassStates:
-    """The states as expressions.
+    """Point masses' states as expressions.
 
     Attributes:
-        masses: what they start from.
+        masses: the point masses with their initial conditions.
     """
 
     def __init__(self, masses: PointMasses, scaling: Scaling, context: Any, number: Rounder) -> None:
@@ -35,17 +35,17 @@ class PointMassStates:
 
     @cached_property
     def positions(self) -> list[list[Symbolic]]:
-        """Of each mass, space axes, units of length."""
+        """Position of each mass, space axes, internal units of length."""
         return [list(hy.make_vars(*(f"{name}_{x}" for x in _AXES))) for name in self.masses.names]
 
     @cached_property
     def velocities(self) -> list[list[Symbolic]]:
-        """Of each mass, space axes, units of speed."""
+        """Velocity of each mass, space axes, internal units of speed."""
         return [list(hy.make_vars(*(f"{name}_v{x}" for x in _AXES))) for name in self.masses.names]
 
     @cached_property
     def inverse_distances(self) -> dict[tuple[int, int], Symbolic]:
-        """Of each pair (i, j), i < j."""
+        """Inverse distance of each pair (i, j), i < j, internal units."""
         found, count = {}, len(self.masses.names)
         for i in range(count):
             for j in range(i + 1, count):
@@ -54,14 +54,14 @@ class PointMassStates:
         return found
 
     def between(self, i: int, j: int) -> list[Symbolic]:
-        """From mass i to mass j."""
+        """Vector from mass i to mass j, internal units of length."""
         return [b - a for a, b in zip(self.positions[i], self.positions[j], strict=True)]
 
     def react(self, pulls: list[tuple[int, Any, list[Symbolic]]]) -> None:
-        """Feel forces beside those of the points.
+        """Add accelerations besides the mutual attraction of the points.
 
         Args:
-            pulls: for some masses the acceleration as a number (mpf) times expressions in units of speed over
+            pulls: accelerations of some masses as a number (mpf) times expressions in units of speed over
                 time.
         """
         self._pulls = pulls
@@ -82,7 +82,7 @@ class PointMassStates:
         return [[hy.sum(found) if found else hy.expression(0.0) for found in three] for three in terms]
 
     def block(self) -> StateBlock:
-        """All of them."""
+        """One block with the states of all masses."""
         context, scaling, masses = self._context, self._scaling, self.masses
         ratio = self._number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
         names: list[str] = []

@@ -1,6 +1,6 @@
-"""An orbit by a table, carried as states: the engine looks nothing up.
+"""Tabulated orbits carried as states, so that the engine interpolates no table.
 
-Between two rows each element is a polynomial of u, the part of their distance that is past:
+Between two rows each element is a polynomial of u, the elapsed fraction of the interval:
 
     u' = 1 / L,    x' = (c_1 + 2 c_2 u + ... + 5 c_5 u^4) / L,
 
@@ -37,12 +37,13 @@ from rigidsim.scene.records import dataclass
 
 _POWERS = 5  # of the polynomials; as many parameters for each element
 _LEAST = -5
-"""Binary exponent, in bits of the working precision, below which parameters are zero: elements are of order
-one, and what is smaller is left of a zero, and can be beyond single precision's range."""
+"""Binary exponent, in bits of the working precision, below which parameters are set to zero: elements are of
+order one, so that anything smaller is a remnant of a zero and could underflow single precision.
+"""
 
 
 class Carried(Enum):
-    """What of the place on the orbit is carried: the eccentric longitude, the mean one, or neither."""
+    """Which longitude along the orbit is carried: the eccentric one, the mean one, or neither."""
 
     ECCENTRIC = "eccentric"
     MEAN = "mean"
@@ -51,11 +52,11 @@ class Carried(Enum):
 
 @dataclass(frozen=True)
 class TablePlace:
-    """Where a table's states and parameters are.
+    """Positions of a table's states and parameters in the system.
 
     Attributes:
-        tag: makes the states' names unique, such as "1".
-        first: number of its first parameter.
+        tag: suffix that makes the states' names unique, such as "1".
+        first: index of its first parameter.
     """
 
     tag: str
@@ -63,19 +64,19 @@ class TablePlace:
     longitude: Carried = Carried.ECCENTRIC
 
     def elements(self, orbit: TabulatedOrbit) -> list[str]:
-        """Those that change and are carried."""
+        """Names of the elements that change and are therefore carried."""
         neither = self.longitude is Carried.NEITHER
         return [x for x in orbit.moving if not (neither and x == LONGITUDE)]
 
     def parameter_count(self, orbit: TabulatedOrbit) -> int:
-        """How many parameters an orbit has."""
+        """Number of parameters that an orbit takes."""
         return 1 + _POWERS * len(self.elements(orbit))
 
 
 def places_of(
     orbits: Sequence[tuple[str, TabulatedOrbit]], longitude: Carried = Carried.ECCENTRIC
 ) -> dict[TabulatedOrbit, TablePlace]:
-    """Of the orbits with their tags, each counted once."""
+    """Places of the given orbits, with their tags; an orbit that occurs twice gets one place."""
     found: dict[TabulatedOrbit, TablePlace] = {}
     first = 0
     for tag, orbit in orbits:
@@ -91,15 +92,15 @@ def _name(element: str, tag: str) -> str:
 
 @dataclass(frozen=True)
 class ElementStates:
-    """The elements of an orbit as expressions; axes in their mean.
+    """Orbital elements as expressions; the semi-major axis in units of its mean.
 
     Attributes:
-        block: states that carry the moving ones, and the mean longitude where that is asked for.
-        values: of axis, k, h, q, p; a constant as a factor.
-        rates: of those that move, and of the longitude where a column gives it, per internal unit of time.
+        block: states that carry the changing elements, and the mean longitude if requested.
+        values: axis, k, h, q, p; constants as factors.
+        rates: rates of changing elements (and longitude, if a column gives it) per internal time unit.
         motion: rate of the mean longitude.
         pace: mean motion by Kepler's third law, or by the period that was given.
-        mean_longitude: rad; None where it isn't carried.
+        mean_longitude: rad; None if it isn't carried.
     """
 
     block: StateBlock
@@ -111,7 +112,7 @@ class ElementStates:
 
     @property
     def normal(self) -> list[Symbolic]:
-        """Of the orbit's plane, unit, space axes."""
+        """Unit normal of the orbit's plane, space axes."""
         q, p = self.values["q"], self.values["p"]
         chi = hy.sqrt(1.0 - p * p - q * q)
         return [2.0 * (p * chi), -2.0 * (q * chi), 1.0 - 2.0 * (p * p + q * q)]
@@ -123,8 +124,8 @@ def element_states(
     """Carry the elements of an orbit.
 
     Args:
-        time_exponent: binary, of the internal unit of time in seconds.
-        start: of the run, seconds (mpf).
+        time_exponent: binary exponent of the internal unit of time in seconds.
+        start: start time of the run, seconds (mpf).
     """
     context, tag = orbit.context, place.tag
     begin = orbit.at(start)
@@ -141,7 +142,7 @@ def element_states(
         for power in reversed(range(_POWERS - 1)):
             rate = hy.par[first + power] + u * rate
         rates[element] = rate
-        if element == LONGITUDE:  # enters through K alone
+        if element == LONGITUDE:  # the place on the orbit enters through K alone
             continue
         names.append(_name(element, tag))
         values[element] = hy.make_vars(names[-1])
@@ -164,7 +165,7 @@ def element_states(
         names.append(_name(LONGITUDE, tag))
         derivatives.append(math.ldexp(1.0, -exponent) * motion)
         initial.append(context.zero)
-        # as a turn's part: what the start adds beyond that says nothing
+        # as a fraction of a turn: whole turns before the start carry no information
         longitude = number(orbit.starting_longitude(start) % (2 * context.pi)) + math.ldexp(
             1.0, exponent
         ) * hy.make_vars(names[-1])
@@ -174,7 +175,7 @@ def element_states(
 def table_states(
     orbit: TabulatedOrbit, place: TablePlace, time_exponent: int, start: Any, number: Rounder
 ) -> OrbitStates:
-    """Carry an orbit with the place on it; arguments as of ``element_states``."""
+    """Carry an orbit including the position along it; arguments as for ``element_states``."""
     context, tag = orbit.context, place.tag
     found = element_states(orbit, place, time_exponent, start, number)
     begin = orbit.at(start)
@@ -206,15 +207,15 @@ def table_states(
 
 
 def _unit(orbit: TabulatedOrbit, element: str) -> Any:
-    """What an element is carried in: axes in their mean."""
+    """Unit in which an element is carried: the mean axis for axes, 1 for the rest."""
     return orbit.semi_major_axis if element == AXIS else orbit.context.one
 
 
 class Pieces:
-    """What changes in the equations at given times: parameters, and states that are set.
+    """Pieces of the table: parameters, and states that are reset, at given times.
 
     Attributes:
-        knots: times (internal units, working precision) at which it does, ascending, after the start.
+        knots: ascending times after the start at which pieces begin (internal units, working precision).
     """
 
     def __init__(
@@ -239,11 +240,11 @@ class Pieces:
         self._longitudes: dict[TabulatedOrbit, Any] = {}
 
     def number_at(self, time: Any) -> int:
-        """Of the piece from a time on (internal units, working precision)."""
+        """Number of the piece that begins at or contains a time (internal units, working precision)."""
         return bisect_right(self.knots, time)
 
     def parameters(self, number: int) -> list[Any]:
-        """All of them in a piece, working precision."""
+        """All parameters of a piece, working precision."""
         if number not in self._known:
             found: list[Any] = []
             for orbit in self._places:
@@ -256,7 +257,7 @@ class Pieces:
         return self._known[number]
 
     def states(self, number: int) -> dict[str, Any]:
-        """Those that are set where a piece begins, by name, working precision."""
+        """Values, by name, of the states that are reset where a piece begins, working precision."""
         found: dict[str, Any] = {}
         for orbit, row in self._rows[number - 1].items() if number else ():
             place, begin = self._places[orbit], orbit.row(row)
@@ -275,7 +276,7 @@ class Pieces:
         return {name: self._number(value) for name, value in found.items()}
 
     def _row(self, orbit: TabulatedOrbit, number: int) -> int:
-        """Of a table, with which a piece begins or in whose span it lies."""
+        """Table row at which a piece begins or in whose interval it lies."""
         for before in range(number - 1, -1, -1):
             if orbit in self._rows[before]:
                 return self._rows[before][orbit]
