@@ -114,7 +114,9 @@ def assemble_states(
 def _attitude(
     plan: ModelPlan, rates: list[Symbolic], number: Rounder, sequence: str | None
 ) -> AttitudeStates | None:
-    """Attitude states of a formulation that carries an attitude besides the rates; None if none is carried."""
+    """Attitude states of a formulation that carries an attitude besides the rates; None if none is
+    carried.
+    """
     scene, formulation = plan.scene, plan.requirements.formulation
     if formulation == "rates":
         return None

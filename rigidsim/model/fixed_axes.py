@@ -91,7 +91,9 @@ def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bo
 
 
 def field_axis(m: Mechanics) -> Vector | None:
-    """Unit vector along the field to which the linear potentials combine; None if they don't combine to one."""
+    """Unit vector along the field to which the linear potentials combine; None if they don't combine to
+    one.
+    """
     linear = _linear(m, m.turning)
     if not linear:
         return None

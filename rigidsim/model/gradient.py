@@ -1,4 +1,6 @@
-"""The torque of a gravity gradient (MacCullagh), whatever its source, and the range of its potential energy."""
+"""The torque of a gravity gradient (MacCullagh), whatever its source, and the range of its potential
+energy.
+"""
 
 from __future__ import annotations
 

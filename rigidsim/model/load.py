@@ -128,7 +128,9 @@ class Load(SceneLoad):
         return None
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
-        """3 G M / R^3 (mpf, 1/s^2) and unit vector (space axes) of a source at rest in space; None otherwise."""
+        """3 G M / R^3 (mpf, 1/s^2) and unit vector (space axes) of a source at rest in space; None
+        otherwise.
+        """
         return None
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None:

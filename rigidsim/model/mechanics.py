@@ -36,7 +36,9 @@ class Mechanics(Kinematics):
 
     @property
     def kept_by_average(self) -> str | None:
-        """Why averaging over rotations keeps the size of the angular momentum constant; None if it doesn't."""
+        """Why averaging over rotations keeps the size of the angular momentum constant; None if it
+        doesn't.
+        """
         return None
 
     @property
@@ -127,7 +129,9 @@ class Mechanics(Kinematics):
 
     @property
     def marked(self) -> Vector | None:
-        """See ``Kinematics``: points to the centre of mass of a heavy body, or along the dipole of any other."""
+        """See ``Kinematics``: points to the centre of mass of a heavy body, or along the dipole of any
+        other.
+        """
         pulled = [load.linear_potential(self.scene) for load in self.loads]
         return self.numbers.arm or next((found[0] for found in pulled if found is not None), None)
 

@@ -51,7 +51,8 @@ _LEAST = 2.0**-6
 STRIDE = "stride"
 _WHY = "constant: steps are relative to the largest state, and of their order they may be longer"
 _ALIKE = 4
-"""Largest ratio of s and n, whose quotient scales f: it is sqrt(3) where the motion's period is the orbit's.
+"""Largest ratio of s and n, whose quotient scales f: it is sqrt(3) where the motion's period is the
+orbit's.
 """
 
 

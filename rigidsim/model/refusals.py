@@ -24,17 +24,19 @@ from rigidsim.model.state_selection import Requirements
 from rigidsim.scene.scene import Scene
 
 _LARGEST_EXPONENT = 1000
-"""Of a recorded variable in SI: float64 ends at 2^1024, and the size of a variable is known roughly."""
+"""Largest binary exponent of a recorded variable in SI: float64 ends at 2^1024, and sizes are known only
+roughly.
+"""
 _STATES = 16
 _NOISE = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
 _QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 def refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
-    """A start where canonical momenta of Euler angles don't exist.
+    """Refuse a start at which canonical momenta of Euler angles don't exist.
 
     Raises:
-        ConfigError: it is one.
+        ConfigError: the start is singular.
     """
     if attitude is None or attitude.singular_factor is None:
         return
@@ -57,10 +59,10 @@ def refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None
 def refuse_out_of_range(
     initial: list[Any], variables: Sequence[Recorded | Invariant], number: Rounder
 ) -> None:
-    """Numbers that neither the states nor the dataset's float64 can hold.
+    """Refuse numbers that the states or the dataset's float64 can't hold.
 
     Raises:
-        OverflowError: there is one.
+        OverflowError: a number is out of range.
     """
     for value in initial:
         number(value)
@@ -71,13 +73,13 @@ def refuse_out_of_range(
 
 
 def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> None:
-    """Evaluate torques and forces at random states and at the same attitudes' other quaternions.
+    """Refuse a load that differs between q and -q, by evaluating torques and forces at random states.
 
     Args:
         loads: those given by expressions or from Python.
 
     Raises:
-        ConfigError: names the load, what was found, and what to write instead.
+        ConfigError: a load is odd; names it, what was found, and what to write instead.
     """
     for load in loads:
         if "attitude" not in load.reads or requirements.formulation == "rates":

@@ -1,1 +1,1 @@
-"""Files: segments, the labelled dataset, the run folder, provenance."""
+"""Files on disk: segments, the labelled dataset, the run folder, provenance."""

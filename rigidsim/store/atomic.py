@@ -1,7 +1,7 @@
-"""Files and folders that take the place of others in one step, so that none is ever seen half-written.
+"""Atomic replacement of files and folders, so that none is ever seen half-written.
 
-What is new comes into being under a hidden name beside its place, which no other process uses, is synced to
-disk and then renamed; so what has a final name is whole, whatever kills the process or fills the disk.
+New content is written under a hidden name beside its destination, which no other process uses, synced to
+disk and then renamed; so a file with its final name is whole, whatever kills the process or fills the disk.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         OSError: it can't be written.
     """
-    path.parent.stat()  # where there is no such folder, it is told before the work is done
+    path.parent.stat()  # a missing parent folder is reported before the work is done
     temporary = _hidden(path, "partial")
     try:
         yield temporary
@@ -39,7 +39,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
-    """The same for a folder, in two steps where there is one: a rename can't replace a folder with files.
+    """The same for a folder, in two steps if there is one already: a rename can't replace a folder with
+    files.
 
     Raises:
         OSError: it can't be written.

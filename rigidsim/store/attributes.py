@@ -1,4 +1,4 @@
-"""The root attributes of segments and datasets: one definition to write, read and compare them by."""
+"""Root attributes of segments and datasets: one definition for writing, reading and comparing them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rigidsim.store import segments
 
 
 class Use(Enum):
-    """What an attribute is for, beside being read."""
+    """What an attribute is used for, besides being read by people."""
 
     SYSTEM = "must be the same for a run to be resumed"
     SETTING = "must be the same when a dataset is verified"
@@ -23,35 +23,35 @@ class Use(Enum):
 
 
 class RootAttributes(BaseModel):
-    """Root attributes; those that are None, as some of older versions and of segments are, don't stand there.
+    """Root attributes; those that are None, as some are in older versions and in segments, aren't written.
 
     Attributes:
         config: the TOML text of what was run, one visible value per key; its digest is config_sha256.
         config_given: the text as it was given, before settings replaced values in it; older files have none,
             and keep settings in ``#:set`` comments at the end of config.
-        config_set: the settings (KEY=VALUE), one a line.
+        config_set: the settings (KEY=VALUE), one per line.
         run_id: tells this run from all others.
-        states: names, in order.
-        tolerance: effective.
+        states: names of the states, in order.
+        tolerance: the effective tolerance.
         unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back, table_errors:
             JSON.
-        modelling_error: of an averaged model, largest of its directions until the end, rad.
+        modelling_error: largest error of an averaged model's directions until the end, rad.
         principal_moments, inertia_tensor: kg m^2.
-        center_of_mass: of the body from its reference point, body axes, m: JSON.
-        mass: of the body, kg, where it is known.
-        surroundings: what stands around the body, for pictures (see ``rigidsim.look.surroundings``): JSON.
-        attitude_error: announced for the end of the run, rad, where it was estimated.
-        recorded: names of what is recorded along time, drifts and residuals apart: where the config names
+        center_of_mass: from the body's reference point to its centre of mass, body axes, m: JSON.
+        mass: the body's mass, kg, if known.
+        surroundings: objects around the body, for pictures (see ``rigidsim.look.surroundings``): JSON.
+        attitude_error: estimate for the end of the run, rad, if one was made.
+        recorded: names of the variables along time, without drifts and residuals: if the config names
             none, a later version may record more by default.
-        hold_from_step: natural steps after which invariants are projected; none where that is from the start.
-        python_loads: names of classes.
-        axes: what the space axes are, where that is known.
-        epoch: time 0, where that is known: date, time and scale.
-        time_unit: the unit that times are to be shown in, where the config asks for one.
+        hold_from_step: natural steps after which invariants are projected; None if from the start.
+        python_loads: class names of loads given from Python.
+        axes: what the space axes are, if known.
+        epoch: date, time and scale of time 0, if known.
+        time_unit: unit in which times are shown, if the config asks for one.
         started_at, finished_at: UTC.
-        mixed_provenance: where the run was resumed with other versions or on another machine, what changed.
-        warnings: one a line.
-        wall_seconds, cpu_seconds: of all sessions.
+        mixed_provenance: what changed, if the run was resumed with other versions or on another machine.
+        warnings: one per line.
+        wall_seconds, cpu_seconds: sums over all sessions.
         angles_wrapped_from: from this time on (s) Euler angles are within one turn, since nobody knows their
             turns; none where all are known.
     """
@@ -126,19 +126,21 @@ class RootAttributes(BaseModel):
     angles_wrapped_from: float | None = None
 
     def having(self, **known: Any) -> Self:
-        """A copy with what has become known since."""
+        """A copy with the given attributes set."""
         return type(self)(**{**dict(self), **known})
 
     def as_dict(self) -> dict[str, Any]:
-        """Those that stand in the file."""
+        """The attributes that stand in the file."""
         return self.model_dump(exclude_none=True)
 
     def of_use(self, use: Use) -> dict[str, Any]:
-        """Those that are for one use."""
+        """The attributes that serve one use."""
         return {name: getattr(self, name) for name in _names(use)}
 
     def changed(self, use: Use, now: RootAttributes) -> Iterator[tuple[str, Any, Any]]:
-        """Name, value here and value now of those that differ; what an older version didn't say doesn't."""
+        """Name, value here and value now of those that differ; what an older version didn't record counts as
+        unchanged.
+        """
         then, others = self.of_use(use), now.of_use(use)
         for name, value in then.items():
             if value is not None and value != others[name]:
@@ -153,7 +155,7 @@ def read_attributes(path: Path) -> RootAttributes:
     """The root attributes of a dataset or segment.
 
     Raises:
-        RunFolderError: it is none of rigidsim.
+        RunFolderError: the file isn't one of rigidsim's.
     """
     try:
         return RootAttributes.model_validate(segments.root_attributes(path))

@@ -1,7 +1,7 @@
 """Chunks of rows compressed outside HDF5, several at a time, in the format of its shuffle and gzip filters.
 
 HDF5 compresses one chunk after the other with zlib, which is most of the CPU time of writing a dense run.
-ISA-L (by python-isal) gives the same format in a tenth of it; where it isn't installed zlib does.
+ISA-L (through python-isal) gives the same format in a tenth of it; without it, zlib is used.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from h5py import h5d, h5z
 from rigidsim.scene.records import dataclass
 
 Deflate = Callable[..., bytes]
-"""Of bytes, at a level."""
+"""Compresses bytes at a level."""
 ZLIB: tuple[Deflate, int] = zlib.compress, 4
 try:
     from isal import isal_zlib
@@ -34,12 +34,13 @@ except ImportError:
 
 @dataclass(frozen=True)
 class Threads:
-    """When chunks are compressed in threads of their own.
+    """When chunks are compressed in threads.
 
     Attributes:
-        most: of them; more than four wait for the disk. None: as many of four as there are idle processors.
-        fewest: numbers from which on there are any: some milliseconds of work.
-        waiting: chunks that may wait to be written, of 64 kB for each component.
+        most: largest number of threads; more than four wait for the disk. None: as many as there are idle
+            processors, up to four.
+        fewest: numbers to compress from which on threads are used: some milliseconds of work.
+        waiting: chunks of 64 kB per component that may wait to be written.
     """
 
     most: int | None = None
@@ -48,7 +49,7 @@ class Threads:
 
     @property
     def count(self) -> int:
-        """How many to begin with now."""
+        """Number of threads to begin with now."""
         return min(4, _processors()) if self.most is None else self.most
 
 
@@ -56,14 +57,14 @@ THREADS = Threads()
 
 
 def packed(values: np.ndarray, by: tuple[Deflate, int] = FASTEST) -> bytes:
-    """Doubles as they stand in a chunk: all first bytes, all second bytes, ..., deflated."""
+    """Doubles as stored in a chunk: all first bytes, all second bytes, ..., deflated."""
     deflate, level = by
     octets = np.ascontiguousarray(values, "<f8").view(np.uint8).reshape(-1, 8)
     return bytes(deflate(np.ascontiguousarray(octets.T), level))
 
 
 class Compressor:
-    """Compresses chunks, in threads as soon as there is enough to do; see ``close``."""
+    """Compresses chunks, in threads as soon as there is enough to do; call ``close`` at the end."""
 
     def __init__(self, threads: Threads = THREADS) -> None:
         self.threads = threads
@@ -71,10 +72,10 @@ class Compressor:
         self._numbers = 0
 
     def packed(self, chunks: Sequence[np.ndarray]) -> list[Future[bytes]]:
-        """Whole chunks as they stand in a file, now or later.
+        """Compress whole chunks to what stands in a file, now or later.
 
         Args:
-            chunks: one piece of work, best of some hundred kB; not to be changed from now on.
+            chunks: one piece of work, ideally some hundred kB; must not be changed afterwards.
         """
         done: list[Future[bytes]] = [Future() for _ in chunks]
         self._numbers += sum(chunk.size for chunk in chunks)
@@ -88,7 +89,7 @@ class Compressor:
         return done
 
     def close(self) -> None:
-        """End the threads; what they haven't begun is dropped."""
+        """End the threads and drop work that hasn't begun."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
             self._pool, self._numbers = None, 0
@@ -103,25 +104,25 @@ def _pack(chunks: Sequence[np.ndarray], done: Sequence[Future[bytes]]) -> None:
 
 
 class ChunkWriter:
-    """Writes chunks in the order in which they come, while later ones are compressed."""
+    """Writes chunks in the order in which they arrive, while later ones are being compressed."""
 
     def __init__(self, compressor: Compressor) -> None:
         self._compressor, self._most = compressor, compressor.threads.waiting
         self._waiting: deque[tuple[h5d.DatasetID, tuple[int, ...], Future[bytes]]] = deque()
 
     def put(self, target: h5d.DatasetID, place: tuple[int, ...], values: np.ndarray) -> None:
-        """Compress a whole chunk, and write it now or later.
+        """Compress a whole chunk and write it, now or later.
 
         Args:
-            place: of its first number.
-            values: not to be changed from now on.
+            place: index of its first number.
+            values: must not be changed afterwards.
         """
         self._waiting.append((target, place, *self._compressor.packed([values])))
         while self._waiting and (len(self._waiting) > self._most or self._waiting[0][2].done()):
             self._write_next()
 
     def finish(self) -> None:
-        """Write what waits."""
+        """Write all chunks that are still waiting."""
         while self._waiting:
             self._write_next()
 
@@ -131,20 +132,20 @@ class ChunkWriter:
 
 
 def _processors() -> int:
-    """Those that aren't busy of late: beside other work threads save no time and cost a fifth more of it."""
+    """Number of processors idle of late: beside other work, threads save no time and cost a fifth more."""
     there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     return max(0, round(there - busy))
 
 
 class RowCutter:
-    """Cuts rows into chunks as they come.
+    """Cuts rows into chunks as they arrive.
 
     Attributes:
         filled: rows that don't fill a chunk yet.
 
     Args:
-        shape: of a chunk.
+        shape: shape of a chunk.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -153,8 +154,10 @@ class RowCutter:
         self.filled = 0
 
     def cut(self, values: np.ndarray) -> Iterator[np.ndarray]:
-        """Take rows, doubles in any shape of that many numbers that aren't changed from now on; the chunks
-        that are full with them.
+        """Take rows and yield the chunks that they complete.
+
+        Args:
+            values: doubles in any shape of that many numbers; must not be changed afterwards.
         """
         rows = self._shape[0]
         values = np.asarray(values, "<f8").reshape(-1, *self._shape[1:])
@@ -180,15 +183,15 @@ class RowCutter:
 
     @property
     def last(self) -> np.ndarray:
-        """They as a chunk, which is a whole one in a file whatever rows there are."""
+        """The remaining rows as a chunk, which has full size in a file however few rows there are."""
         return self._open
 
 
 class ChunkedVariable:
-    """The chunks of one compressed variable, filled with rows as they come.
+    """Chunks of one compressed variable, filled with rows as they arrive.
 
     Args:
-        target: created with chunks along its first dimension alone.
+        target: HDF5 dataset with chunks along its first dimension only.
     """
 
     def __init__(self, target: h5d.DatasetID, writer: ChunkWriter) -> None:
@@ -199,37 +202,39 @@ class ChunkedVariable:
         self._cutter = RowCutter(self._shape)
 
     def add(self, values: np.ndarray) -> None:
-        """Take rows: doubles in any shape of that many numbers, not to be changed from now on."""
+        """Take rows: doubles in any shape of that many numbers, which must not be changed afterwards."""
         for chunk in self._cutter.cut(values):
             self._put(chunk)
 
     def add_zeros(self, count: int) -> None:
-        """Take so many rows of zeros."""
+        """Append ``count`` rows of zeros."""
         for start in range(0, count, self._shape[0]):
             self.add(np.zeros((min(self._shape[0], count - start), *self._shape[1:])))
 
     def add_packed(self, content: bytes) -> None:
-        """Take a chunk as it stands in a file, where no rows wait for the rest of theirs."""
+        """Append a compressed chunk as it is; no incomplete chunk may be waiting."""
         if self._cutter.filled:
             raise AssertionError("a whole chunk in the middle of another")
         self._target.write_direct_chunk(self._place, content)
         self._first += self._shape[0]
 
     def add_chunks_of(self, saved: h5py.Dataset) -> int:
-        """Take whole chunks of another file as they are, if they are made like these; returns their rows."""
+        """Copy whole chunks of another file unchanged if they are laid out like these; returns the rows
+        copied.
+        """
         rows = self._shape[0]
         if self._cutter.filled or saved.chunks != self._shape or not _packed_alike(saved.id):
             return 0
         whole = len(saved) // rows
         for number in range(whole):
             mask, content = saved.id.read_direct_chunk((number * rows, *self._place[1:]))
-            if mask:  # filters that were left out
+            if mask:  # some filters were left out
                 return number * rows
             self.add_packed(content)
         return whole * rows
 
     def finish(self) -> None:
-        """Write the last chunk, which is a whole one in the file whatever rows there are."""
+        """Write the last chunk, which has full size in the file however few rows there are."""
         if self._cutter.filled:
             self._put(self._cutter.last)
 
@@ -253,7 +258,7 @@ def _packed_alike(saved: h5d.DatasetID) -> bool:
 def chunked(
     variables: Mapping[str, h5d.DatasetID], threads: Threads = THREADS
 ) -> Iterator[dict[str, ChunkedVariable]]:
-    """The chunks of compressed variables, whose rows are added inside the block; written when it ends."""
+    """Compressed variables to which rows are added inside the block; everything is written when it ends."""
     compressor = Compressor(threads)
     writer = ChunkWriter(compressor)
     chunks = {name: ChunkedVariable(target, writer) for name, target in variables.items()}
@@ -263,4 +268,4 @@ def chunked(
             variable.finish()
         writer.finish()
     finally:
-        compressor.close()  # after an error or Ctrl-C nobody needs what waits
+        compressor.close()  # after an error or Ctrl-C nobody needs the waiting chunks

@@ -1,6 +1,7 @@
-"""Rows that wait for their segment: whole chunks compressed as soon as they are full, the rest as they came.
+"""Rows waiting for their segment: whole chunks are compressed as soon as they are full, the rest stays as it
+is.
 
-Chunks of a segment that begins with one of the dataset's are copied into the dataset as they are, so that
+A segment's chunks that coincide with the dataset's are copied into it unchanged, so that
 each is compressed once, and while the next samples are being integrated.
 """
 
@@ -21,10 +22,10 @@ class CollectedRows:
     """The rows since the last segment.
 
     Attributes:
-        rows: their number.
+        rows: number of rows.
 
     Args:
-        first: index of the first of them; chunks are compressed where it is the first of a chunk.
+        first: index of the first row; chunks are compressed if it begins one.
     """
 
     def __init__(self, variables: Sequence[Variable], first: int, compressor: Compressor) -> None:
@@ -42,7 +43,7 @@ class CollectedRows:
 
     @property
     def compressed(self) -> bool:
-        """Whether they are written as chunks: less than one isn't worth it."""
+        """Whether the rows are written as chunks; less than one chunk isn't worth it."""
         return self._fitting and self.rows >= CHUNK_ROWS
 
     def add(self, block: Block) -> None:
@@ -61,7 +62,7 @@ class CollectedRows:
                 self._packed[name].append(content)
 
     def write(self, created: Created) -> None:
-        """Write them into a segment whose variables were declared for as many, compressed or not."""
+        """Write the rows into a segment whose variables were declared for this count, compressed or not."""
         if self.compressed:
             self._write_chunks(created)
         elif self._fitting:
@@ -84,7 +85,7 @@ class CollectedRows:
                 created[name].write_direct_chunk((number * CHUNK_ROWS, *beside), chunk.result())
 
     def add_to(self, chunks: Mapping[str, ChunkedVariable]) -> None:
-        """Add them to a dataset, after those of all segments; of variables that it has."""
+        """Append the rows of the given variables to a dataset that already has all segments."""
         for block in self._blocks:
             for variable in self._variables:
                 for name, values in zip(variable.part_names(), block[variable.name], strict=True):
@@ -99,7 +100,7 @@ class CollectedRows:
 
 
 class JoinedBlocks(Mapping[str, Sequence[np.ndarray]]):
-    """Blocks one after the other; only the variable that is asked for is in memory twice."""
+    """Concatenation of blocks; only the variable being read is in memory twice."""
 
     def __init__(self, blocks: Sequence[Block], variables: Sequence[Variable]) -> None:
         self._blocks = blocks
@@ -109,7 +110,9 @@ class JoinedBlocks(Mapping[str, Sequence[np.ndarray]]):
         return [self._column(name, part) for part in range(self._parts[name])]
 
     def _column(self, name: str, part: int) -> np.ndarray:
-        """Row by row in memory, as it stands in a file; blocks come column by column."""
+        """One part of a variable, row by row as it is stored in a file; blocks are stored column by
+        column.
+        """
         pieces = [block[name][part] for block in self._blocks]
         rows = sum(len(piece) for piece in pieces)
         return np.concatenate(pieces, out=np.empty((rows, *pieces[0].shape[1:])))

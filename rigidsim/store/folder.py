@@ -34,43 +34,43 @@ class RunFolder(WorkFolder):
 
     @property
     def figure(self) -> Path:
-        """Where ``rigidsim plot`` draws unless told otherwise."""
+        """Default file of ``rigidsim plot``."""
         return self.path / "figure.png"
 
     def figure_of(self, what: str) -> Path:
-        """Where ``rigidsim plot --what`` draws a figure of that name unless told otherwise."""
+        """Default file of ``rigidsim plot --what`` for a figure of that name."""
         return self.path / f"figure_{what}.png"
 
     @property
     def analysis(self) -> Path:
-        """Where ``rigidsim analyse`` writes unless told otherwise."""
+        """Default file of ``rigidsim analyse``."""
         return self.path / "analysis.h5"
 
     @property
     def spectrum(self) -> Path:
-        """Its figure."""
+        """Figure of the analysis."""
         return self.path / "analysis.png"
 
     @property
     def checkpoint(self) -> Path:
-        """Where a finished run can be prolonged from."""
+        """Checkpoint from which a finished run can be prolonged."""
         return self.path / "checkpoint.h5"
 
     @property
     def segments(self) -> Path:
-        """What an unfinished run has saved."""
+        """Folder of the segments that an unfinished run has saved."""
         return self.path / "segments"
 
     @property
     def set_aside(self) -> Path:
-        """Segments that didn't belong, out of the way."""
+        """Folder to which segments that don't belong to the run are moved."""
         return self.path / "set_aside"
 
     def begin(self, config: str, *, force: bool) -> None:
-        """Make the folder ready for a new run, and leave its config and the mark of a run under way there.
+        """Make the folder ready for a new run: write its config and mark it as under way.
 
         Raises:
-            RunFolderError: as ``create``.
+            RunFolderError: as for ``create``.
         """
         self.create(force=force)
         try:
@@ -80,7 +80,7 @@ class RunFolder(WorkFolder):
             raise self.unwritable(error) from None
 
     def create(self, *, force: bool) -> None:
-        """Make the folder empty of any run.
+        """Create the folder, or clear it of an earlier run.
 
         Raises:
             RunFolderError: it holds a run and ``force`` is false, or something that is no run, or it can't
@@ -109,7 +109,7 @@ class RunFolder(WorkFolder):
                     f"{self.path}: holds {what}; {FORCE} replaces it, another {OUT} puts this one elsewhere"
                 )
             self.remove_torn()
-            for path in files:  # the segments last: as long as they are there, the run isn't finished
+            for path in files:  # segments go last: as long as they are there, the run isn't finished
                 path.unlink(missing_ok=True)
             for path in folders:
                 segments.remove(path)
@@ -120,7 +120,7 @@ class RunFolder(WorkFolder):
 
     @property
     def read_only(self) -> OSError | None:
-        """Why nothing can be written here, as far as can be told without trying; None where it can."""
+        """Why the folder can't be written, as far as can be told without trying; None if it can."""
         for place in (self.path, self.segments):
             if not place.is_dir() or _may_write(place):
                 continue
@@ -130,7 +130,7 @@ class RunFolder(WorkFolder):
         return None
 
     def refuse_read_only(self) -> None:
-        """Before hours of work whose result could not be saved.
+        """Refuse a folder that can't be written, before hours of work whose result couldn't be saved.
 
         Raises:
             RunFolderError: the folder can't be written.
@@ -143,7 +143,7 @@ class RunFolder(WorkFolder):
             )
 
     def remove_torn(self) -> None:
-        """Delete what a killed process was writing, or deleting, when it died."""
+        """Delete partial files that a killed process was writing or deleting."""
         for folder in (self.path, self.segments):
             for pattern in (".*.partial", ".timeline.rrd.*.part"):
                 for path in folder.glob(pattern):
@@ -155,7 +155,8 @@ class RunFolder(WorkFolder):
     def reopen(self) -> None:
         """Make a finished run unfinished: its dataset becomes the first segment, its checkpoint the second.
 
-        In one step for whoever looks, and for a crash: before it the run is finished, after it it isn't.
+        This is one step for other processes, and in a crash: the run is finished before it and unfinished
+        after it.
         """
         prepared = self.path / _REOPENED
         prepared.mkdir()
@@ -176,7 +177,7 @@ class RunFolder(WorkFolder):
         atomic.write_bytes(self.summary, (text + "\n").encode())
 
     def note_timeline(self, summary: Brief, drawn: Path) -> None:
-        """Name the timeline that was drawn again for a complete run in its summary, for ``verify``."""
+        """Record in the summary the timeline that was redrawn for a complete run, for ``verify``."""
         if drawn == self.timeline and summary.dataset_digest is not None and not self.segments.exists():
             self.write_summary(summary.having(timeline_sha256=provenance.file_sha256(drawn)))
 
@@ -184,7 +185,7 @@ class RunFolder(WorkFolder):
         """The summary; a run that was killed has none and reads as "running".
 
         Raises:
-            RunFolderError: damaged.
+            RunFolderError: the summary is damaged.
         """
         if not self.summary.exists():
             return Brief(status="running", message="the run is under way, or was killed")
@@ -192,7 +193,7 @@ class RunFolder(WorkFolder):
 
 
 def _may_write(folder: Path) -> bool:
-    """Root may write everywhere, but not to a file system that is mounted read-only."""
+    """Whether this process may write there: root may anywhere except on a file system mounted read-only."""
     return os.access(
         folder, os.R_OK | os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids
     )
@@ -202,14 +203,14 @@ def find_run(path: str | Path) -> RunFolder:
     """The run at ``path``: a run folder, or a file in one.
 
     Raises:
-        RunFolderError: there is none.
+        RunFolderError: there is no run.
     """
     given = Path(path)
     try:
         run = RunFolder(given if given.is_dir() else given.parent)
         found = run.dataset.exists() or run.segments.exists() or run.summary.exists()
         there = given.exists() and found
-    except OSError as error:  # a folder that may not be entered
+    except OSError as error:  # a folder that can't be entered
         raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
     if not there:
         usual = Path("runs") / given

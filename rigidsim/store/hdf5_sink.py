@@ -1,7 +1,7 @@
-"""A file for HDF5 to write into that never fails while HDF5 looks.
+"""A file object for HDF5 that never reports an error to HDF5 itself.
 
-HDF5 keeps what it couldn't write, tries again while it closes, and then crashes the process (seen with HDF5
-2.0 on a full disk). So the first error is kept here, later writes are dropped, and the error is raised
+HDF5 keeps data that it couldn't write, tries again while it closes, and then crashes the process (seen with
+HDF5 2.0 on a full disk). So the first error is kept here, later writes are dropped, and the error is raised
 afterwards.
 """
 
@@ -18,7 +18,7 @@ class Sink(io.RawIOBase):
     """A new file, open for reading and writing.
 
     Attributes:
-        error: the first that occurred; the content is worthless then.
+        error: the first error; the content is worthless after it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -28,34 +28,34 @@ class Sink(io.RawIOBase):
         self.error: OSError | None = None
 
     def check(self) -> None:
-        """Raise the error that was kept, if there is one."""
+        """Raise the error that was kept, if any."""
         if self.error is not None:
             raise self.error
 
     def readable(self) -> bool:
-        """Yes."""
+        """True."""
         return True
 
     def writable(self) -> bool:
-        """Yes."""
+        """True."""
         return True
 
     def seekable(self) -> bool:
-        """Yes."""
+        """True."""
         return True
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """As of any file; dropped writes count as done."""
+        """As for any file; dropped writes count as done."""
         if whence == 2:
             offset, whence = self._size + offset, 0
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """As of any file."""
+        """As for any file."""
         return self._file.tell()
 
     def readinto(self, buffer: Any) -> int:
-        """What was dropped reads as zeros."""
+        """As for any file; dropped data read as zeros."""
         view = memoryview(buffer).cast("B")
         done = 0
         while done < len(view):
@@ -67,7 +67,7 @@ class Sink(io.RawIOBase):
         return len(view)
 
     def write(self, content: Any) -> int:
-        """All of it, or nothing after an error."""
+        """Write everything, or nothing after an error."""
         view = memoryview(content).cast("B")
         start = self._file.tell()
         done = 0
@@ -82,7 +82,7 @@ class Sink(io.RawIOBase):
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
-        """HDF5 does so when it closes a file."""
+        """Resize the file, as HDF5 does when it closes one."""
         wanted = self._file.tell() if size is None else size
         try:
             self._file.truncate(wanted)
@@ -99,7 +99,7 @@ class Sink(io.RawIOBase):
 
 @contextmanager
 def sink(path: Path) -> Iterator[Sink]:
-    """A file for one HDF5 file to be written into, inside the block.
+    """A file into which one HDF5 file can be written inside the block.
 
     Raises:
         OSError: when the block ends, if anything couldn't be written.
@@ -108,7 +108,7 @@ def sink(path: Path) -> Iterator[Sink]:
     try:
         yield opened
     except Exception:
-        opened.check()  # what HDF5 makes of zeros is no news
+        opened.check()  # HDF5's own errors on dropped data tell nothing new
         raise
     finally:
         opened.close()

@@ -1,4 +1,6 @@
-"""The segments of an unfinished run as one dataset, read lazily: memory goes with what is asked for."""
+"""Segments of an unfinished run joined into one dataset, read lazily: only the requested rows are in
+memory.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +19,15 @@ if TYPE_CHECKING:
 
 
 def join_segments(paths: Sequence[Path], *, status: str, indexed: bool = True) -> xarray.Dataset:
-    """All samples of a chain of segments.
+    """Dataset of all samples in a chain of segments.
 
     Args:
         paths: at least one, in order; their seals have been checked.
-        status: of the run, for the attributes.
+        status: the run's status, for the attributes.
         indexed: whether ``time`` becomes an index.
 
     Raises:
-        RunFolderError: one can't be read.
+        RunFolderError: a segment can't be read.
     """
     import xarray
 
@@ -54,8 +56,8 @@ def join_segments(paths: Sequence[Path], *, status: str, indexed: bool = True) -
 
 
 def _not_begun(first: xarray.Dataset, last: Path) -> set[str]:
-    """What was put back, of a run that is to project from a count of steps on and hasn't come there: zero
-    until its last sample, and left out of the dataset of a run that ends so.
+    """Names of the variables of corrections put back in a run that ends before its projection begins: they
+    are zero throughout, and the dataset leaves them out.
     """
     if "hold_from_step" not in first.attrs:
         return set()
@@ -71,7 +73,7 @@ def _joined(paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.V
     from xarray.core import indexing
 
     class Joined(BackendArray):
-        """One variable along all segments."""
+        """One variable along all segments, read lazily."""
 
         shape = (int(starts[-1]), *like.shape[1:])
         dtype = like.dtype if like.dtype.kind != "M" else np.dtype(np.float64)

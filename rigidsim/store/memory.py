@@ -1,4 +1,4 @@
-"""Runs that leave no file: samples collected in memory, and the dataset made of them when it is asked for."""
+"""Runs in memory: samples collected without files, and the dataset made of them on request."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 class MemoryWriter:
-    """Takes what a ``SegmentWriter`` takes, and keeps it.
+    """Takes what a ``SegmentWriter`` takes, and keeps it in memory.
 
     Attributes:
-        blocks: of samples, in order.
+        blocks: blocks of samples, in order.
     """
 
     due = False
@@ -39,19 +39,19 @@ class MemoryWriter:
             self.blocks.append(block)
 
     def flush(self, checkpoint: Mapping[str, np.ndarray], events: Mapping[str, np.ndarray]) -> None:
-        """Nothing can be resumed from memory."""
+        """Do nothing: a run in memory can't be resumed."""
 
 
 @dataclass(frozen=True, repr=False)
 class MemoryRun(Run):
-    """A run in memory; ``dataset`` is the one that ``dataset.h5`` would hold, attribute for attribute.
+    """A run in memory; ``dataset`` equals the one that ``dataset.h5`` would hold, attribute for attribute.
 
     Attributes:
-        outcome: its ``Summary``.
-        variables: of the dataset, time first.
-        blocks: of samples, in order.
+        outcome: the run's ``Summary``.
+        variables: the dataset's variables, time first.
+        blocks: blocks of samples, in order.
         extras: variables with dimensions of their own.
-        attributes: of the dataset.
+        attributes: the dataset's attributes.
     """
 
     outcome: Brief
@@ -62,7 +62,7 @@ class MemoryRun(Run):
 
     @property
     def place(self) -> str:
-        """Where it is kept."""
+        """Description of where the run is kept."""
         return "memory"
 
     @cached_property
@@ -86,10 +86,10 @@ class MemoryRun(Run):
             coordinates[dim] = xarray.Variable((dim,), labels, {"long_name": dim.replace("_", " ")})
         coordinates |= {n: found.pop(n) for n in list(found) if found[n].dims == (n,)}
         told = xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))
-        return xarray.decode_cf(told)  # dates, and coordinates beside time
+        return xarray.decode_cf(told)  # dates, and coordinates besides time
 
     def view(self, *, web: bool = False) -> int:
-        """See ``Run``; the timeline goes with the viewer."""
+        """See ``Run``; the timeline is discarded when the viewer closes."""
         return viewing.view(self, None, web=web)
 
     def concluded(self, outcome: Brief) -> Self:

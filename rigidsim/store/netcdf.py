@@ -19,7 +19,7 @@ from rigidsim.store.variables import Extra, Variable, used_labels
 CHUNK_ROWS = 8192
 GZIP_LEVEL = 4  # with shuffle: every reader opens it (other filters fail in some)
 Block = Mapping[str, Sequence[np.ndarray]]
-"""Variable name to float64 parts, each of shape (rows, components)."""
+"""Float64 parts by variable name, each of shape (rows, components)."""
 
 
 Created = Mapping[str, h5d.DatasetID]
@@ -34,7 +34,7 @@ def declare(
     *,
     compressed: bool,
 ) -> Created:
-    """Lay out dimensions, coordinates, variables and attributes."""
+    """Create dimensions, coordinates, variables and attributes."""
     file.attributes(attributes)
     file.dimension("time", rows)
     for dim, labels in used_labels(variables).items():
@@ -59,17 +59,17 @@ class FileRows(Protocol):
     """Values of all variables of a file.
 
     Attributes:
-        rows: their number.
+        rows: number of rows.
     """
 
     rows: int
 
     @property
     def compressed(self) -> bool:
-        """Whether they are written as compressed chunks."""
+        """Whether the rows are written as compressed chunks."""
 
     def write(self, created: Created) -> None:
-        """Write them."""
+        """Write the rows."""
 
 
 def image(
@@ -78,7 +78,7 @@ def image(
     attributes: Mapping[str, Any],
     groups: Mapping[str, Mapping[str, np.ndarray]],
 ) -> io.BytesIO:
-    """A whole file built in memory; ``groups`` hold plain arrays beside the variables."""
+    """A whole file built in memory; ``groups`` hold plain arrays besides the variables."""
     buffer = io.BytesIO()
     with writing(buffer) as file:
         count, compressed = (0, False) if rows is None else (rows.rows, rows.compressed)
@@ -95,7 +95,7 @@ def reading(path: Path) -> Iterator[Any]:
     """An HDF5 file open for reading.
 
     Raises:
-        RunFolderError: it is none, or damaged.
+        RunFolderError: it isn't an HDF5 file, or is damaged.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -105,10 +105,10 @@ def reading(path: Path) -> Iterator[Any]:
 
 
 def read_group(path: Path, name: str) -> dict[str, np.ndarray]:
-    """The plain arrays of a group; none where there is no such group.
+    """The plain arrays of a group; empty if there is no such group.
 
     Raises:
-        RunFolderError: it holds something else than numbers.
+        RunFolderError: the group holds something other than numbers.
     """
     with reading(path) as file:
         if not isinstance(file.get(name), h5py.Group):
@@ -120,6 +120,6 @@ def read_group(path: Path, name: str) -> dict[str, np.ndarray]:
 
 
 def _is_data(name: str, item: Any) -> bool:
-    """Older files hold the scales of each array's dimensions beside it."""
+    """Whether an item is an array; older files also hold dimension scales of each array."""
     dimension = name[-2:-1] == "_" and name[-1:].isdigit()
     return isinstance(item, h5py.Dataset) and not (dimension and h5ds.is_scale(item.id))

@@ -20,12 +20,12 @@ from h5py import h5a, h5d, h5ds, h5g, h5p, h5s, h5t
 from rigidsim.scene.records import dataclass
 from rigidsim.store.variables import BARE_DIMENSION
 
-_LEAST_CHUNK_ROWS = 1024  # of variables along a dimension that can grow
+_LEAST_CHUNK_ROWS = 1024  # for variables along a dimension that can grow
 
 
 @dataclass(frozen=True)
 class _Type:
-    """A type as numpy calls it, as it stands in files, and as HDF5 finds it in numpy's arrays."""
+    """A type as numpy names it, as it is stored in files, and as HDF5 finds it in numpy's arrays."""
 
     numpy: np.dtype[Any]
     stored: Any
@@ -46,10 +46,10 @@ _ONE_VALUE = h5s.create(h5s.SCALAR)
 
 
 class NetcdfFile:
-    """A file under construction; see ``writing``.
+    """A netCDF-4 file under construction; see ``writing``.
 
     Args:
-        file: new and empty.
+        file: a new, empty HDF5 file.
     """
 
     def __init__(self, file: h5py.File) -> None:
@@ -59,7 +59,7 @@ class NetcdfFile:
         _attribute(self._root, "_NCProperties", _properties(), _Type.of(f"S{len(_properties())}"))
 
     def dimension(self, name: str, size: int) -> None:
-        """Declare a dimension, once or again; of size 0 it is unlimited, since netCDF knows no empty ones."""
+        """Declare a dimension, possibly again; size 0 makes it unlimited, since netCDF has no empty ones."""
         self._sizes.setdefault(name, size)
 
     def has(self, name: str) -> bool:
@@ -79,11 +79,11 @@ class NetcdfFile:
 
         Args:
             attributes: texts and numbers.
-            chunk_rows: of the first dimension; None for one contiguous piece.
+            chunk_rows: rows per chunk along the first dimension; None for contiguous storage.
             gzip: the level at which its chunks are compressed after a byte shuffle.
 
         Returns:
-            What ``write_rows`` writes to.
+            The variable, for ``write_rows``.
         """
         shape = tuple(self._sizes[dim] for dim in dims)
         if chunk_rows is None and 0 in shape:
@@ -101,32 +101,32 @@ class NetcdfFile:
         gzip: int | None,
         whole: bool = False,
     ) -> h5d.DatasetID:
-        """Create a variable of doubles, or of whole numbers, in chunks of any shape.
+        """Create a variable of doubles or integers, in chunks of any shape.
 
         Returns:
-            What ``write_box`` writes to.
+            The variable, for ``write_box``.
         """
         how = _new_dataset(None if chunk is None else tuple(chunk), gzip)
         return self._created(name, dims, _INTEGER if whole else _DOUBLE, attributes, how)
 
     def texts(self, name: str, dim: str, texts: Sequence[str], attributes: Mapping[str, Any]) -> None:
-        """Write texts along a dimension that isn't theirs alone."""
+        """Write strings along a dimension that other variables may share."""
         self.dimension(dim, len(texts))
         created = self._created(name, (dim,), _TEXT, attributes, _new_dataset())
         _write(created, np.array(texts, dtype=_TEXT.numpy), _TEXT)
 
     def labels(self, name: str, labels: Sequence[str], attributes: Mapping[str, Any]) -> None:
-        """Declare a dimension whose coordinate is texts."""
+        """Declare a dimension whose coordinate consists of strings."""
         self.dimension(name, len(labels))
         created = self._created(name, (name,), _TEXT, attributes, _new_dataset())
         _write(created, np.array(labels, dtype=_TEXT.numpy), _TEXT)
 
     def attributes(self, attributes: Mapping[str, Any]) -> None:
-        """Write attributes of the whole file: texts and numbers."""
+        """Write attributes of the whole file: strings and numbers."""
         _attributes(self._root, attributes)
 
     def group(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
-        """Write arrays of numbers without labels; an empty one isn't written."""
+        """Write arrays of numbers as a group without labels; an empty group isn't written."""
         group = h5g.create(self._root, name.encode(), gcpl=_new_group())
         for key, values in arrays.items():
             if values.size:
@@ -148,7 +148,7 @@ class NetcdfFile:
         return created
 
     def finish(self) -> None:
-        """Tie variables and dimensions to each other, when all are there."""
+        """Connect variables and dimensions once all of them are there."""
         scales: dict[str, h5d.DatasetID] = {}
         for number, (dim, size) in enumerate(self._sizes.items()):
             own, dims = self._variables.get(dim, (None, ()))
@@ -163,7 +163,9 @@ class NetcdfFile:
                     h5ds.attach_scale(created, scales[dim], axis)
 
     def _bare(self, dim: str, size: int, number: int) -> h5d.DatasetID:
-        """A dimension without a coordinate stands in the file as a variable that was never written."""
+        """Create the variable, never written, that stands in the file for a dimension without a
+        coordinate.
+        """
         how = _new_dataset(None if size else (_LEAST_CHUNK_ROWS,))
         space = h5s.create_simple((size,), (size or h5s.UNLIMITED,))
         scale = h5d.create(self._root, dim.encode(), h5t.IEEE_F32BE, space, dcpl=how)
@@ -174,7 +176,7 @@ class NetcdfFile:
 
 @contextmanager
 def writing(target: Any) -> Iterator[NetcdfFile]:
-    """A new netCDF-4 file in a file object open for reading and writing, whole when the block ends."""
+    """A new netCDF-4 file in a file object open for reading and writing; complete when the block ends."""
     with h5py.File(target, "w", track_order=True) as file:
         made = NetcdfFile(file)
         yield made
@@ -204,7 +206,7 @@ def _write(created: h5d.DatasetID, values: np.ndarray, of: _Type) -> None:
 
 
 def _attributes(owner: Any, attributes: Mapping[str, Any]) -> None:
-    """Texts, and numbers as netCDF writes them: always a list."""
+    """Write attributes: strings, and numbers as netCDF writes them, always as an array."""
     for name, value in attributes.items():
         if isinstance(value, str):
             _attribute(owner, name, value, _TEXT)
@@ -223,7 +225,7 @@ def _attribute(owner: Any, name: str, value: Any, of: _Type) -> None:
 
 @cache
 def _new_dataset(chunk: tuple[int, ...] | None = None, gzip: int | None = None) -> Any:
-    """Properties of a dataset that remembers in which order its attributes were made, but not when."""
+    """Creation properties of a dataset that tracks the order of its attributes but no times."""
     how = h5p.create(h5p.DATASET_CREATE)
     how.set_attr_creation_order(_IN_ORDER)
     how.set_obj_track_times(False)
@@ -245,5 +247,5 @@ def _new_group() -> Any:
 
 @cache
 def _properties() -> bytes:
-    """The writer, for ``_NCProperties``."""
+    """Description of the writer, for ``_NCProperties``."""
     return f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}".encode()

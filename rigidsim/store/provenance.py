@@ -1,4 +1,4 @@
-"""Where a dataset comes from: versions, machine and settings, as far as they can change bits."""
+"""Provenance of a dataset: versions, machine and settings, as far as they can change bits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import numpy as np
 
 
 def cpu_model() -> str:
-    """The processor's name, from the kernel where it tells."""
+    """The processor's name, from the kernel if it tells."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("model name"):
@@ -27,15 +27,15 @@ def cpu_model() -> str:
 
 
 def versions() -> dict[str, str]:
-    """Of everything that takes part in the numbers."""
+    """Versions of everything that affects the numbers."""
     parts = {"heyoka": hy, "numpy": np, "mpmath": mpmath, "h5py": h5py}
     found = {name: str(module.__version__) for name, module in parts.items()}
     return {"python": platform.python_version(), "rigidsim": sys.modules["rigidsim"].__version__, **found}
 
 
 def code_target(integrator: Any) -> dict[str, str]:
-    """What LLVM compiled for: bits depend on the CPU's features. The wheel's LLVM has no version query;
-    it is fixed by heyoka's version.
+    """What LLVM compiled for, since bits depend on the CPU's features. The wheel's LLVM can't be asked for
+    its version, which heyoka's version determines.
     """
     lines = dict(line.split(":", 1) for line in str(integrator.llvm_state).splitlines() if ":" in line)
     lines = {key.strip(): value.strip() for key, value in lines.items()}
@@ -51,11 +51,11 @@ def code_target(integrator: Any) -> dict[str, str]:
 
 
 def now() -> str:
-    """UTC, ISO 8601."""
+    """Current time, UTC, ISO 8601."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def file_sha256(path: Path) -> str:
-    """Digest of a file, read in pieces."""
+    """SHA-256 of a file, read in pieces."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,4 +1,4 @@
-"""A dataset read without the library of labelled arrays, which takes longer to load than a run's picture."""
+"""Reading a dataset without xarray, which takes longer to import than a run's picture takes to draw."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rigidsim.look.rows import Column, Rows
 from rigidsim.store.validated_open import inspect
 from rigidsim.store.variables import is_bare_dimension
 
-# what HDF5 and netCDF-4 note beside a variable's own attributes
+# bookkeeping of HDF5 and netCDF-4 among a variable's attributes
 _OF_THE_FORMAT = {
     "CLASS",
     "NAME",
@@ -32,10 +32,10 @@ _OF_THE_FORMAT = {
 
 @contextmanager
 def recorded_rows(path: Path) -> Iterator[Rows]:
-    """A complete dataset, whose numbers are read when they are asked for; dates stay numbers.
+    """A complete dataset, whose numbers are read on request; dates stay numbers.
 
     Raises:
-        RunFolderError: as of ``validated_open.open_dataset``.
+        RunFolderError: as for ``validated_open.open_dataset``.
     """
     try:
         inspect(path)
@@ -74,7 +74,7 @@ def _labels(item: h5py.Dataset) -> Any:
 
 
 class _Text:
-    """Labels of letters."""
+    """Labels stored as arrays of characters."""
 
     def __init__(self, item: h5py.Dataset) -> None:
         self._item = item
@@ -104,5 +104,5 @@ def _attributes(item: Any) -> Mapping[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A number where netCDF has but one in an array."""
+    """A value as a scalar if netCDF stored it as an array of one number."""
     return value[0] if getattr(value, "shape", ()) == (1,) else value

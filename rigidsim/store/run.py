@@ -1,4 +1,4 @@
-"""Runs, and those on disk, finished or partial, opened for reading."""
+"""Runs, finished or partial, opened for reading."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 
 class Run:
-    """What a run came to, wherever its numbers are kept.
+    """The result of a run, wherever its numbers are kept.
 
     Attributes:
-        outcome: what its summary says; a ``Summary`` where the run ended.
+        outcome: the contents of its summary; a ``Summary`` if the run ended.
     """
 
     outcome: Brief
@@ -46,12 +46,12 @@ class Run:
     @property
     @abstractmethod
     def place(self) -> str:
-        """Where it is kept, in words."""
+        """Description of where the run is kept."""
 
     @property
     @abstractmethod
     def dataset(self) -> xarray.Dataset:
-        """Its labelled numbers."""
+        """The labelled dataset."""
 
     def plot(self, what: str = "overview") -> Figure:
         """A figure of the run, by default the page that suits the scene; a notebook shows it.
@@ -60,7 +60,7 @@ class Run:
             what: a name of ``rigidsim.look.figures.FIGURES``.
 
         Raises:
-            ValueError: no such figure, none of this run, or a run without samples.
+            ValueError: no such figure, none for this run, or a run without samples.
         """
         from rigidsim.look.figures import figure
 
@@ -71,7 +71,7 @@ class Run:
 
     @abstractmethod
     def view(self, *, web: bool = False) -> int:
-        """Open the timeline in the viewer, or the browser, and wait until it is closed; its exit code.
+        """Open the timeline in the viewer or the browser and wait until it is closed; returns the exit code.
 
         Raises:
             RunFolderError: the timeline can't be drawn, or no viewer is installed.
@@ -79,7 +79,7 @@ class Run:
 
     @abstractmethod
     def concluded(self, outcome: Brief) -> Self:
-        """The same run with what is known of it now, kept where the run is."""
+        """The same run with the given summary, saved where the run is kept."""
 
     def __repr__(self) -> str:
         return f"<Run {self.outcome.name!r} ({self.place}): {self.status}>"
@@ -97,7 +97,7 @@ class SavedRun(Run):
 
     Attributes:
         folder: its files.
-        outcome: what ``summary.json`` says; a ``Summary`` where the run ended.
+        outcome: the contents of ``summary.json``; a ``Summary`` if the run ended.
     """
 
     folder: RunFolder
@@ -105,7 +105,7 @@ class SavedRun(Run):
 
     @property
     def place(self) -> str:
-        """Its folder."""
+        """Path of the run's folder."""
         return str(self.folder.path)
 
     def view(self, *, web: bool = False) -> int:
@@ -113,18 +113,18 @@ class SavedRun(Run):
         return viewing.view(self, self.folder, web=web)
 
     def concluded(self, outcome: Brief) -> Self:
-        """The same run with another summary, which is written."""
+        """The same run with the given summary, which is written."""
         self.folder.write_summary(outcome)
         return replace(self, outcome=outcome)
 
     @property
     def saved(self) -> bool:
-        """Whether anything is on disk that ``dataset`` could read."""
+        """Whether anything was saved that ``dataset`` could read."""
         return self.folder.dataset.exists() or bool(segments.segment_paths(self.folder.segments))
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """The dataset, read lazily; of an unfinished run what its segments hold.
+        """The dataset, read lazily; for an unfinished run, what its segments hold.
 
         Raises:
             RunFolderError: nothing was saved, or a file is damaged.
@@ -132,13 +132,14 @@ class SavedRun(Run):
         return self.opened()
 
     def opened(self, *, indexed: bool = True) -> xarray.Dataset:
-        """As ``dataset``; not ``indexed``, no sample times are held in memory, and none can be selected by.
+        """The dataset as in ``dataset``; without ``indexed``, sample times aren't loaded and can't be
+        selected by.
 
         Raises:
             RunFolderError: nothing was saved, or a file is damaged.
         """
         if self.folder.dataset.exists():
-            # a run that is completed once more after a crash still has the summary of the first time, or none
+            # a run completed again after a crash still has the summary of the first time, or none
             claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest
             return open_dataset(_whole(self.folder.dataset, claimed), indexed=indexed)
         chain = segments.read_chain(self.folder.segments)
@@ -152,13 +153,13 @@ class SavedRun(Run):
 
 
 def _whole(path: Path, expected: str | None) -> Path:
-    """A dataset's path, after its seal was checked; datasets of the first schema version had none.
+    """A dataset's path after its seal was checked; datasets of the first schema version have no seal.
 
     Args:
-        expected: SHA-256 of the file, where the summary beside it tells.
+        expected: SHA-256 of the file, if the summary beside it gives one.
 
     Raises:
-        RunFolderError: damaged, edited, exchanged, or of a version that is newer than this rigidsim.
+        RunFolderError: the file is damaged, edited, replaced, or of a newer version than this rigidsim.
     """
     try:
         unsealed = read_seal(path) is None
@@ -197,7 +198,7 @@ def open_run(path: str | Path) -> SavedRun:
 
 
 def _table(outcome: Brief) -> str:
-    """Warnings, the attitude's error and the invariants of a summary, for a notebook."""
+    """HTML table of a summary's warnings, attitude error and invariants, for a notebook."""
     import html
 
     if not isinstance(outcome, Summary):

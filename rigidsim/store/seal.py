@@ -1,7 +1,7 @@
-"""Seals: the last bytes of a file hold the SHA-256 of all others, so that damage is known before it is read.
+"""Seals: a file's last bytes hold the SHA-256 of all others, so that damage is known before anything is read.
 
-HDF5 readers ignore what follows the end of their data. A file without a seal was torn, or written by
-something else, or by a version that didn't seal yet.
+HDF5 readers ignore bytes after the end of their data. A file without a seal was torn, or written by
+another program, or by a version that didn't seal yet.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _LENGTH = len(_MARK) + 64 + 1
 
 
 def sealed(content: io.BytesIO) -> memoryview:
-    """The content with its seal, in place: there may be a lot of it."""
+    """The content with its seal appended in place, since it may be large."""
     digest = hashlib.sha256(content.getbuffer()).hexdigest()
     content.seek(0, io.SEEK_END)
     content.write(_MARK + digest.encode() + b"\n")
@@ -31,7 +31,7 @@ def seal_of(content: memoryview) -> str:
 
 
 def seal(path: Path) -> tuple[str, str]:
-    """Append the seal of a file; returns the digest of its content, and that of the sealed file."""
+    """Append the seal to a file; returns the digests of its content and of the sealed file."""
     with path.open("rb") as file:
         running = hashlib.file_digest(file, "sha256")
     digest = running.hexdigest()
@@ -43,10 +43,10 @@ def seal(path: Path) -> tuple[str, str]:
 
 
 def refuse_special(path: Path) -> None:
-    """Only plain files are read: a link shows another file's content, a pipe never ends.
+    """Refuse anything but a plain file: a link shows another file's content, a pipe never ends.
 
     Raises:
-        RunFolderError: it is something else, or isn't there.
+        RunFolderError: the path is something else, or doesn't exist.
     """
     try:
         mode = path.lstat().st_mode
@@ -62,7 +62,7 @@ def read_seal(path: Path) -> str | None:
     """The digest that a file claims for its content; None without a seal.
 
     Raises:
-        OSError: it can't be read.
+        OSError: the file can't be read.
     """
     with path.open("rb") as file:
         size = file.seek(0, 2)
@@ -74,16 +74,16 @@ def read_seal(path: Path) -> str | None:
 
 
 def check_seal(path: Path) -> str:
-    """The digest of a sealed file, which agrees with its content.
+    """The digest of a sealed file, verified against its content.
 
     Raises:
-        RunFolderError: no seal (torn or foreign), or another content than was sealed (damaged, edited).
+        RunFolderError: no seal (torn or foreign), or content that differs from it (damaged, edited).
     """
     return check_whole(path)[0]
 
 
 def check_whole(path: Path) -> tuple[str, str]:
-    """As ``check_seal``; also the digest of the file as it is, with its seal."""
+    """Like ``check_seal``, but also returns the digest of the file including its seal."""
     try:
         claimed = read_seal(path) if path.is_file() else None
         if claimed is None:

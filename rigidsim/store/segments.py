@@ -1,8 +1,8 @@
-"""Immutable segments: how samples reach the disk while a run is under way.
+"""Immutable segments, by which samples reach the disk while a run is under way.
 
-Each segment is a complete small dataset with a checkpoint, sealed, written once and never touched again. A
-sample is saved when its segment has its final name; a crash can only cost what came after. Each names the run
-that it belongs to and the seal of the one before, so that none can be missing, foreign or old in silence.
+Each segment is a complete small dataset with a checkpoint, sealed, written once and never changed. A
+sample is saved when its segment has its final name; a crash can only cost later ones. Each names the run
+that it belongs to and the seal of the one before, so that a missing, foreign or old one is noticed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, seale
 from rigidsim.store.variables import Extra, Variable
 
 REMOVED = ".segments.removed"
-"""Where segments go before they are deleted."""
+"""Name to which segments are moved before they are deleted."""
 _ROWS_AT_ONCE = 16 * netcdf.CHUNK_ROWS
 Arrays = Mapping[str, np.ndarray]
 
@@ -39,9 +39,9 @@ class SegmentLimits:
     """When a segment is due.
 
     Attributes:
-        bytes: of what is collected, before it is compressed; as much again, compressed, is in memory while a
-            segment is put together.
-        seconds: since the latest one, which is what a crash can cost. A segment takes some 20 ms.
+        bytes: size of the collected rows before compression; as much again, compressed, is in memory while a
+            segment is assembled.
+        seconds: time since the latest one, which is what a crash can cost. A segment takes some 20 ms.
     """
 
     bytes: int = 16_000_000
@@ -53,11 +53,11 @@ class Chain:
     """The segments of a run that belong together.
 
     Attributes:
-        paths: in order.
-        rows: of all of them.
+        paths: paths in order.
+        rows: rows of all segments.
         run: the run's identity; empty without segments.
-        seal: of the last one.
-        damage: what is wrong with the first that doesn't belong, or None.
+        seal: seal of the last segment.
+        damage: what is wrong with the first segment that doesn't belong, or None.
         spoiled: that one and all after it.
     """
 
@@ -73,14 +73,14 @@ class SegmentWriter:
     """Collects blocks and writes them as segments.
 
     Attributes:
-        saved_rows, count: rows in segments, and the number of those.
-        dataset_sha256: of the complete dataset's file, once there is one.
+        saved_rows, count: rows in segments, and the number of segments.
+        dataset_sha256: SHA-256 of the complete dataset's file, once there is one.
 
     Args:
         folder: ``segments/`` of a run folder; created.
-        variables: of the dataset, time first.
+        variables: the dataset's variables, time first.
         attributes: root attributes that make a segment readable on its own; ``run_id`` among them.
-        chain: segments written before, to go on from.
+        chain: earlier segments, to continue from.
         limits: when a segment is due.
     """
 
@@ -115,8 +115,8 @@ class SegmentWriter:
 
     @property
     def due(self) -> bool:
-        """Whether what is collected is large, and ends with a chunk where it fills any, or the last segment
-        so old that losing the time would hurt.
+        """Whether a segment is due: the collected rows are large (and end with a chunk, if they fill any), or
+        the last segment is old.
         """
         rows = self._collected.rows
         large = rows * self._row_bytes >= self._limits.bytes
@@ -124,14 +124,14 @@ class SegmentWriter:
         return (large and fitting) or time.monotonic() - self._saved >= self._limits.seconds
 
     def flush(self, checkpoint: Arrays, events: Arrays) -> None:
-        """Write what is collected, which may be nothing but the checkpoint; on return it is saved.
+        """Write the collected rows, possibly just the checkpoint; on return they are saved.
 
         Args:
-            checkpoint: goes on after the last collected sample.
-            events: those since the last segment.
+            checkpoint: state from which the run continues after the last collected sample.
+            events: events since the last segment.
 
         Raises:
-            RunFolderError: the disk is full or fails; what is collected stays in memory.
+            RunFolderError: the disk is full or fails; collected rows stay in memory.
         """
         content = self._image(self._collected, checkpoint, events, self._place())
         path = self._folder / f"{self.count:08d}.h5"
@@ -179,13 +179,13 @@ class SegmentWriter:
     ) -> int:
         """Stream all segments, and what is still in memory, into one compressed, sealed dataset.
 
-        The dataset appears atomically; the segments go last of all, in one step: as long as they are there,
+        The dataset appears atomically; the segments are removed last, in one step: as long as they are there,
         a run that was killed in between is known to be unfinished, and is completed again. Returns its rows.
 
         Args:
-            unused: variables that are zero all along, and left out.
-            checkpoint: where to leave a last checkpoint, and all events: a later end can go on from it.
-            conclude: writes what else belongs to a complete run; called before the segments go.
+            unused: variables that are zero throughout, and left out.
+            checkpoint: where to leave a last checkpoint and all events, from which the run can be prolonged.
+            conclude: writes everything else of a complete run; called before the segments are removed.
 
         Raises:
             RunFolderError: a segment is missing, or the disk is full or fails; the segments stay.
@@ -220,7 +220,7 @@ def segment_paths(folder: Path) -> list[Path]:
     """The segments of a run folder in order.
 
     Raises:
-        RunFolderError: one is missing in the sequence, or the folder can't be read.
+        RunFolderError: a segment is missing in the sequence, or the folder can't be read.
     """
     paths = _numbered(folder)
     for number, path in enumerate(paths):
@@ -230,7 +230,9 @@ def segment_paths(folder: Path) -> list[Path]:
 
 
 def _numbered(folder: Path) -> list[Path]:
-    """Files named like segments, in order. A folder that may not be listed isn't an empty one."""
+    """Files named like segments, in order; a folder that can't be listed raises rather than counting as
+    empty.
+    """
     try:
         names = os.listdir(folder)
     except (FileNotFoundError, NotADirectoryError):
@@ -263,7 +265,7 @@ def read_chain(folder: Path) -> Chain:
 
 
 def _misfit(path: Path, labels: Mapping[str, Any], number: int, rows: int, run: str, last: str) -> str | None:
-    """Why a whole segment doesn't follow those before it; None where it does."""
+    """Why an intact segment doesn't follow those before it; None if it does."""
     if path.stem != f"{number:08d}":
         return f"{path.parent}: segment {number:08d}.h5 is missing"
     if not run or str(labels.get("run_id", "")) != run:
@@ -280,7 +282,7 @@ def root_attributes(path: Path) -> dict[str, Any]:
     """Root attributes of a dataset or segment as Python values, and its ``rows``.
 
     Raises:
-        RunFolderError: it is no dataset.
+        RunFolderError: the file isn't a dataset.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -297,11 +299,15 @@ def root_attributes(path: Path) -> dict[str, Any]:
 
 
 def _copy(path: Path, chunks: Mapping[str, ChunkedVariable]) -> None:
-    """Take one segment piece by piece; chunks of a finished dataset that is prolonged as they are."""
+    """Append one segment piece by piece; chunks of a finished dataset being prolonged are copied
+    unchanged.
+    """
     with netcdf.reading(path) as segment:
         saved = {name: segment[name] for name in chunks if name in segment}
         rows = len(saved["time"])
-        for name in chunks.keys() - saved.keys():  # left out of a finished dataset that is prolonged
+        for name in (
+            chunks.keys() - saved.keys()
+        ):  # variables left out of a finished dataset that is being prolonged
             chunks[name].add_zeros(rows)
         done = {name: chunks[name].add_chunks_of(data) for name, data in saved.items()}
         for start in range(min(done.values()), rows, _ROWS_AT_ONCE):
@@ -311,7 +317,7 @@ def _copy(path: Path, chunks: Mapping[str, ChunkedVariable]) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Delete the segments of a run whose dataset is complete: all at once for whoever looks."""
+    """Delete the segments of a run whose dataset is complete; for other processes, all at once."""
     gone = folder.with_name(REMOVED)
     shutil.rmtree(gone, ignore_errors=True)
     with suppress(FileNotFoundError):

@@ -1,4 +1,4 @@
-"""What ``summary.json`` says of a run: one definition, by which it is written, read with distrust, and shown.
+"""Contents of ``summary.json``: one definition by which it is written, read with distrust, and shown.
 
 A field that isn't given isn't written, so that summaries of older versions, which say less, are read and
 written again as they are.
@@ -42,7 +42,7 @@ _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
 
 
 class Brief(SummaryPart):
-    """What any summary says; of a run that is under way, or was killed, no more."""
+    """Fields that every summary has; a run that is under way or was killed has no others."""
 
     name: Annotated[Text, Claim()] = ""
     description: Annotated[StrictStr, Claim()] = ""
@@ -52,23 +52,23 @@ class Brief(SummaryPart):
 
     @property
     def dataset_digest(self) -> str | None:
-        """SHA-256 of the complete dataset; None where there was none yet."""
+        """SHA-256 of the complete dataset; None if there is none yet."""
         return None
 
 
 class Summary(Brief):
-    """Of a run that ended.
+    """Summary of a run that ended.
 
     Attributes:
-        warnings, warning_codes: texts, and a ``WarningCode`` for each; older summaries have the texts alone.
-        time_reached: seconds: of the last sample, or of the event that ended the run.
-        engine_time: seconds: where the integration stood, which goes past samples in steps of its own.
-        events, event_times: how often each happened, and when those that did.
-        tables: of orbits by tables, by name, how well interpolation does.
-        advice: what would do better nearly for free, the best last.
-        undefined_samples: by recorded variable that is NaN at some, how many.
-        provenance: attributes of the dataset that are repeated here.
-        dataset_sha256, timeline_sha256: of the files, once there are any.
+        warnings, warning_codes: texts, and a ``WarningCode`` for each; older summaries have only texts.
+        time_reached: time of the last sample, or of the event that ended the run, s.
+        engine_time: time that the integration reached, s; its own steps go past the last sample.
+        events, event_times: how often each event happened, and when.
+        tables: interpolation errors of tabulated orbits, by name.
+        advice: settings that would do better at about the same cost, the best last.
+        undefined_samples: number of NaN samples of each recorded variable that has any.
+        provenance: attributes repeated from the dataset.
+        dataset_sha256, timeline_sha256: SHA-256 of the files, once there are any.
     """
 
     warnings: tuple[Text, ...]
@@ -105,12 +105,12 @@ class Summary(Brief):
 
     @property
     def held(self) -> bool:
-        """Whether invariants were projected, be it from a count of steps on that the run went past."""
+        """Whether invariants were projected, possibly only after a number of steps that the run did reach."""
         return self.hold_invariants and self.cost.steps > (self.hold_from_step or 0)
 
     @property
     def dataset_digest(self) -> str | None:
-        """SHA-256 of the complete dataset; None where there was none yet."""
+        """SHA-256 of the complete dataset; None if there is none yet."""
         return self.dataset_sha256
 
     @property
@@ -129,7 +129,7 @@ class Summary(Brief):
 
 
 def as_fields(cautions: Iterable[Caution]) -> dict[str, Any]:
-    """The two fields of a summary that hold warnings."""
+    """The two fields of a summary that hold the warnings and their codes."""
     kept = list(cautions)
     return {
         "warnings": tuple(caution.text for caution in kept),
@@ -138,7 +138,7 @@ def as_fields(cautions: Iterable[Caution]) -> dict[str, Any]:
 
 
 def read_summary(path: Path) -> Brief:
-    """What a ``summary.json`` says: a ``Summary`` where the run ended.
+    """Read a ``summary.json``; a ``Summary`` if the run ended.
 
     Raises:
         RunFolderError: it can't be read, or isn't what a run writes; the text names the first thing wrong.
@@ -164,7 +164,7 @@ def read_summary(path: Path) -> Brief:
 
 
 def _visible(value: Any) -> Any:
-    """Without characters that a terminal would obey."""
+    """The value without characters that a terminal would obey."""
     if isinstance(value, str):
         return "".join(
             c if c in "\n\t" or c.isprintable() or ord(c) > 0xA0 else ascii(c)[1:-1] for c in value

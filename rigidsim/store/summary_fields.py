@@ -1,4 +1,4 @@
-"""What the parts of ``summary.json`` are made of: fields, and which of them are claims."""
+"""Building blocks of the parts of ``summary.json``: fields, and which of them are claims."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Claim:
     """Marks a field that follows from the config alone, so that running it again must confirm it.
 
     Attributes:
-        since: schema version of the dataset from which the field means what it means now.
-        of_end: whether it says how the run ended, which an interruption changes.
-        beside: a field without which, in older summaries, this one means something else; empty for none.
+        since: schema version of the dataset from which the field has its present meaning.
+        of_end: whether it tells how the run ended, which an interruption changes.
+        beside: field whose absence, in older summaries, gives this one another meaning; empty for none.
     """
 
     since: int = 1
@@ -29,15 +29,15 @@ class Claim:
 
 
 class SummaryPart(BaseModel):
-    """Immutable; what a newer version wrote beside the fields is kept."""
+    """Immutable part of a summary; unknown fields, written by a newer version, are kept."""
 
     model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants", defer_build=True)
 
     def having(self, **known: Any) -> Self:
-        """A copy with what has become known since, checked as on reading."""
+        """A copy with the given fields set, validated as on reading."""
         given = {name: value for name, value in self if name in self.model_fields_set}
         return type(self).model_validate({**given, **known})
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; nothing that wasn't given."""
+        """Fields for JSON, without those that weren't given."""
         return self.model_dump(mode="json", exclude_unset=True)

@@ -1,4 +1,4 @@
-"""What a run's summary is made of: what it cost, what held, how true it is, and the codes of its warnings."""
+"""Parts of a run's summary: its cost, its invariants, its accuracy, and the codes of its warnings."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rigidsim.scene.records import dataclass
 from rigidsim.store.summary_fields import Claim, FiniteNumber, SummaryPart, Text
 
 ENGINE = "engine"
-"""Beside the phases in ``Cost.seconds``: what the engine alone took of integrating and recording."""
+"""Key beside the phases in ``Cost.seconds``: time that the engine alone took of integrating and recording."""
 
 
 class WarningCode(Enum):
-    """Why a result isn't to be trusted, or not wholly; ``value`` stands in summaries."""
+    """Why a result can't be trusted, or not wholly; ``value`` stands in summaries."""
 
     DRIFT = "drift"
     SINGULARITY = "singularity"
@@ -35,7 +35,7 @@ class WarningCode(Enum):
 
 
 class AdviceCode(Enum):
-    """What would do better nearly for free; ``value`` stands in summaries."""
+    """Which setting would do better nearly for free; ``value`` stands in summaries."""
 
     HOLD_INVARIANTS = "hold_invariants"
     CLOSED_FORM = "closed_form"
@@ -61,13 +61,13 @@ Seconds = Annotated[dict[Text, FiniteNumber], AfterValidator(_with_engine)]
 
 
 class Cost(SummaryPart):
-    """What a run took.
+    """What a run cost.
 
     Attributes:
-        steps_redone: of the steps, those that were taken once more on the way to an event or a chart.
-        smallest_step, largest_step: seconds; None where no step was taken, or none was finite.
-        seconds, cpu_by_phase: of this session by phase, on the wall and of the CPU.
-        cpu_seconds, wall_seconds: of all sessions.
+        steps_redone: steps taken once more on the way to an event or a chart change.
+        smallest_step, largest_step: seconds; None if no step was taken, or none was finite.
+        seconds, cpu_by_phase: wall and CPU seconds of this session by phase.
+        cpu_seconds, wall_seconds: seconds of all sessions.
     """
 
     steps: Annotated[StrictInt, Claim()]
@@ -82,16 +82,16 @@ class Cost(SummaryPart):
 
 
 class InvariantDrift(SummaryPart):
-    """How well one was kept.
+    """How well an invariant was kept.
 
     Attributes:
         initial: value, or components, in ``units``.
-        scale: what drifts are relative to, in ``units``.
-        largest_drift, final_drift: relative; None where no sample was taken.
-        bound: which rounding alone explains.
-        put_back: of a held one, what the drift would have been.
-        why: it is one.
-        numerical: whether it is kept by definition, whatever the motion.
+        scale: size that drifts are relative to, in ``units``.
+        largest_drift, final_drift: relative drifts; None if no sample was taken.
+        bound: relative drift that rounding alone explains.
+        put_back: for a projected invariant, the drift that would have been.
+        why: why it is an invariant.
+        numerical: whether it is constant by definition, whatever the motion.
     """
 
     initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Claim()]
@@ -107,17 +107,17 @@ class InvariantDrift(SummaryPart):
 
 
 class Accuracy(SummaryPart):
-    """How right the attitude is at the end, rad: asked for, estimated, and certified by a reference.
+    """Attitude error at the end, rad: requested, estimated, and certified against a reference.
 
     Attributes:
-        requested_position, certified_position: of the path, m.
+        requested_position, certified_position: position error, m.
         estimated_position_error, estimated_velocity_error: at the end, m and m/s.
-        amplification: of rounding errors by the motion; None where nothing was estimated.
+        amplification: factor by which the motion amplifies rounding errors; None if not estimated.
         error_growth_rate: 1/s; 0 where errors don't grow exponentially.
-        predictable_seconds: from the start, after which no digit is left; None where that is never.
-        examined_share: of the run, over which the growth of errors was followed without a gap from its start;
+        predictable_seconds: time from the start after which no digit is left; None if never.
+        examined_share: share of the run over which error growth was followed without a gap from its start;
             1 for all of it.
-        how: the certificate came about.
+        how: how the certificate was obtained.
         chosen, chosen_why, forecast: the setting that was chosen for ``requested``, and its forecast.
     """
 
@@ -144,12 +144,12 @@ class Accuracy(SummaryPart):
 
 
 class TableErrors(SummaryPart):
-    """How well interpolation does between the rows of an orbit's table.
+    """Interpolation errors between the rows of an orbit's table.
 
     Attributes:
-        direction: by which it misses the source's direction with every other row left out, largest, rad.
-        distance: the same of the distance, relative.
-        expected: by which both become smaller with all rows in, where they follow smooth functions.
+        direction: largest error of the source's direction with every other row left out, rad.
+        distance: the same for the distance, relative.
+        expected: factor by which both shrink with all rows present, if the rows follow smooth functions.
     """
 
     direction: FiniteNumber
@@ -158,15 +158,15 @@ class TableErrors(SummaryPart):
 
 
 class ModellingWindow(SummaryPart):
-    """Where the full model ran beside a reduced one; see ``rigidsim.accuracy.models.modelling``.
+    """A window in which the full model ran beside a reduced one; see ``rigidsim.accuracy.models.modelling``.
 
     Attributes:
-        start, end: seconds.
-        steps: of the full model.
+        start, end: times, s.
+        steps: steps of the full model.
         momentum_axis, figure_axis: largest distances between both models' directions, with what averaging
-            removed added back, rad; None where a figure axis points nowhere on average.
-        growth_along, growth_across: of the former, along and across the precession, rad/s.
-        doubt: by how much the growth of the window's parts differs, rad/s.
+            removed added back, rad; None if the figure axis has no mean direction.
+        growth_along, growth_across: growth of the former, along and across the precession, rad/s.
+        doubt: difference of growth between the window's parts, rad/s.
     """
 
     start: FiniteNumber
@@ -180,17 +180,17 @@ class ModellingWindow(SummaryPart):
 
 
 class Modelling(SummaryPart):
-    """How far a reduced model is from the full one, apart from numerical errors.
+    """Error of a reduced model against the full one, apart from numerical errors.
 
     Attributes:
-        level: of the model.
+        level: level of the model.
         short_period: whether what averaging removed is added back in what is recorded.
         momentum_axis, figure_axis: largest distances of the directions recorded from the full model's, until
-            the end of the run, rad; None where they weren't measured, or a figure axis points nowhere.
-        growth: of the distance, rad/s; oscillation: what it is without, rad.
+            the end of the run, rad; None if not measured, or if the figure axis has no mean direction.
+        growth, oscillation: secular growth of the distance, rad/s, and its oscillating part, rad.
         whole: whether the full model was followed to the end.
-        requested: what of it was asked for, rad.
-        how: it was found, or why it wasn't.
+        requested: largest error that was asked for, rad.
+        how: how it was found, or why it wasn't.
     """
 
     level: Annotated[Text, Claim()]
@@ -207,13 +207,13 @@ class Modelling(SummaryPart):
 
     @property
     def worst(self) -> float | None:
-        """Of both directions; None where it wasn't measured."""
+        """The larger of both directions' errors, rad; None if not measured."""
         known = [x for x in (self.momentum_axis, self.figure_axis) if x is not None]
         return max(known, default=None)
 
 
 class Lyapunov(SummaryPart):
-    """The spectrum of the motion, 1/s, with what it says of the run's digits."""
+    """The motion's Lyapunov spectrum, 1/s, and what it implies for the run's digits."""
 
     chaotic: Annotated[StrictBool, Claim()]
     largest_exponent: Annotated[FiniteNumber, Claim()]
@@ -226,7 +226,7 @@ class Lyapunov(SummaryPart):
 
 
 class EventTimes(SummaryPart):
-    """When an event happened, s.
+    """Times at which an event happened, s.
 
     Attributes:
         early: the first ones, at most ``EventTimes.EARLY``; the first among them.
@@ -239,14 +239,14 @@ class EventTimes(SummaryPart):
 
 
 class Advice(SummaryPart):
-    """Something that would do better.
+    """A setting that would do better.
 
     Attributes:
         code: an ``AdviceCode``.
-        now, then: attitude error at the end as it is, and about as it would be, rad; of an averaged model the
+        now, then: attitude error at the end as it is, and as it would be, rad; for an averaged model the
             error of the recorded axes.
-        level: of the model advised; empty for none.
-        share: of the steps that it takes, at most; None where that stays.
+        level: level of the model advised; empty for none.
+        share: largest share of the steps that it would take; None if unchanged.
     """
 
     code: Text
@@ -257,7 +257,7 @@ class Advice(SummaryPart):
 
 
 class ChartChanges(SummaryPart):
-    """How often a run in Euler angles went from its sequence to the partner or back."""
+    """How often a run in Euler angles changed from its sequence to the partner or back."""
 
     count: StrictInt
     sequence: Text
@@ -265,7 +265,7 @@ class ChartChanges(SummaryPart):
 
 
 class BitForBit(SummaryPart):
-    """Whether running again gives the same bits, and on what condition."""
+    """Whether repeating the run gives the same bits, and on what condition."""
 
     claim: StrictBool
     holds_for: StrictStr

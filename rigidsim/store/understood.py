@@ -1,4 +1,4 @@
-"""What was understood of a config, as ``plan``, ``run`` and ``info`` show it: body, start and time."""
+"""How a config was understood, as ``plan``, ``run`` and ``info`` show it: body, start and time."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Start(SummaryPart):
     """The state that a motion starts from.
 
     Attributes:
-        euler_sequence, euler_angles_deg: the attitude as intrinsic angles, as given where these were given.
+        euler_sequence, euler_angles_deg: the attitude as intrinsic angles, unchanged if given so.
         quaternion: w x y z, body to space.
         angular_velocity: body axes, rad/s.
         position, velocity: of the centre of mass, space axes, m and m/s; None unless it moves freely.
@@ -42,12 +42,12 @@ class Start(SummaryPart):
 
 
 class Span(SummaryPart):
-    """When a motion starts and ends, and its samples.
+    """Start and end of a motion, and its samples.
 
     Attributes:
-        every_s: from one sample to the next; None where their times are listed.
-        epoch: what time 0 is; empty where nothing says it.
-        unit: by which the config calls times; empty where it names none.
+        every_s: sampling interval; None if the times are listed.
+        epoch: date of time 0; empty if unknown.
+        unit: unit of times in the config; empty if it names none.
     """
 
     start_s: FiniteNumber

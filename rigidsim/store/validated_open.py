@@ -1,4 +1,4 @@
-"""Datasets opened with distrust: what isn't a whole dataset of rigidsim is refused before it is read.
+"""Datasets opened with distrust: whatever isn't a whole dataset of rigidsim is refused before it is read.
 
 A file may be torn, foreign, from a newer version, or made to hurt: declare rows that it doesn't hold (a few
 kilobytes that unpack to terabytes of zeros), or point to other files, whose content it would show as data.
@@ -25,11 +25,11 @@ def open_dataset(path: Path, *, indexed: bool = True) -> xarray.Dataset:
     """A dataset, or a segment, read lazily.
 
     Args:
-        path: the file; its checksum, where one is known, has been compared already.
+        path: the file; its checksum, if known, has been compared already.
         indexed: whether ``time`` becomes an index, which holds all sample times in memory.
 
     Raises:
-        RunFolderError: damaged, foreign, of a newer schema version, or not what it claims to hold.
+        RunFolderError: the file is damaged, foreign, of a newer schema version, or lacks what it declares.
     """
     import xarray
 
@@ -52,10 +52,10 @@ def _first_line(error: Exception) -> str:
 
 
 def inspect(path: Path) -> None:
-    """Refuse what the labels of the file promise and its content doesn't keep.
+    """Refuse a file whose content doesn't match what its metadata declare.
 
     Raises:
-        RunFolderError: that is so.
+        RunFolderError: the content doesn't match.
     """
     import h5py
 
@@ -86,12 +86,12 @@ def inspect(path: Path) -> None:
 
 
 def _names(name: str, item: Any) -> bool:
-    """Whether it is a coordinate of names that the run has of its own."""
+    """Whether an item is a coordinate of names specific to the run."""
     return name in OF_THE_RUN and item.ndim == 1 and item.dtype.kind == "O"
 
 
 def _check_version(found: Any, path: Path) -> None:
-    """Only schema versions that this version of rigidsim knows are read."""
+    """Refuse schema versions that this version of rigidsim doesn't know."""
     version = found.item() if hasattr(found, "item") else found
     if not isinstance(version, int) or isinstance(version, bool):
         raise RunFolderError(f"{path}: names no schema version; it is no dataset of rigidsim")
@@ -105,7 +105,7 @@ def _check_version(found: Any, path: Path) -> None:
 
 
 def _check_numbers(item: Any, name: str, path: Path) -> None:
-    """Every row that is declared is there: none would be read as a fill value."""
+    """Require that every declared row is stored, so that none is read as a fill value."""
     if item.dtype.kind not in "fiuSOV" or item.dtype.hasobject:
         raise RunFolderError(f"{path}: the variable {name!a} holds no numbers")
     if name != "time" and is_bare_dimension(item):

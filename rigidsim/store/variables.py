@@ -1,4 +1,4 @@
-"""What a dataset's variables are called and how they are labelled (the interface's section 3)."""
+"""Names and labels of a dataset's variables (the interface's section 3)."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ LABELS: dict[str, list[str]] = {
     "roll_pitch_yaw_component": ["roll", "pitch", "yaw"],
     "libration_angle": ["in_plane", "out_of_plane"],
 }
-"""Coordinates beside time, with their labels."""
+"""Coordinates besides time, with their labels."""
 
 OF_THE_RUN = ("point_mass",)
-"""Coordinates whose labels a run has of its own: names of ``[[bodies]]``."""
+"""Coordinates whose labels depend on the run: names of ``[[bodies]]``."""
 
 SCHEMA_VERSION = 4
 """1: without seals. 2: files end with the SHA-256 of their content; checkpoints. 3: what was put back of held
 invariants along time (runs that hold none have the same variables as before). 4: dates along time (runs
-without an epoch have the same variables as before)."""
+without an epoch have the same variables as before).
+"""
 
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
-"""How the ``NAME`` of the empty variable begins that netCDF-4 keeps for a dimension without coordinates."""
+"""Beginning of the ``NAME`` of the empty variable that netCDF-4 keeps for a dimension without coordinates."""
 
 
 def is_bare_dimension(item: h5py.Dataset) -> bool:
-    """Whether it is such a variable."""
+    """Whether an item is the empty variable of a dimension without coordinates."""
     return bytes(item.attrs.get("NAME", b"")).startswith(BARE_DIMENSION[:-1].encode())
 
 
@@ -51,10 +52,10 @@ class Variable:
     """A variable along time.
 
     Attributes:
-        dims: beside time; each is a key of ``LABELS``, or among ``OF_THE_RUN``.
+        dims: dimensions besides time; each is a key of ``LABELS``, or among ``OF_THE_RUN``.
         attributes: units, long_name, frame, ...
-        parts: how many float64 numbers hold one value exactly; part 0 has the plain name.
-        own_labels: of those dimensions whose labels are the run's.
+        parts: number of float64 that hold one value exactly; part 0 has the plain name.
+        own_labels: labels of the dimensions whose labels depend on the run.
     """
 
     name: str
@@ -64,12 +65,12 @@ class Variable:
     own_labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def labels(self, dim: str) -> Sequence[str]:
-        """Of one of its dimensions."""
+        """Labels of one of its dimensions."""
         return LABELS[dim] if dim in LABELS else self.own_labels[dim]
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Beside time."""
+        """Shape of a sample, without time."""
         return tuple(len(self.labels(dim)) for dim in self.dims)
 
     def part_names(self) -> list[str]:
@@ -77,7 +78,7 @@ class Variable:
         return [part_name(self.name, part) for part in range(self.parts)]
 
     def part_attributes(self, part: int) -> dict[str, Any]:
-        """Attributes of one part; residuals say what they belong to."""
+        """Attributes of one part; those of residuals say what they belong to."""
         if part == 0:
             attributes = dict(self.attributes)
             if self.parts > 1:
@@ -92,24 +93,24 @@ class Variable:
 
 
 def used_labels(variables: Iterable[Variable]) -> dict[str, Sequence[str]]:
-    """The dimensions that variables have beside time, in the order of a dataset, with their labels."""
+    """Dimensions of the variables besides time, in the order of a dataset, with their labels."""
     found = {dim: variable.labels(dim) for variable in variables for dim in variable.dims}
     return {dim: found[dim] for dim in (*LABELS, *OF_THE_RUN) if dim in found}
 
 
 def part_name(name: str, part: int) -> str:
-    """What the parts of a value are called: ``name``, ``name_lo``, ``name_lo2``, ``name_lo3``, ..."""
+    """Name of a part of a value: ``name``, ``name_lo``, ``name_lo2``, ``name_lo3``, ..."""
     return name + ("", "_lo")[part] if part < 2 else f"{name}_lo{part}"
 
 
 def parts_in(dataset: xarray.Dataset, name: str) -> list[str]:
-    """Names of the parts that a dataset holds of a value, whose sum, smallest first, is the exact value."""
+    """Names of a value's parts in a dataset, whose sum, smallest first, is the exact value."""
     residuals = takewhile(dataset.variables.__contains__, (part_name(name, part) for part in count(1)))
     return [name, *takewhile(lambda residual: "residual_of" in dataset[residual].attrs, residuals)]
 
 
 def time_variable(parts: int) -> Variable:
-    """The coordinate; ``units = "s"`` keeps readers from turning it into dates."""
+    """The time coordinate; ``units = "s"`` keeps readers from turning it into dates."""
     return Variable(
         "time",
         (),
@@ -123,7 +124,7 @@ class Extra:
     """A variable with dimensions of its own, small enough to be held in memory.
 
     Attributes:
-        dims: names; a variable with the name of its only dimension is that dimension's coordinate.
+        dims: names of dimensions; a variable named like its only dimension is that one's coordinate.
         values: float64.
     """
 

@@ -1,4 +1,4 @@
-"""A run's timeline, drawn where there is none yet, and opened in the viewer."""
+"""Viewing a run's timeline, which is drawn first if there is none yet."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 
 
 class Viewable(Protocol):
-    """What is needed of a run."""
+    """The part of a run's interface needed here."""
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """Its labelled numbers."""
+        """The labelled dataset."""
 
     @property
     def outcome(self) -> Brief:
-        """What its summary says."""
+        """The contents of its summary."""
 
 
 def view(run: Viewable, folder: RunFolder | None, *, web: bool = False) -> int:
     """Open a run's timeline in the viewer and wait until it is closed.
 
     Args:
-        folder: of the run; None for one in memory.
+        folder: the run's folder; None for one in memory.
         web: in the browser, served on loopback only, until Ctrl-C.
 
     Returns:
@@ -53,10 +53,10 @@ def view(run: Viewable, folder: RunFolder | None, *, web: bool = False) -> int:
 
 @contextmanager
 def drawn(run: Viewable, folder: RunFolder | None) -> Iterator[Path]:
-    """The recording: the run's own, kept with the run where that can be written, or one that goes at the end.
+    """The recording: the run's own, saved with the run if it can be written, or a temporary one.
 
     Raises:
-        RunFolderError: it can't be drawn.
+        RunFolderError: the timeline can't be drawn.
     """
     if folder is not None and folder.timeline.exists():
         yield folder.timeline

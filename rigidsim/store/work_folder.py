@@ -1,4 +1,4 @@
-"""A folder that one process at a time works in: names of its files, its lock, and what is said of faults."""
+"""A folder in which one process at a time works: names of its files, its lock, and messages about faults."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class WorkFolder:
-    """What the folders of runs and of sweeps have in common.
+    """Common base of the folders of runs and sweeps.
 
     Attributes:
-        kept: what stays when writing stops.
-        resumed: what the command that resumes it does with the rest.
+        kept: what remains when writing stops, for messages.
+        resumed: what the command that resumes does with the rest, for messages.
         seen_by: the lock (of ``fcntl``) by which it is seen whether a process is at work: a shared one
             disturbs nobody else who looks, an exclusive one sees those that share the work too.
     """
@@ -31,25 +31,25 @@ class WorkFolder:
 
     @property
     def config(self) -> Path:
-        """What is run, in one visible value per key."""
+        """The config that is run, one visible value per key."""
         return self.path / "config.toml"
 
     @property
     def dataset(self) -> Path:
-        """Everything, when it is finished."""
+        """The dataset, once the work is finished."""
         return self.path / "dataset.h5"
 
     @property
     def summary(self) -> Path:
-        """How it ended, and what it took."""
+        """The summary: how the work ended and what it cost."""
         return self.path / "summary.json"
 
     @contextmanager
     def locked(self, *, shared: bool = False) -> Iterator[None]:
-        """Keep other processes out; the lock goes with the process, however it ends.
+        """Keep other processes out inside the block; the lock disappears with the process, however it ends.
 
         Args:
-            shared: others that share the work may be here, too.
+            shared: admit other processes that share the work.
 
         Raises:
             RunFolderError: another process works there, or the folder can't be written.
@@ -95,16 +95,16 @@ class WorkFolder:
         return False
 
     def refuse_a_file(self) -> None:
-        """Where the folder should be.
+        """Refuse a plain file in the folder's place.
 
         Raises:
-            RunFolderError: there is one.
+            RunFolderError: there is a file.
         """
         if self.path.exists() and not self.path.is_dir():
             raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
 
     def unwritable(self, error: OSError) -> RunFolderError:
-        """What to say where nothing can be written."""
+        """The error to raise if nothing can be written."""
         return RunFolderError(
             f"{self.path}: can't be written: {error.strerror or error}; choose another {OUT}"
         )

@@ -1,8 +1,8 @@
-"""Datasets read into xarray through h5py, lazily, faster than by a general reader.
+"""Lazy reading of datasets into xarray through h5py, faster than by a general reader.
 
 xarray's own engine for these files, h5netcdf, looks every attribute of every variable up through the whole
 file: to open twenty variables took 0.07 s of CPU, and takes 0.02 s here, most of it xarray's. Commands on
-small finished runs did little else. What is read is the same, which a test compares.
+small finished runs did little else. The result is the same, which a test verifies.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from xarray.core import indexing
 
 from rigidsim.store.variables import is_bare_dimension
 
-# what ties a file's variables to each other, or is of use to netCDF's library alone
+# attributes that link a file's variables to each other, or serve only netCDF's library
 _HIDDEN = frozenset(
     {
         "CLASS",
@@ -35,7 +35,7 @@ _HIDDEN = frozenset(
 
 
 class NetcdfBackend(StoreBackendEntrypoint):
-    """What ``xarray.open_dataset`` takes for ``engine``: netCDF-4 files that rigidsim wrote."""
+    """Engine for ``xarray.open_dataset``: netCDF-4 files that rigidsim wrote."""
 
     description = "rigidsim's datasets"
 
@@ -50,14 +50,14 @@ class NetcdfBackend(StoreBackendEntrypoint):
 
 
 class _Store(AbstractDataStore):
-    """Variables and attributes of one file, which is opened again where xarray had to close it."""
+    """Variables and attributes of one file, which is reopened if xarray had to close it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path.absolute()
         self.files = CachingFileManager(h5py.File, self._path, mode="r")
 
     def load(self) -> tuple[dict[str, xarray.Variable], dict[str, Any]]:
-        """All variables, unread, and the attributes of the file."""
+        """All variables, with their values unread, and the attributes of the file."""
         with self.files.acquire_context() as file:
             items = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset)}
             dims = _dimensions(items)
@@ -69,7 +69,7 @@ class _Store(AbstractDataStore):
             return variables, _attributes(file)
 
     def get_encoding(self) -> dict[str, Any]:
-        """Dimensions that can grow: those of size 0, since netCDF knows no empty ones."""
+        """Encoding with the unlimited dimensions: those of size 0, since netCDF has no empty ones."""
         with self.files.acquire_context() as file:
             growing = {
                 name
@@ -106,7 +106,7 @@ _TEXT = np.dtype("O", metadata={"element_type": str})  # as xarray marks texts o
 
 
 class _Array(BackendArray):
-    """One variable's numbers or texts, read when they are looked at."""
+    """Numbers or strings of one variable, read on access."""
 
     def __init__(
         self, files: CachingFileManager, name: str, shape: tuple[int, ...], dtype: np.dtype[Any], text: bool
@@ -125,12 +125,12 @@ class _Array(BackendArray):
 
 
 def _dimensions(items: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
-    """The names of each variable's dimensions.
+    """Dimension names of each variable.
 
     Raises:
         ValueError: a variable has a dimension without a name.
     """
-    # scales are told by their places in the file, since to look up the name of a reference takes longer
+    # scales are identified by their addresses in the file, since looking up a reference's name takes longer
     places = {h5py.h5o.get_info(item.id).addr: name for name, item in items.items()}
     found: dict[str, tuple[str, ...]] = {}
     for name, item in items.items():
@@ -147,7 +147,7 @@ def _dimensions(items: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]
 
 
 def _attributes(owner: Any) -> dict[str, Any]:
-    """Texts and numbers; a list of one number is that number."""
+    """Attributes: strings and numbers; an array of one number becomes that number."""
     found: dict[str, Any] = {}
     for name, value in owner.attrs.items():
         if name in _HIDDEN:

@@ -116,7 +116,9 @@ class Source:
         return Ellipse.of(context, self.orbit)
 
     def secular_strength(self, context: Any) -> Any:
-        """Secular strength 3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2) of an orbit, the largest in a table."""
+        """Secular strength 3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2) of an orbit, the largest in a
+        table.
+        """
         if self.table is not None:
             rest = 1 - self.table.largest_eccentricity**2
             size = self.strength * (self.table.semi_major_axis / self.table.smallest_axis) ** 3
@@ -125,7 +127,9 @@ class Source:
         return self.strength * Ellipse.of(context, self.orbit).secular_factor
 
     def normal(self, context: Any, time: Any) -> Vector:
-        """Unit normal of the orbit's plane at a time, space axes; at time zero if the node moves uniformly."""
+        """Unit normal of the orbit's plane at a time, space axes; at time zero if the node moves
+        uniformly.
+        """
         if self.table is not None:
             return self.table.normal(time)
         assert self.orbit is not None

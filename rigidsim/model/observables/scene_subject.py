@@ -17,7 +17,9 @@ _FAST = 10
 
 
 def _turns_about_its_figure(m: Mechanics) -> bool:
-    """Whether the body starts turning nearly about its figure axis (that of largest moment, or of symmetry)."""
+    """Whether the body starts turning nearly about its figure axis (that of largest moment, or of
+    symmetry).
+    """
     scene, context = m.scene, m.scene.context
     spin, pole = scene.angular_velocity, scene.figure.pole
     if all(w == 0 for w in spin):

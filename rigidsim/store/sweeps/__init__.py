@@ -1,1 +1,1 @@
-"""Files of a sweep: sealed tiles, generations, and the one dataset that is gathered from them."""
+"""Files of a sweep: sealed tiles, generations, and the dataset gathered from them."""

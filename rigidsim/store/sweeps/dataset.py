@@ -1,4 +1,4 @@
-"""All members of a sweep as one labelled dataset, put together from its tiles."""
+"""The dataset of a sweep: all members labelled along its axes, gathered from its tiles."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ RESERVED = {
 }
 """Names that an axis can't have."""
 SUFFIXES = ("_final", "_min", "_max", "_mean", "_largest", "_time", "_times", "_count", "_first", "_lo")
-"""Of names of what is kept."""
+"""Suffixes of the names of variables that are kept."""
 
 
 def write_dataset(
@@ -53,10 +53,10 @@ def write_dataset(
     found: Gathered,
     attributes: Mapping[str, Any],
 ) -> str:
-    """Write the dataset in one step for whoever looks; returns the digest of the file.
+    """Write the dataset atomically; returns the digest of the file.
 
     Raises:
-        OSError: it can't be written.
+        OSError: the file can't be written.
     """
     with atomic.replacing(path) as temporary:
         with sink(temporary) as target, writing(target) as file:
@@ -156,7 +156,7 @@ def file_labels(file: NetcdfFile, dim: str) -> None:
 
 
 def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]:
-    """Whole trailing dimensions, and as much of the one before them as makes a megabyte."""
+    """Shape of chunks: whole trailing dimensions, and as much of the one before them as makes a megabyte."""
     left = max(1, _CHUNK_NUMBERS // max(1, math.prod(extra)))
     chunk = []
     for size in reversed(members):
@@ -169,12 +169,12 @@ def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]
 def boxes(
     members: Sequence[int], extra: int, numbers: int = _BOX_NUMBERS
 ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], range]]:
-    """Consecutive members that are a box of their dimensions: first corner, shape, and which they are.
+    """Cut consecutive members into boxes of their dimensions: first corner, shape, and the members' range.
 
     Args:
-        members: along each of their dimensions.
-        extra: numbers of one member.
-        numbers: of a box, unless a single member has more.
+        members: number of members along each dimension.
+        extra: numbers per member.
+        numbers: largest count of numbers in a box, unless a single member has more.
     """
     most = max(1, numbers // max(1, extra))
     axis, within = len(members) - 1, 1
@@ -228,5 +228,5 @@ def _write_reasons(file: NetcdfFile, reasons: Mapping[int, str]) -> None:
 
 
 def kept_items(sweep: Sweep) -> tuple[str, ...]:
-    """For messages and attributes."""
+    """Names of the items kept, for messages and attributes."""
     return tuple(plain(item) for item in items_of(sweep))

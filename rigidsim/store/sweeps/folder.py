@@ -26,7 +26,7 @@ _GENERATION = re.compile(r"g(\d{3})\.json")
 
 @dataclass(frozen=True)
 class SweepFolder(WorkFolder):
-    """Paths of one sweep, and what lies there."""
+    """Paths of one sweep, and what is stored there."""
 
     kept = "the tiles that are complete stay"
     resumed = "computes the others"
@@ -34,16 +34,16 @@ class SweepFolder(WorkFolder):
 
     @property
     def tiles(self) -> Path:
-        """Generations and their tiles."""
+        """Folder of generations and their tiles."""
         return self.path / "tiles"
 
     @property
     def is_sweep(self) -> bool:
-        """Whether one lies here."""
+        """Whether the folder holds a sweep."""
         return self.tiles.is_dir() or self.read_summary().get("kind") == KIND
 
     def read_summary(self) -> dict[str, Any]:
-        """What ``summary.json`` says; empty without one."""
+        """Contents of ``summary.json``; empty if there is none."""
         try:
             content = json.loads(self.summary.read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -54,7 +54,7 @@ class SweepFolder(WorkFolder):
         """All of them, the oldest first.
 
         Raises:
-            RunFolderError: one is damaged.
+            RunFolderError: a generation is damaged.
         """
         if not self.tiles.is_dir():
             return []
@@ -62,13 +62,13 @@ class SweepFolder(WorkFolder):
         return [Generation.read(path, int(match[1])) for path, match in found if match]
 
     def add(self, generation: Generation, *, exclusive: bool = False) -> Generation:
-        """Write a generation, whose tiles may be computed from now on.
+        """Write a generation, whose tiles may then be computed.
 
         Args:
-            exclusive: others may write the same one at the same time; the first counts.
+            exclusive: other processes may write the same one at the same time; the first one counts.
 
         Returns:
-            The one that is there.
+            The generation that is stored.
         """
         self.tiles.mkdir(parents=True, exist_ok=True)
         path = self.tiles / f"g{generation.number:03d}.json"
@@ -87,11 +87,11 @@ class SweepFolder(WorkFolder):
         return generation
 
     def tile(self, generation: Generation, tile: int) -> Path:
-        """Where a tile lies."""
+        """Path of a tile."""
         return self.tiles / f"g{generation.number:03d}-{tile:07d}.h5"
 
     def present(self, generation: Generation) -> np.ndarray:
-        """Which tiles of a generation are there, (tiles,) bool."""
+        """Which tiles of a generation exist, (tiles,) bool."""
         there = np.zeros(generation.tiles, dtype=bool)
         pattern = re.compile(rf"g{generation.number:03d}-(\d{{7}})\.h5")
         if self.tiles.is_dir():
@@ -102,10 +102,10 @@ class SweepFolder(WorkFolder):
         return there
 
     def read(self, generation: Generation, tile: int) -> Tile:
-        """A tile, checked.
+        """Read and check a tile.
 
         Raises:
-            RunFolderError: damaged, or not what belongs there.
+            RunFolderError: the tile is damaged, or isn't the one that belongs there.
         """
         path = self.tile(generation, tile)
         found = read_tile(path, generation.config_sha256)
@@ -122,7 +122,7 @@ class SweepFolder(WorkFolder):
         """Make the folder ready for a sweep.
 
         Raises:
-            RunFolderError: something else lies there, or it can't be written.
+            RunFolderError: the folder holds something else, or can't be written.
         """
         ours = {"config.toml", "tiles", "dataset.h5", "summary.json"}
         try:
@@ -149,7 +149,7 @@ class SweepFolder(WorkFolder):
             raise self.unwritable(error) from None
 
     def remove_torn(self) -> None:
-        """Delete what killed processes were writing."""
+        """Delete partial files that killed processes were writing."""
         for folder in (self.path, self.tiles):
             for path in folder.glob(".*.partial"):
                 if not _alive(path):
@@ -162,13 +162,13 @@ class SweepFolder(WorkFolder):
 
 
 def _alive(partial: Path) -> bool:
-    """Whether the process that writes a temporary file is still there (on this machine)."""
+    """Whether the process that writes a temporary file is still running (on this machine)."""
     number = partial.name.split(".")[-2]
     return number.isdigit() and Path(f"/proc/{number}").exists()
 
 
 def is_sweep(path: str | Path) -> bool:
-    """Whether a sweep lies at a folder, or beside a file."""
+    """Whether a path is the folder of a sweep, or a file in one."""
     given = Path(path)
     try:
         return SweepFolder(given if given.is_dir() else given.parent).is_sweep

@@ -1,4 +1,4 @@
-"""The tiles of a sweep, read once and checked: which variables they hold, of which sizes, at which times."""
+"""Tiles of a sweep, read once and checked: which variables they hold, of which sizes, at which times."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _TILES_IN_MEMORY = 96
 
 @dataclass
 class Described:
-    """A variable as the tiles have it.
+    """A variable as described by the tiles.
 
     Attributes:
-        extra: sizes of the dimensions beside the members', the largest of any tile.
+        extra: sizes of the dimensions besides the members', the largest in any tile.
     """
 
     variable: TileVariable
@@ -34,12 +34,12 @@ class Described:
 
 @dataclass
 class Gathered:
-    """What the tiles hold, before their numbers are read again.
+    """What the tiles hold, known before their numbers are read again.
 
     Attributes:
-        times: sample times that all members have; None where they differ, or aren't kept.
-        reasons: by member, of those that didn't end well.
-        made: of each tile, see ``Tile``.
+        times: sample times that all members share; None if they differ, or aren't kept.
+        reasons: why each failed member ended, by member.
+        made: how each tile was made, see ``Tile``.
     """
 
     variables: dict[str, Described] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Gathered:
 
 
 class TileReader:
-    """Tiles of a folder, the latest in memory."""
+    """Reads tiles of a folder and keeps the latest in memory."""
 
     def __init__(self, folder: SweepFolder, generations: Sequence[Generation]) -> None:
         self._folder = folder
@@ -57,10 +57,10 @@ class TileReader:
         self._held: OrderedDict[tuple[int, int], Tile] = OrderedDict()
 
     def tile(self, generation: int, tile: int) -> Tile:
-        """One of them, checked when it is read.
+        """A tile, checked when it is read.
 
         Raises:
-            RunFolderError: it is damaged.
+            RunFolderError: the tile is damaged.
         """
         key = generation, tile
         if key in self._held:
@@ -74,10 +74,10 @@ class TileReader:
 
 
 def gather(sources: Sources, reader: TileReader) -> Gathered:
-    """Read every tile that is used once.
+    """Read once every tile that is used.
 
     Raises:
-        RunFolderError: one is damaged, or two say different things of one variable.
+        RunFolderError: a tile is damaged, or two describe a variable differently.
     """
     found = Gathered()
     wanted = {plain(item) for item in sources.found}
@@ -112,7 +112,7 @@ def gather(sources: Sources, reader: TileReader) -> Gathered:
 
 
 def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | None, bool]:
-    """The longest row of times, and whether all others begin it."""
+    """The longest row of times, and whether all others are its beginning."""
     counts = (~np.isnan(rows)).sum(axis=1)
     longest = rows[int(np.argmax(counts)), : int(counts.max())]
     if known is None or len(longest) > len(known):
@@ -123,7 +123,7 @@ def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | No
 
 
 def _tiles(sources: Sources) -> list[tuple[int, int]]:
-    """All tiles that something lies in."""
+    """All tiles in which something is found."""
     found: set[tuple[int, int]] = set()
     for source in sources.found.values():
         there = ~source.missing

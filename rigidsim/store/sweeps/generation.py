@@ -1,6 +1,7 @@
-"""Generations of a sweep: a config with the members that were missing when it was given, in tiles of so many.
+"""Generations of a sweep: a config together with the members that were missing when it was given, in tiles.
 
-A sweep begins with one; a longer axis or one more output adds another, whose tiles hold only what was new.
+A sweep begins with one generation; a longer axis or one more output adds another, whose tiles hold only what
+was new.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class Work:
-    """Members of which the same is to be computed.
+    """Members for which the same items are to be computed.
 
     Attributes:
-        keep: of what is kept.
+        keep: items that are kept.
         ranges: [first, stop) of the members, ascending.
     """
 
@@ -30,11 +31,11 @@ class Work:
 
     @property
     def count(self) -> int:
-        """Of members."""
+        """Number of members."""
         return sum(stop - first for first, stop in self.ranges)
 
     def members(self, first: int, stop: int) -> np.ndarray:
-        """The members at places first ... stop-1 among these."""
+        """The members at places first ... stop-1 in this work."""
         found, before = [np.zeros(0, dtype=np.int64)], 0
         for begin, end in self.ranges:
             low, high = max(first - before, 0), min(stop - before, end - begin)
@@ -44,7 +45,7 @@ class Work:
         return np.concatenate(found)
 
     def places(self, members: np.ndarray) -> np.ndarray:
-        """The places of members among these; -1 where one isn't."""
+        """Places of the given members in this work; -1 for one that isn't in it."""
         begins = np.array([first for first, _ in self.ranges], dtype=np.int64)
         sizes = np.array([stop - first for first, stop in self.ranges], dtype=np.int64)
         before = np.concatenate([[0], np.cumsum(sizes)[:-1]])
@@ -55,7 +56,7 @@ class Work:
 
 
 def ranges_of(members: np.ndarray) -> tuple[tuple[int, int], ...]:
-    """Ascending members as ranges."""
+    """Ascending members as ranges [first, stop)."""
     if not len(members):
         return ()
     breaks = np.flatnonzero(np.diff(members) != 1)
@@ -66,13 +67,13 @@ def ranges_of(members: np.ndarray) -> tuple[tuple[int, int], ...]:
 
 @dataclass(frozen=True)
 class Generation:
-    """A config with what was to be computed for it.
+    """A config together with the work that was to be done for it.
 
     Attributes:
-        number: from 0.
-        config: TOML text.
-        length: of a tile, members.
-        works: in order; tiles are numbered through them.
+        number: number of the generation, from 0.
+        config: the config's TOML text.
+        length: members per tile.
+        works: works in order; tiles are numbered through them.
     """
 
     number: int
@@ -82,26 +83,26 @@ class Generation:
 
     @property
     def config_sha256(self) -> str:
-        """Of the TOML text."""
+        """SHA-256 of the TOML text."""
         return hashlib.sha256(self.config.encode()).hexdigest()
 
     @cached_property
     def tile_counts(self) -> tuple[int, ...]:
-        """Tiles of each work."""
+        """Number of tiles in each work."""
         return tuple(-(-work.count // self.length) for work in self.works)
 
     @property
     def tiles(self) -> int:
-        """How many there are."""
+        """Number of tiles."""
         return sum(self.tile_counts)
 
     @property
     def members(self) -> int:
-        """How many are to be run."""
+        """Number of members to be run."""
         return sum(work.count for work in self.works)
 
     def work_of(self, tile: int) -> tuple[Work, int]:
-        """The work that a tile belongs to, and its number within."""
+        """The work that a tile belongs to, and the tile's number within it."""
         for work, count in zip(self.works, self.tile_counts, strict=True):
             if tile < count:
                 return work, tile
@@ -114,17 +115,17 @@ class Generation:
         return work.members(number * self.length, (number + 1) * self.length)
 
     def as_text(self) -> str:
-        """For ``gNNN.json``."""
+        """JSON text for ``gNNN.json``."""
         works = [{"keep": list(work.keep), "ranges": [list(r) for r in work.ranges]} for work in self.works]
         content = {"format": 1, "config": self.config, "length": self.length, "works": works}
         return json.dumps(content) + "\n"
 
     @classmethod
     def read(cls, path: Path, number: int) -> Generation:
-        """From a ``gNNN.json``.
+        """Read a ``gNNN.json``.
 
         Raises:
-            RunFolderError: damaged.
+            RunFolderError: the file is damaged.
         """
         try:
             content = json.loads(path.read_text(encoding="utf-8"))

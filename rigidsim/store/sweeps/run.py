@@ -1,4 +1,4 @@
-"""A sweep on disk: its dataset, read lazily, and what is known of it."""
+"""Sweeps on disk: the dataset, read lazily, and the summary."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from rigidsim.store.sweeps.folder import SweepFolder
 if TYPE_CHECKING:
     import xarray
 
-_RECENT = 20  # tiles by which the rate is told
+_RECENT = 20  # tiles from which the rate is determined
 
 
 @dataclass(frozen=True, repr=False)
 class SavedSweep:
-    """A sweep, finished or not.
+    """A sweep on disk, finished or not.
 
     Attributes:
         folder: its files.
-        summary: what is known of it; of an unfinished one from its tiles.
+        summary: contents of its summary; for an unfinished sweep, what its tiles tell.
     """
 
     folder: SweepFolder
@@ -33,17 +33,17 @@ class SavedSweep:
 
     @property
     def place(self) -> str:
-        """Its folder."""
+        """Path of the sweep's folder."""
         return str(self.folder.path)
 
     @property
     def status(self) -> str:
-        """ "finished", "running", "interrupted" ..."""
+        """Status of the sweep: "finished", "running", "interrupted" ..."""
         return str(self.summary["status"])
 
     @property
     def finished(self) -> bool:
-        """Whether all members are there."""
+        """Whether all members are complete."""
         return self.status == "finished"
 
     @property
@@ -75,7 +75,7 @@ def open_sweep(path: str | Path) -> SavedSweep:
     """Open the folder of a sweep, or the dataset in it, finished or not.
 
     Raises:
-        RunFolderError: there is none.
+        RunFolderError: there is no sweep.
     """
     given = Path(path)
     folder = SweepFolder(given if given.is_dir() else given.parent)
@@ -85,7 +85,7 @@ def open_sweep(path: str | Path) -> SavedSweep:
 
 
 def so_far(folder: SweepFolder) -> dict[str, Any]:
-    """The summary; of a sweep that isn't finished what its tiles tell."""
+    """The summary; for an unfinished sweep, what its tiles tell."""
     summary = folder.read_summary()
     generations = folder.generations()
     if not generations:
@@ -118,7 +118,7 @@ def so_far(folder: SweepFolder) -> dict[str, Any]:
 
 
 def _rate(folder: SweepFolder, generation: int, length: int) -> float | None:
-    """Members a second, from when the latest tiles were written."""
+    """Members per second, from the times at which the latest tiles were written."""
     times = sorted(path.stat().st_mtime for path in folder.tiles.glob(f"g{generation:03d}-*.h5"))[-_RECENT:]
     if len(times) < 2:
         return None

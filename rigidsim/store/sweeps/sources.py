@@ -1,4 +1,4 @@
-"""Which tile holds what of which member, over all generations of a sweep."""
+"""Lookup of the tile that holds each kept item of each member, over all generations of a sweep."""
 
 from __future__ import annotations
 
@@ -13,25 +13,27 @@ from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation, Work, ranges_of
 
 ALWAYS = "always"
-"""The item of what is kept of every member."""
+"""The item that is kept for every member."""
 _NOWHERE = -1
 
 
 def items_of(sweep: Sweep) -> tuple[str, ...]:
-    """What is kept of a sweep's members, each as it is known by: how many events are kept is part of it."""
+    """Items kept of a sweep's members, by the names under which they are known (the number of events kept is
+    part of it).
+    """
     counted = {name: f"{name}:{sweep.table.most_events}" for name in ("events", "section")}
     return tuple(counted.get(name, name) for name in sweep.table.keep)
 
 
 def plain(item: str) -> str:
-    """As ``[sweep] keep`` calls it."""
+    """The item's name in ``[sweep] keep``."""
     return item.partition(":")[0]
 
 
 @dataclass(frozen=True)
 class ItemPlaces:
-    """Where an item lies of each member, (members,): a tile of a generation, and the place in it; -1 where it
-    lies nowhere.
+    """Where each member's item is found, (members,): generation, tile, and place in the tile; -1 if
+    nowhere.
     """
 
     generation: np.ndarray
@@ -40,7 +42,7 @@ class ItemPlaces:
 
     @classmethod
     def nowhere(cls, count: int) -> ItemPlaces:
-        """Of no member."""
+        """Places of an item that no member has."""
         return cls(
             np.full(count, _NOWHERE, dtype=np.int16),
             np.full(count, _NOWHERE, dtype=np.int32),
@@ -49,18 +51,18 @@ class ItemPlaces:
 
     @property
     def missing(self) -> np.ndarray:
-        """Of which members it lies nowhere."""
+        """Mask of the members that lack the item."""
         return self.generation == _NOWHERE
 
 
 @dataclass(frozen=True)
 class Sources:
-    """Where what is kept of a sweep's members lies, by item; ``ALWAYS`` with them."""
+    """Where everything kept of a sweep's members is found, by item, including ``ALWAYS``."""
 
     found: dict[str, ItemPlaces] = field(default_factory=dict)
 
     def works(self) -> tuple[Work, ...]:
-        """What is still to be computed: members of which the same is missing go together."""
+        """What is still to be computed; members that lack the same items go together."""
         items = list(self.found)
         if not items:
             return ()
@@ -76,10 +78,10 @@ class Sources:
 
 
 def sources_of(sweep: Sweep, folder: SweepFolder, generations: Sequence[tuple[Generation, Sweep]]) -> Sources:
-    """Where everything lies that a sweep asks for; the oldest that there is of each.
+    """Find everything that a sweep asks for; the oldest copy counts.
 
     Args:
-        generations: of the folder, with the sweeps that their configs describe.
+        generations: the folder's generations, with the sweeps that their configs describe.
     """
     found = {item: ItemPlaces.nowhere(sweep.count) for item in (ALWAYS, *items_of(sweep))}
     for generation, then in generations:
@@ -101,13 +103,13 @@ def sources_of(sweep: Sweep, folder: SweepFolder, generations: Sequence[tuple[Ge
 
 
 def positions(sweep: Sweep, then: Sweep) -> np.ndarray:
-    """Of each member of a sweep, which member of another it is; -1 where it is none."""
+    """Index, in another sweep, of each member of a sweep; -1 if it isn't there."""
     if _same_axes(sweep, then):
         return np.arange(sweep.count)
     keys, old_keys = [axis.key for axis in sweep.axes], [axis.key for axis in then.axes]
     if sorted(keys) != sorted(old_keys):
         return np.full(sweep.count, _NOWHERE)
-    order = [old_keys.index(key) for key in keys]  # of the other's axes, as this one's stand
+    order = [old_keys.index(key) for key in keys]  # the other's axes in the order of this one's
     if sweep.product and then.product:
         strides = np.array([int(np.prod(then.shape[i + 1 :])) for i in range(len(then.axes))], dtype=np.int64)
         flat = np.zeros(sweep.shape, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Tiles: what was kept of some members of a sweep, sealed, written once, and read with distrust."""
+"""Tiles: results of some members of a sweep, sealed, written once, and read with distrust."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _FORMAT = 1
 
 @dataclass(frozen=True)
 class TileVariable:
-    """What a variable of a tile is.
+    """Description of a variable in a tile.
 
     Attributes:
-        dims: beside the members'.
-        item: what of ``[sweep] keep`` it belongs to.
+        dims: dimensions besides the members'.
+        item: item of ``[sweep] keep`` that it belongs to.
     """
 
     dims: tuple[str, ...]
@@ -36,15 +36,15 @@ class TileVariable:
 
 @dataclass(frozen=True)
 class Tile:
-    """Some members, run.
+    """Results of some members.
 
     Attributes:
-        config_sha256: of the config that they are members of.
-        members: which they are, (n,) int64.
-        arrays: by name, (n, ...) float64 or int64; those without a number aren't there.
-        variables: what these are.
-        reasons: by place in the tile, why members didn't end well.
-        made: engines, versions, seconds, ...: what isn't the same each time it is made.
+        config_sha256: SHA-256 of the config that the members belong to.
+        members: indices of the members, (n,) int64.
+        arrays: arrays by name, (n, ...) float64 or int64; empty ones are left out.
+        variables: descriptions of the arrays.
+        reasons: by place in the tile, why members failed.
+        made: engines, versions, seconds, ...: everything that differs between repetitions.
     """
 
     config_sha256: str
@@ -55,7 +55,7 @@ class Tile:
     made: Mapping[str, Any] = field(default_factory=dict)
 
     def image(self) -> bytes:
-        """The sealed file that holds it."""
+        """The sealed file's bytes."""
         described = {
             name: {"dims": list(v.dims), "attributes": dict(v.attributes), "item": v.item}
             for name, v in self.variables.items()
@@ -78,13 +78,13 @@ class Tile:
 
 
 def read_tile(path: Path, config_sha256: str) -> Tile:
-    """A tile, its seal checked.
+    """Read a tile and check its seal.
 
     Args:
-        config_sha256: of the config that its members belong to.
+        config_sha256: SHA-256 of the config that its members belong to.
 
     Raises:
-        RunFolderError: torn, damaged, foreign, or of another sweep.
+        RunFolderError: the file is torn, damaged, foreign, or of another sweep.
     """
     refuse_special(path)
     check_seal(path)
