@@ -79,6 +79,17 @@ def test_every_study_of_the_folder_is_in_the_list_and_in_the_guide() -> None:
     ]
 
 
+def test_every_command_of_the_folder_is_in_the_guides_table() -> None:
+    _, _, after = GUIDE.read_text(encoding="utf-8").partition("\n## All studies\n")
+    listed = after.partition("\n## ")[0]
+    commands = {
+        path.stem for path in GUIDE.parent.glob("*.py") if '__name__ == "__main__"' in path.read_text()
+    }
+    assert len(commands) > 20
+    missing = sorted(name for name in commands if f"`{name}`" not in listed)
+    assert not missing, f"a row of experiments/README.md, All studies, is wanted for: {missing}"
+
+
 @pytest.mark.slow
 def test_a_wrong_expected_value_makes_the_exit_code_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
