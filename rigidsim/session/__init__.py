@@ -1,1 +1,1 @@
-"""One session of a run: recording, guards, checkpoints, and the summary that it ends with."""
+"""Sessions of a run: recording, guards, checkpoints, and the summary at the end."""

@@ -1,4 +1,4 @@
-"""What would do better than a run did, nearly for free: decided from its numbers, told elsewhere."""
+"""Advice on settings that would have done better at about the same cost; the wording is elsewhere."""
 
 from __future__ import annotations
 
@@ -10,20 +10,23 @@ from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.store.summary_parts import Advice, AdviceCode
 
 _LONG = 8192
-"""Steps from which on projected invariants pay for themselves (``experiments/precision_tradeoff.py``: from
-1e4 rad on, some 2500 steps in double precision)."""
+"""Steps from which projecting invariants pays off (``experiments/precision_tradeoff.py``: from 1e4 rad on,
+some 2500 steps in double precision).
+"""
 _HELD = 3.0
 """tolerance sqrt(steps): attitude error with projected invariants, whose growth is that of a random walk.
-Over free bodies and heavy symmetric tops it was 1 to 2 of that at 1e7 rad (``experiments.long_horizon``)."""
+Over free bodies and heavy symmetric tops it was 1 to 2 of that at 1e7 rad (``experiments.long_horizon``).
+"""
 _WORTH, _FAR = 30.0, 1000.0
-"""Times by which an error has to become smaller for anybody to be bothered: with a switch, with a method."""
+"""Factors by which an error must shrink to be worth advice: by a switch, and by another method."""
 
 
 def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
     """Settings that would have given a far better attitude at the same cost or less, the best last.
 
-    Only what was measured is promised: projected invariants make up for the errors of motions that are
-    integrable (those with a closed form), whose frequencies depend on what is projected alone.
+    Only what was measured is promised: projecting invariants removes the errors of integrable motions (those
+    with a
+    closed form), whose frequencies depend on the projected invariants alone.
     """
     prepared, estimate, cheaper = found.prepared, found.estimate, found.cheaper
     if estimate is not None and cheaper is not None:
@@ -43,7 +46,7 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
         return ()
     now, advice = estimate.attitude, []
     held = _HELD * prepared.law_tolerance * math.sqrt(found.progress.steps) * estimate.amplification
-    # times of samples are rounded to doubles, which every estimate counts
+    # sample times are rounded to doubles, which every estimate includes
     held += label_rounding(prepared, estimate.seconds) * float(prepared.system.rate_bound)
     if not prepared.holds_invariants and found.progress.steps >= _LONG and now > _WORTH * held:
         advice.append(Advice(code=AdviceCode.HOLD_INVARIANTS.value, now=now, then=held))

@@ -1,4 +1,4 @@
-"""The root attributes of a run's files, filled."""
+"""Filling in the root attributes of a run's files."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from rigidsim.store.variables import SCHEMA_VERSION
 def root_attributes(
     prepared: InitialValueProblem, stepper: Stepper, run_id: str, mixed: str = ""
 ) -> RootAttributes:
-    """Of segments, and of a dataset before its end is known.
+    """Attributes of segments, and of a dataset before the end of its run is known.
 
     Args:
-        run_id: tells this run from all others.
-        mixed: what changed in versions or machine since the run began; empty where nothing did.
+        run_id: identifies this run.
+        mixed: what changed in versions or machine since the run began; empty if nothing did.
     """
     scene, system = prepared.scene, prepared.system
     platform: dict[str, Any] = {f"version_{k}": v for k, v in provenance.versions().items()}
@@ -86,7 +86,7 @@ def root_attributes(
 
 
 def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
-    """Gravity, and what every load shows of itself."""
+    """Gravity and the pictured objects of every load."""
     scene = prepared.scene
     shown = [load.pictured() for load in (*scene.loads, *prepared.python_loads)]
     if scene.gravity is not None:
@@ -95,17 +95,17 @@ def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
 
 
 def _as_json(tables: Mapping[str, TableErrors]) -> str | None:
-    """None where there are none."""
+    """Tables as JSON text; None if there are none."""
     return json.dumps({name: found.as_dict() for name, found in tables.items()}) if tables else None
 
 
 def of_complete(
     attributes: RootAttributes, summary: Summary, effort: Effort, angles_wrapped_from: float = math.nan
 ) -> RootAttributes:
-    """Those of the dataset of a run that ended.
+    """Attributes of the dataset of a run that ended.
 
     Args:
-        angles_wrapped_from: as of ``SampleStatistics``.
+        angles_wrapped_from: see ``SampleStatistics``.
     """
     put_back = {name: row.put_back for name, row in summary.invariants.items()}
     return attributes.having(

@@ -1,4 +1,4 @@
-"""Whether an averaged model would have told what a long run records, and at what part of its steps."""
+"""Whether an averaged model would have given what a long run records, and at what share of its steps."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 
 @dataclass(frozen=True)
 class CheaperModel:
-    """An averaged model for a run that resolved every rotation.
+    """An averaged model that could replace a run that resolved every rotation.
 
     Attributes:
-        level: of ``[model]``, with short-period terms.
-        error: of the recorded axes at the end, rad.
-        share: of the run's steps that it takes, at most.
+        level: level of ``[model]``, with short-period terms.
+        error: error of the recorded axes at the end, rad.
+        share: largest share of the run's steps that it would take.
     """
 
     level: str
@@ -29,15 +29,15 @@ class CheaperModel:
 def cheaper_model(
     prepared: InitialValueProblem, steps: int, limits: AdviceLimits, go_on: Callable[[], bool]
 ) -> CheaperModel | None:
-    """The most averaged model that keeps the axes, measured over the beginning of the span.
+    """The most averaged model that keeps the axes accurate, measured over the beginning of the run.
 
     Args:
-        steps: that the run took.
-        limits: of runs that are looked at, and of models that are advised.
-        go_on: asked again and again; False ends it.
+        steps: steps that the run took.
+        limits: which runs are examined, and which models are advised.
+        go_on: polled repeatedly; False ends the comparison.
 
     Returns:
-        None where none does, the run is short, or something is recorded that needs every rotation.
+        None if no model does, the run is short, or something recorded needs every rotation.
     """
     config = prepared.scene.config
     loads = prepared.system.plan.loads
@@ -51,7 +51,7 @@ def cheaper_model(
         try:
             other = prepare(prepared.experiment.having(keys), loads=prepared.python_loads)
             found = measure_modelling(other, go_on=go_on)
-        except ConfigError:  # it has no such average, or records what that doesn't know
+        except ConfigError:  # no such average exists, or it can't provide what is recorded
             continue
         if found is None:
             return None

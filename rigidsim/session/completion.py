@@ -1,4 +1,4 @@
-"""The end of a run's files: segments to dataset, dataset to timeline, and the summary beside them."""
+"""Completing a run's files: segments to dataset, dataset to timeline, and the summary beside them."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class Completion:
-    """Completes a run that ended for good.
+    """Completes the files of a run that has ended.
 
     Attributes:
-        summary: all but the files' digests at first; replaced as they become known.
+        summary: without the files' digests at first; replaced as they become known.
         extras: variables with dimensions of their own.
-        unused: names of variables along time that the dataset needn't have.
+        unused: names of variables along time that the dataset leaves out.
     """
 
     prepared: InitialValueProblem
@@ -52,7 +52,8 @@ class Completion:
     summary: Summary
 
     def complete(self) -> Summary:
-        """Write the files; a Ctrl-C leaves what can be resumed from, and the summary returned says so.
+        """Write the files; after a Ctrl-C, leave a state that can be resumed from and return a summary that
+        says so.
 
         Raises:
             RunFolderError: the folder can't be written.
@@ -94,7 +95,7 @@ class Completion:
         return of_complete(self.attributes, self.summary, self.effort, wrapped_from)
 
     def _conclude(self) -> None:
-        """The dataset is in place, the segments are still there."""
+        """Write what remains once the dataset is in place and the segments are still there."""
         cost = cost_so_far(self.prepared, self.loop.progress, self.phases, self.effort)
         self.summary = self.summary.having(cost=cost, dataset_sha256=self.writer.dataset_sha256)
         self.folder.write_summary(self.summary)
@@ -118,13 +119,13 @@ def with_timeline(
     observer: Observer,
     kept: KeptRows | None = None,
 ) -> Summary:
-    """Draw a complete dataset's timeline, where one is asked for; the summary with its digest.
+    """Draw a complete dataset's timeline, if requested; returns the summary with its digest.
 
     Args:
-        kept: its rows, where they were kept.
+        kept: the timeline's rows, if they were kept.
 
     Raises:
-        StoppedWritingError: it can't be written.
+        StoppedWritingError: the timeline can't be written.
     """
     if not output.timeline or not summary.samples:
         return summary

@@ -1,4 +1,4 @@
-"""The dates of samples and events where time 0 of the scene is known: year, Julian date, calendar date.
+"""Dates of samples and events, if time 0 of the scene is known: year, Julian date, calendar date.
 
 A Julian date is worked out from the exact rational time of a sample and kept in two doubles: right to 2^-104
 of its size, some 1e-20 s. Blocks are cut at multiples of a fixed count of samples, so that bits depend on the
@@ -22,22 +22,22 @@ DAY = 86400
 _YEAR = 365.25
 _J2000 = float(J2000.julian_date())
 _BLOCK = 1 << 16
-_SPARE = 17  # bits that products with an index within a block take
+_SPARE = 17  # bits taken by products with an index within a block
 # What xarray turns into datetime64[ns] without the package cftime.
 _FIRST_DATE, _LAST_DATE = parse_epoch("1678-01-01 TT").day, parse_epoch("2262-01-01 TT").day
 
 Columns = dict[str, list[np.ndarray]]
-"""Parts of each variable, (rows,) float64."""
+"""Parts of each variable by name, (rows,) float64."""
 Parts = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Dates:
-    """The coordinates beside ``time`` of a scene whose time 0 is known.
+    """Coordinates besides ``time`` for a scene whose time 0 is known.
 
     Attributes:
-        epoch: time 0.
-        samples: where they lie.
+        epoch: date of time 0.
+        samples: times of the samples.
     """
 
     epoch: Epoch
@@ -45,12 +45,16 @@ class Dates:
 
     @property
     def scale(self) -> str:
-        """Of years and Julian dates: the epoch's own, TT for UTC, whose days differ in length."""
+        """Time scale of years and Julian dates: the epoch's own, but TT for UTC, whose days differ in
+        length.
+        """
         return self.epoch.uniform().scale
 
     @cached_property
     def has_dates(self) -> bool:
-        """Whether all samples lie where readers have dates (1678 to 2261) and UTC, if asked for, is known."""
+        """Whether all samples lie where readers have dates (1678 to 2261), and UTC is known if it is asked
+        for.
+        """
         ends = [self.samples.begin, self.samples.exact_last]
         days: list[Fraction] = [Fraction(self.epoch.day), *(self.epoch.uniform().day + t / DAY for t in ends)]
         if not _FIRST_DATE <= min(days) <= max(days) < _LAST_DATE:
@@ -63,7 +67,7 @@ class Dates:
 
     @property
     def variables(self) -> list[Variable]:
-        """``year``, ``julian_date`` and, where all can be said, ``date``."""
+        """The variables ``year`` and ``julian_date``, and ``date`` if every sample has one."""
         told = {"time_scale": self.scale}
         found = [
             Variable(
@@ -93,7 +97,7 @@ class Dates:
         return found
 
     def of_samples(self, first: int, count: int) -> Columns:
-        """Of samples first ... first+count-1."""
+        """Dates of samples first ... first+count-1."""
         times = self.samples.times
         if times is not None:
             return self.of_times(times[first : first + count])
@@ -102,7 +106,7 @@ class Dates:
         return self._columns(*(np.concatenate([piece[i] for piece in pieces]) for i in range(3)))
 
     def of_times(self, times: Sequence[Fraction]) -> Columns:
-        """Of any times of the scene, s."""
+        """Dates of any times of the scene, s."""
         zero = self.epoch.julian_date()
         dates = [zero + time / DAY for time in times]
         high = np.array([float(date) for date in dates])
@@ -112,7 +116,7 @@ class Dates:
         return self._columns(high, low, np.array([float(time) for time in times]))
 
     def _grid(self, block: int, first: int, stop: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Julian dates in two doubles and times (s) of the samples of one block that are asked for."""
+        """Julian dates in two doubles and times (s) of the requested samples of one block."""
         origin = block * _BLOCK
         index = np.arange(max(first - origin, 0), min(stop - origin, _BLOCK), dtype=np.float64)
         days, seconds = self._begins(block)
@@ -120,10 +124,10 @@ class Dates:
         return high, low, np.add(*_line(seconds, self._steps[1], index))
 
     def _begins(self, block: int) -> tuple[Parts, Parts]:
-        """Julian date and time, s, of the first sample of a block."""
+        """Julian date and time (s) of the first sample of a block."""
         if block not in self._known:
             begin = self.samples.begin + block * _BLOCK * self.samples.step
-            self._known.clear()  # blocks come one after the other
+            self._known.clear()  # blocks are asked for one after the other
             self._known[block] = _parts(self.epoch.julian_date() + begin / DAY), _parts(begin)
         return self._known[block]
 
@@ -133,7 +137,7 @@ class Dates:
 
     @cached_property
     def _steps(self) -> tuple[Parts, Parts]:
-        """From one sample to the next, days and s; products of two parts with an index are exact."""
+        """Sampling interval in days and in seconds; products of two parts with an index are exact."""
         step = self.samples.step
         return _parts(step / DAY, _SPARE), _parts(step, _SPARE)
 
@@ -146,14 +150,14 @@ class Dates:
 
     @cached_property
     def _reference(self) -> tuple[str, float]:
-        """A date and time without fractions to count from, and what time 0 has there, s."""
+        """A date and time without fractions to count from, and the seconds from it to time 0."""
         second = 10**14
         whole = min(self.epoch.ticks // second, DAY - 1)
         start = Epoch(self.epoch.scale, self.epoch.day, whole * second)
         return start.calendar().replace("T", " "), float(Fraction(self.epoch.ticks, second) - whole)
 
     def _date(self, seconds: np.ndarray) -> np.ndarray:
-        """Seconds since the reference, none of them a leap second; not a number within one."""
+        """Dates from seconds since the reference, none of them a leap second; NaT within one."""
         dates = seconds + self._reference[1]
         if self.epoch.scale != "UTC":
             return dates
@@ -164,7 +168,7 @@ class Dates:
 
     @cached_property
     def _leaps(self) -> list[tuple[float, int]]:
-        """Times (s) after time 0 from which UTC has counted another second, or one less, and which."""
+        """Times (s) after time 0 from which UTC has counted another second, or one less, with the count."""
         days, offsets, _ = leap_seconds()
         later = [k for k in range(1, len(days)) if days[k] > self.epoch.day]
         zero = self.epoch.julian_date()
@@ -189,7 +193,7 @@ def _line(base: Parts, step: Parts, index: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _parts(value: Fraction, spare: int = 0) -> Parts:
-    """Three doubles whose sum is close to a value, the first two with so many bits to spare."""
+    """Three doubles whose sum is close to a value, the first two with ``spare`` low bits zero."""
     parts = []
     for bits in (spare, spare, 0):
         part = float(value)
@@ -202,7 +206,7 @@ def _parts(value: Fraction, spare: int = 0) -> Parts:
 
 
 def _sum(a: float | np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sum as rounded, and what rounding took off it (Knuth 1969, section 4.2.2, theorem B)."""
+    """Rounded sum and its rounding error (Knuth 1969, section 4.2.2, theorem B)."""
     total = a + b
     of_b = total - a
     return total, (a - (total - of_b)) + (b - of_b)

@@ -1,4 +1,4 @@
-"""How far a run is to be trusted: its errors as the laws estimate them, and all that there is to warn of."""
+"""Trustworthiness of a run: its errors as the error laws estimate them, and all warnings."""
 
 from __future__ import annotations
 
@@ -25,18 +25,20 @@ if TYPE_CHECKING:
     from rigidsim.session.cheaper_model import CheaperModel
 
 NEAR_SINGULAR = 1e-3
-"""Factor from which Euler angles lose digits to their singularity."""
-_STEPS_TO_SINGULARITY = math.e**2  # a Taylor step is e^-2 of the way to it (Jorba & Zou 2005)
+"""Singular factor below which Euler angles lose digits near their singularity."""
+_STEPS_TO_SINGULARITY = (
+    math.e**2
+)  # a Taylor step is e^-2 of the distance to the singularity (Jorba & Zou 2005)
 
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """What a run's steps, its samples and the motion itself say of its errors.
+    """Evidence on a run's errors from its steps, its samples and the motion itself.
 
     Attributes:
-        estimate: of the errors at the end; None where none was asked for, or the run hasn't ended.
-        modelling: what a reduced model leaves out; None for the full one, and where it wasn't measured.
-        cheaper: an averaged model that would have done; None where there is none, or nobody looked.
+        estimate: estimated errors at the end; None if not requested, or the run hasn't ended.
+        modelling: error of a reduced model; None for the full model, and if not measured.
+        cheaper: an averaged model that would have sufficed; None if there is none, or none was sought.
     """
 
     prepared: InitialValueProblem
@@ -58,13 +60,13 @@ class Diagnostics:
         waypoints: Waypoints | None = None,
         go_on: Callable[[], bool] = lambda: True,
     ) -> Diagnostics:
-        """With an estimate of the errors.
+        """The diagnostics with an estimate of the errors.
 
         Args:
             trail: some of the run's samples.
-            stepper: of the run; left as it was.
+            stepper: the run's stepper; left as it was.
             waypoints: some of its step boundaries.
-            go_on: asked again and again; False ends it, without a result.
+            go_on: polled repeatedly; False ends the estimate without a result.
         """
         from rigidsim.accuracy.estimates.estimate import estimate_errors
 
@@ -83,13 +85,15 @@ class Diagnostics:
         return replace(self, estimate=found)
 
     def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
-        """With the error of a reduced model, arguments as of ``estimated``."""
+        """The diagnostics with the error of a reduced model; arguments as for ``estimated``."""
         from rigidsim.accuracy.models.modelling import measure_modelling
 
         return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
 
     def compared(self, limits: AdviceLimits, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
-        """With the averaged model that would have done, arguments as of ``cheaper_model``."""
+        """The diagnostics with an averaged model that would have sufficed; arguments as for
+        ``cheaper_model``.
+        """
         from rigidsim.session.cheaper_model import cheaper_model
 
         return replace(self, cheaper=cheaper_model(self.prepared, self.progress.steps, limits, go_on))
@@ -196,8 +200,8 @@ class Diagnostics:
             )
 
     def _undefined(self) -> Iterator[Caution]:
-        """Variables that are lost on the way; those that aren't defined from the start on are the scene's
-        own, as the node of a top that sleeps.
+        """Warnings of variables that become undefined on the way; those undefined from the start belong to
+        the scene, like the node of a sleeping top.
         """
         conventions = {r.name: r.attributes.get("convention", "") for r in self.prepared.system.recorded}
         for name, seen in self.statistics.undefined.items():
@@ -218,7 +222,7 @@ class Diagnostics:
         return f" from about {self._words.moment(since, 3)} on (errors grow e-fold every {folding})"
 
     def _passed(self) -> float:
-        """About how near a chart's singularity the motion came between two samples, by the shortest step,
+        """Estimate from the shortest step of how near a chart's singularity the motion came between samples,
         rad.
         """
         system = self.prepared.system

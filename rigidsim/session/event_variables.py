@@ -21,7 +21,7 @@ def event_variables(
     """``NAME_time``, dates and ``NAME_<variable>`` along a dimension ``NAME``, with residuals beyond double.
 
     Args:
-        last: time of the run's last sample, internal units; steps, and crossings, go past it.
+        last: time of the run's last sample, internal units; steps and crossings may lie past it.
     """
     extras: list[Extra] = []
     variables, dates = recorded_variables(prepared), dates_of(prepared)
@@ -50,10 +50,10 @@ def event_variables(
 
 
 def refuse_taken_names(prepared: InitialValueProblem) -> None:
-    """Before a run whose dataset would need one name twice.
+    """Refuse a run whose dataset would use one name twice.
 
     Raises:
-        ConfigError: an event's dimension or variables would be called like something else.
+        ConfigError: an event's dimension or variables would have the name of something else.
     """
     taken = {name for variable in dataset_variables(prepared) for name in variable.part_names()}
     taken |= {*LABELS, *OF_THE_RUN, *LYAPUNOV_NAMES, "checkpoint", "events"}
@@ -94,7 +94,7 @@ def _extras(
 
 
 def event_times(prepared: InitialValueProblem, log: EventLog, last: float) -> dict[str, EventTimes]:
-    """When each event that was found happened first and last."""
+    """First and last times of each event that was found."""
     clock, times = prepared.clock, {}
     for index, crossing in enumerate(prepared.system.crossings):
         found = log.occurrences(index, last)

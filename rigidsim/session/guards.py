@@ -1,4 +1,4 @@
-"""What looks after a run between two chunks of steps: observers, signals and the guards of ``[limits]``."""
+"""Checks between two chunks of steps: observers, signals and the guards of ``[limits]``."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rigidsim.solve.status import Status
 
 
 class Observer:
-    """Is told how a run goes; the command line draws a progress bar with it. Does nothing by itself."""
+    """Receives a run's progress, for instance to draw a progress bar; the base class does nothing."""
 
     def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
-        """The equations are compiled; integration begins, into a folder or into memory."""
+        """The equations are compiled and integration begins, in a folder or in memory."""
 
     def resumed(self, progress: Progress) -> None:
-        """After ``started``, of a run that goes on: what was done before this session."""
+        """Called after ``started`` for a resumed run, with what was done before this session."""
 
     def progressed(self, progress: Progress) -> None:
         """Called between chunks, at most some tens of times per second."""
@@ -34,18 +34,19 @@ class Observer:
         """
 
     def nothing_left(self, why: str) -> None:
-        """The run to be resumed had ended for good before, with these words; nothing was done."""
+        """The run to be resumed had already ended for good, for the given reason; nothing was done."""
 
     def choosing(self, name: str) -> None:
-        """Settings for the run of this name are about to be chosen, by trials; its integration follows."""
+        """Settings for the run of this name are about to be chosen by trials; its integration follows."""
 
     def trying(self, title: str, fraction: float) -> None:
-        """A trial for the choice or the certificate has come so far; some tens of times per second."""
+        """Progress of a trial for the choice or the certificate; called some tens of times per second."""
 
 
 class Interruption:
-    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks; where
-    something is being compiled, nobody waits for it any more, and nothing more is.
+    """Notes SIGINT and SIGTERM while the engine works, so that a run always ends between two chunks.
+
+    Compilation under way is no longer waited for after a signal, and none is started.
     """
 
     def __init__(self) -> None:
@@ -54,9 +55,7 @@ class Interruption:
 
     @contextmanager
     def dispensable(self) -> Iterator[None]:
-        """What is done inside the block is given up at the first signal, wherever it is: its result would
-        not be used any more.
-        """
+        """Abandon the block at the first signal, wherever it is, since its result would no longer be used."""
         with suppress(KeyboardInterrupt):
             self._dispensable = True
             try:
@@ -66,7 +65,7 @@ class Interruption:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Handle the signals inside the block (in the main thread, the only one that gets them)."""
+        """Handle the signals inside the block (in the main thread, the only one that receives them)."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -88,8 +87,11 @@ class Interruption:
 
 
 class Guards:
-    """The checks between chunks; ``wall_time`` counts anew in each session of a run. The loop itself keeps
-    ``max_steps``, and the recorder looks at each sample's drift: an earlier session's are looked at here.
+    """The checks between chunks; ``wall_time`` starts anew in each session of a run.
+
+    The loop itself enforces ``max_steps``, and the recorder checks each sample's drift; here the drifts of an
+    earlier
+    session are checked.
     """
 
     def __init__(
@@ -109,7 +111,7 @@ class Guards:
         self._reported = 0.0
 
     def __call__(self, progress: Progress) -> Status | None:
-        """The status that ends the run now; None where nothing does."""
+        """The status that ends the run now; None if nothing does."""
         now = time.monotonic()
         if now - self._reported > 0.05:
             self._reported = now

@@ -1,6 +1,6 @@
-"""What is kept of a sweep's members, from their samples: last values, extremes, means, drifts, whole series.
+"""Results kept of a sweep's members, from their samples: last values, extremes, means, drifts, whole series.
 
-Everything here works on blocks of many members at once, and knows samples alone, not where they come from.
+Everything here works on blocks of many members at once and on samples alone, wherever they come from.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from rigidsim.solve.indicators import indicators
 from rigidsim.store.variables import Variable, part_name
 
 ALWAYS = "always"
-"""The item of what is kept of every member, asked for or not."""
+"""The item that is kept for every member, asked for or not."""
 
 
 @dataclass(frozen=True)
 class KeptVariable:
-    """One variable of the members of a tile.
+    """One variable for the members of a tile.
 
     Attributes:
-        dims: beside the members'.
+        dims: dimensions besides the members'.
         values: (members, ...), float64 or int64.
-        item: what of ``[sweep] keep`` it belongs to, or ``ALWAYS``.
+        item: item of ``[sweep] keep`` that it belongs to, or ``ALWAYS``.
     """
 
     dims: tuple[str, ...]
@@ -37,7 +37,7 @@ class KeptVariable:
 
 
 Kept = dict[str, KeptVariable]
-"""By name."""
+"""Kept variables by name."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class MemberSeries:
     """The samples of some members.
 
     Attributes:
-        variable: what they are samples of.
+        variable: the sampled variable.
         parts: float64 parts, each (members, samples, components); missing samples at the end are nan.
     """
 
@@ -53,12 +53,12 @@ class MemberSeries:
     parts: Sequence[np.ndarray]
 
     def shaped(self, values: np.ndarray) -> np.ndarray:
-        """(members, components) or (members, samples, components) in the variable's own shape."""
+        """Values (members, components) or (members, samples, components) in the variable's own shape."""
         return values.reshape(*values.shape[:-1], *self.variable.shape)
 
     @property
     def drift_of(self) -> str | None:
-        """The invariant whose drift it is."""
+        """The invariant whose drift this variable is; None for any other variable."""
         return self.variable.attributes.get("drift_of")
 
 
@@ -69,13 +69,13 @@ def kept_of_series(
     keep: Collection[str],
     hidden: Collection[str] = (),
 ) -> Kept:
-    """What is asked for, of recorded variables; drifts always.
+    """What is asked for of recorded variables; drifts are always kept.
 
     Args:
-        series: of all recorded variables, time apart.
-        times: (samples,), or (members, samples) where each has its own, s.
+        series: series of all recorded variables except time.
+        times: (samples,), or (members, samples) if each has its own, s.
         lengths: samples that each member has, (members,).
-        hidden: variables that are recorded for indicators alone.
+        hidden: variables recorded only for indicators.
     """
     found: Kept = {}
     for one in series:
@@ -100,7 +100,7 @@ def kept_of_series(
 
 
 def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> Kept:
-    """Of chaos, from the growth of a tangent vector."""
+    """Chaos indicators from the growth of a tangent vector."""
     since = times if times.ndim == 1 else times.T
     told = indicators(since, one.parts[0][:, :, 0].T)
     labels = {
@@ -118,7 +118,7 @@ def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> 
 
 
 def _last(values: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Of (members, samples, components) the last sample that each member has, nan where it has none."""
+    """Last sample of each member from (members, samples, components), nan if it has none."""
     rows = np.maximum(lengths - 1, 0)
     last = values[np.arange(len(values)), rows]
     return np.where((lengths > 0)[:, None], last, np.nan)
@@ -167,7 +167,7 @@ def _means(one: MemberSeries) -> Kept:
     variable = one.variable
     present = ~np.isnan(one.parts[0])
     count = np.maximum(present.sum(axis=1), 1)
-    # in the order of the samples: ``sum`` takes another one where a member is alone in its block
+    # in the order of the samples: ``sum`` takes another order if a member is alone in its block
     total = sum(np.cumsum(np.where(present, part, 0), axis=1)[:, -1] for part in reversed(one.parts))
     mean = np.where(present.any(axis=1), total / count, np.nan)
     attributes = {
@@ -209,18 +209,18 @@ def _series(series: Sequence[MemberSeries], times: np.ndarray) -> Kept:
 
 
 Points = Mapping[str, tuple[Variable, Sequence[np.ndarray]]]
-"""What was recorded at events, by name: of each member (times, ...)."""
+"""Values recorded at events by name: for each member (times, ...)."""
 
 
 def kept_events(
     name: str, times: Sequence[np.ndarray], most: int, points: Points, keep: Collection[str]
 ) -> Kept:
-    """How often an event happened, and when; the first that fit.
+    """How often an event happened and when; only the first times that fit are kept.
 
     Args:
-        times: of each member, s.
-        most: times that are kept of a member.
-        points: what was recorded there.
+        times: times for each member, s.
+        most: largest number of times kept per member.
+        points: values recorded at the event.
     """
     count = len(times)
     found: Kept = {}
@@ -259,10 +259,10 @@ def _padded(rows: Sequence[np.ndarray], most: int, shape: tuple[int, ...]) -> np
 
 
 def joined(parts: Sequence[Kept], counts: Sequence[int]) -> Kept:
-    """What was kept of several groups of members as one, nan (0 of counts) where a group has none of it.
+    """Concatenate groups of members, with nan (0 for counts) where a group lacks a variable.
 
     Args:
-        counts: members of each group.
+        counts: members in each group.
     """
     names = dict.fromkeys(name for part in parts for name in part)
     found: Kept = {}

@@ -1,4 +1,4 @@
-"""The Lyapunov spectrum of a run, saved on the way: it costs tens of times what the run does."""
+"""The Lyapunov spectrum of a run, saved on the way because it costs tens of times as much as the run."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def spectrum_of(
     interruption: Interruption,
     save_seconds: float,
 ) -> LyapunovSpectrum | None:
-    """Integrate the variational equations, or what is left of them.
+    """Integrate the variational equations, or what remains of them.
 
     Args:
-        folder: of the run; None for one in memory, of which nothing is saved.
-        save_seconds: between saving what is known.
+        folder: the run's folder; None for a run in memory, which saves nothing.
+        save_seconds: interval between saves, s.
 
     Returns:
-        The spectrum; None where it was interrupted, or stopped being finite.
+        The spectrum; None if it was interrupted, or stopped being finite.
 
     Raises:
         RunFolderError: the folder can't be written.
@@ -65,7 +65,9 @@ def _save(path: Path, done: Convergence, run_id: str) -> None:
 
 
 def _saved(path: Path, run_id: str) -> Convergence | None:
-    """What an earlier session saved; what doesn't belong to this run, or is damaged, is worked out anew."""
+    """State saved by an earlier session; None, so that it is computed anew, if it is damaged or not this
+    run's.
+    """
     if not path.exists():
         return None
     try:
@@ -79,7 +81,7 @@ def _saved(path: Path, run_id: str) -> Convergence | None:
 
 
 def lyapunov_variables(spectrum: LyapunovSpectrum) -> list[Extra]:
-    """The convergence of the exponents, as variables of the dataset."""
+    """Convergence of the exponents, as variables of the dataset."""
     along = {"units": "s", "long_name": "time since the run's start, of the estimates"}
     what = {
         "units": "s-1",

@@ -1,4 +1,4 @@
-"""Members of a sweep, run: what is kept of each, how each ended, and why where it didn't come to its end."""
+"""Running members of a sweep: what is kept of each, how each ended, and why if it failed."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ OUTCOMES = (
     *(s.value for s in (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED)),
     *(o.value for o in Outcome),
 )
-"""How members can end; a dataset holds the place in this list, which only grows."""
+"""All outcomes of members; a dataset stores the index in this list, which may only grow."""
 WARNINGS = tuple(code.value for code in WarningCode)
 
 
 @dataclass(frozen=True)
 class MemberResults:
-    """Some members, run.
+    """Results of some members.
 
     Attributes:
-        kept: by name, each (members, ...).
-        reasons: by place among them, of those that didn't end well.
-        engines: by which members were run, with their numbers.
-        why_alone: code of the reason that members were run one by one; empty where none was.
-        estimating: seconds of CPU that went into estimates of errors in batches.
+        kept: kept variables by name, each (members, ...).
+        reasons: by place among the members, why those failed.
+        engines: engines that ran members, with the number of members each.
+        why_alone: code of the reason why members were run one by one; empty if none was.
+        estimating: CPU seconds spent on error estimates in batches.
     """
 
     kept: Kept
@@ -65,7 +65,7 @@ class MemberResults:
 
     @classmethod
     def together(cls, parts: Sequence[MemberResults]) -> MemberResults:
-        """Several groups of members as one, in order."""
+        """Several groups of members joined in order."""
         counts = [len(part.kept["status"].values) for part in parts]
         reasons: dict[int, str] = {}
         first = 0
@@ -80,7 +80,7 @@ class MemberResults:
 
 
 def status_variable(codes: np.ndarray) -> KeptVariable:
-    """How members ended: their places in ``OUTCOMES``, with the meanings."""
+    """Outcomes of members as indices in ``OUTCOMES``, with their meanings."""
     meanings = " ".join(re.sub(r"\W+", "_", outcome) for outcome in OUTCOMES)
     attributes = {
         "long_name": "how the member ended",
@@ -91,12 +91,12 @@ def status_variable(codes: np.ndarray) -> KeptVariable:
 
 
 def warning_bits(codes: Iterable[str]) -> int:
-    """Warnings of one member, a bit for each kind."""
+    """Warnings of one member as a mask, one bit for each kind."""
     return sum(1 << WARNINGS.index(code) for code in set(codes))
 
 
 def warnings_variable(bits: np.ndarray) -> KeptVariable:
-    """Warnings of members, each as of ``warning_bits``."""
+    """Warnings of members, each a mask as in ``warning_bits``."""
     attributes = {
         "long_name": "warnings of the member, a bit each",
         "flag_masks": [1 << bit for bit in range(len(WARNINGS))],
@@ -113,8 +113,8 @@ def plain_variables(
     attitude_error: np.ndarray | None,
     position_error: np.ndarray | None = None,
 ) -> Kept:
-    """What is told of every member beside how it ended: (members,) each; None where nothing is estimated, and
-    of a body that has no place.
+    """Variables that every member has besides its status, (members,) each; None for errors that aren't
+    estimated, and for the position of a body without one.
     """
     unknown = np.full(len(steps), np.nan)
     placed: Kept = {}
@@ -145,14 +145,14 @@ def run_alone(
     more: Callable[[MemoryRun], Kept] | None = None,
     hidden: Collection[str] = (),
 ) -> MemberResults:
-    """One member by itself; what goes wrong with it is recorded.
+    """Run one member by itself; its failure is recorded.
 
     Args:
-        run: runs it.
-        keep, most_events: as of ``[sweep]``.
+        run: function that runs it.
+        keep, most_events: as in ``[sweep]``.
         events: names of the scene's events.
-        more: what else is to be kept of the run.
-        hidden: variables that are recorded for indicators alone.
+        more: function that returns what else is to be kept of the run.
+        hidden: variables recorded only for indicators.
 
     Raises:
         KeyboardInterrupt: the run was interrupted.
@@ -190,7 +190,7 @@ def run_alone(
 
 
 def _ended(status: str, warnings: Iterable[str]) -> Kept:
-    """Of a single member."""
+    """Status and warnings of a single member."""
     return {
         "status": status_variable(np.array([OUTCOMES.index(status)], dtype=np.int64)),
         "warnings": warnings_variable(np.array([warning_bits(warnings)], dtype=np.int64)),
@@ -198,7 +198,7 @@ def _ended(status: str, warnings: Iterable[str]) -> Kept:
 
 
 def failed(outcome: Outcome, reason: str) -> MemberResults:
-    """A member that gave no samples."""
+    """Results of a member that gave no samples."""
     nothing = np.array([np.nan])
     kept = _ended(outcome.value, [])
     kept |= plain_variables(steps=np.array([0]), reached=nothing, bound=nothing, attitude_error=nothing)

@@ -1,4 +1,4 @@
-"""What becomes of a run's samples: evaluated, watched, and written to segments together with checkpoints."""
+"""Recording a run's samples: evaluated, watched, and written to segments together with checkpoints."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class Recorder(SampleReceiver):
     """The receiver of a run's samples.
 
     Attributes:
-        statistics: what the summary says of all samples.
-        progress: of the run; set when it begins.
-        trail: some of this session's samples, where errors are estimated by them.
-        kept: rows for the timeline; None where none is asked for.
+        statistics: what the summary needs of all samples.
+        progress: progress of the run; set when it begins.
+        trail: some of this session's samples, if errors are estimated from them.
+        kept: rows for the timeline; None if no timeline is asked for.
     """
 
     progress: Progress
@@ -111,8 +111,9 @@ class Recorder(SampleReceiver):
         self.statistics.angles_wrapped_from = math.ldexp(lost, self._prepared.clock.exponent)
 
     def _wanted(self, recorded: RecordedParts, put_back: Mapping[str, np.ndarray]) -> int:
-        """How many samples there are up to the first past the guard, and with it; more than all where none
-        is. What a run puts back that nobody asked for it counts as the drift that it would have been.
+        """Number of samples up to and including the first past the drift guard; more than all if none is.
+
+        Corrections that a run puts back without being asked to count as the drift that they prevented.
         """
         if self._max_drift is None:
             return sys.maxsize
@@ -122,18 +123,18 @@ class Recorder(SampleReceiver):
         return min((int(found[0]) + 1 for found in past if len(found)), default=sys.maxsize)
 
     def due(self) -> bool:
-        """Whether what is collected is much, or the last segment old."""
+        """Whether much is collected, or the last segment is old."""
         return self._writer.due
 
     def save(self, position: Position) -> None:
-        """Write a segment; on return all samples taken, and the way on from there, are saved."""
-        known = position.boundary.mark.events  # those past it are found once more
+        """Write a segment; on return all samples taken, and the state to continue from, are saved."""
+        known = position.boundary.mark.events  # later ones are found again
         events = pack_events(self._log.found[self._events_saved : known], self._prepared.precision)
         self._writer.flush(self.packed(position), events)
         self._events_saved = known
 
     def packed(self, position: Position) -> Arrays:
-        """The checkpoint at a position as arrays, with what the summary will say of the samples so far."""
+        """Checkpoint at a position as arrays, with the statistics of the samples so far."""
         seen, progress, effort = self.statistics, self.progress, self._effort
         statistics = Statistics(
             largest_drift=seen.largest,
@@ -157,11 +158,11 @@ class Recorder(SampleReceiver):
         return pack_checkpoint(checkpoint, self._prepared.precision, names, recorded)
 
     def all_events(self, position: Position) -> Arrays:
-        """Every crossing up to a position."""
+        """All crossings up to a position."""
         return pack_events(self._log.found[: position.boundary.mark.events], self._prepared.precision)
 
     def restore(self, statistics: Statistics) -> None:
-        """Go on counting from an earlier session's checkpoint; ``progress`` is set by then."""
+        """Continue counting from an earlier session's checkpoint; ``progress`` has been set by then."""
         seen, progress, effort = self.statistics, self.progress, self._effort
         seen.largest |= statistics.largest_drift
         seen.final |= statistics.final_drift
@@ -178,7 +179,7 @@ class Recorder(SampleReceiver):
 
 
 def _kept_rows(count: int, most: int) -> KeptRows:
-    """Rows that the timeline will show, so that it needn't read them again."""
+    """Buffer for the rows that the timeline will show, so that it needn't read them again."""
     from rigidsim.look.thinning import KeptRows
 
     return KeptRows(count, most)

@@ -1,4 +1,4 @@
-"""A run's last checkpoint, restored into all that continues from it."""
+"""Restoring a run's last checkpoint into everything that continues from it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def restore(
     evaluator: Evaluator,
     log: EventLog,
 ) -> Checkpoint:
-    """Put a checkpoint into a fresh evaluator and event log; the integration and the recorder take
-    theirs from the result.
+    """Put a checkpoint into a fresh evaluator and event log; the integration and the recorder take their
+    state from the returned checkpoint.
 
     Raises:
         RunFolderError: the checkpoint belongs to another system.

@@ -1,4 +1,4 @@
-"""One session of a run: integrate and save segments; where the run ended, complete its files; summarise."""
+"""One session of a run: integrate and save segments; if the run ended, complete its files; summarise."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from rigidsim.store.summary_parts import Caution
 
 @dataclass
 class Session:
-    """One process's work on a run: the whole of it, or what was left.
+    """The work of one process on a run: all of it, or what was left.
 
     Attributes:
-        remarks: for the summary, on how the session began.
-        mixed: what changed in versions or machine since the run began; empty where nothing did.
-        effort, phases: what the run has cost, all its sessions and this one; choosing and certifying count.
-        tuning: how often it looks up and saves, and when it looks for a cheaper model.
+        remarks: remarks for the summary on how the session began.
+        mixed: what changed in versions or machine since the run began; empty if nothing did.
+        effort, phases: cost of all sessions and of this one, including choosing and certifying.
+        tuning: how often it checks and saves, and when it looks for a cheaper model.
     """
 
     observer: Observer
@@ -47,7 +47,7 @@ class Session:
     tuning: Tuning = field(default_factory=Tuning)
 
     def another(self) -> Session:
-        """For the next attempt where this one didn't keep the accuracy; its cost is part of that one's."""
+        """Session for the next attempt after this one missed the accuracy; its cost includes this one's."""
         return Session(
             self.observer, effort=self.effort, phases=self.phases.begin_again(), tuning=self.tuning
         )
@@ -58,7 +58,7 @@ class Session:
         """Integrate to the end, or to whatever ends it, and complete the files.
 
         Args:
-            folder: of the run; None for a run in memory.
+            folder: the run's folder; None for a run in memory.
             chain: segments to resume from, with the arrays of the last one's checkpoint.
 
         Raises:
@@ -83,7 +83,7 @@ class Session:
         start = None if resumed is None else resumed.position
         guards = Guards(prepared, recorder.statistics, interruption, self.observer)
         most_steps = prepared.scene.config.limits.max_steps
-        if most_steps is not None and start is not None:  # it counts anew in each session
+        if most_steps is not None and start is not None:  # the limit starts anew in each session
             most_steps += start.boundary.mark.steps
         loop = sampler(prepared, parts, recorder, guards, start, self.tuning.pacing, most_steps)
         recorder.progress = loop.progress

@@ -1,4 +1,4 @@
-"""What is followed over all samples of a run, so that its end can be judged without reading them again."""
+"""Statistics over all samples of a run, so that its end can be judged without reading them again."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from rigidsim.solve.checkpoint import Undefined
 
 @dataclass
 class SampleStatistics:
-    """Of the samples taken so far, in all sessions.
+    """Statistics of the samples taken so far, in all sessions.
 
     Attributes:
-        largest, final: relative drifts by invariant.
-        put_back: of projected invariants, what was put back before the latest sample.
+        largest, final: largest and last relative drift by invariant.
+        put_back: corrections put back into projected invariants before the latest sample.
         nearest_singularity: smallest absolute singular factor at a sample.
-        singularity_time: of that sample, seconds.
+        singularity_time: time of that sample, s.
         angles_wrapped_from: time of the first sample whose angles are within one turn, since their turns
             aren't known, seconds; nan where all are.
-        undefined: by recorded variable that has samples which are NaN.
+        undefined: NaN samples by recorded variable that has any.
     """
 
     largest: dict[str, float] = field(default_factory=dict)
@@ -37,20 +37,20 @@ class SampleStatistics:
         """Follow one invariant through a block of samples.
 
         Args:
-            drifts: relative, shape (samples,).
+            drifts: relative drifts, shape (samples,).
         """
         self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.abs(drifts).max()))
         self.final[invariant] = float(drifts[-1])
 
     def see_undefined(self, variable: str, values: np.ndarray, first: int, times: np.ndarray) -> None:
-        """Count the samples of a block at which a recorded variable isn't defined.
+        """Count the samples in a block at which a recorded variable is undefined.
 
         Args:
             values: shape (samples, components).
             first: index of the block's first sample.
             times: seconds, shape (samples,).
         """
-        if not values.size or not math.isnan(values.min()):  # NaN where one of them is
+        if not values.size or not math.isnan(values.min()):  # the minimum is NaN if one value is
             return
         bad = np.isnan(values).any(axis=1)
         known = self.undefined.get(variable, Undefined())
@@ -68,7 +68,7 @@ class SampleStatistics:
         """Follow the distance from a formulation's singularity.
 
         Args:
-            factors: singular ones, shape (samples,).
+            factors: singular factors, shape (samples,).
             times: seconds, same shape.
         """
         size = np.abs(factors.astype(np.float64))

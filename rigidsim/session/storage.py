@@ -1,4 +1,4 @@
-"""What a run takes on its disk until it is complete, and whether there is room for it."""
+"""Disk space that a run takes until it is complete, and whether there is enough."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigidsim.scene.records import dataclass
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.problem import InitialValueProblem
 
-_SHRINK = 0.9  # gzip on doubles whose low bits are noise; measured 0.85 to 0.95
+_SHRINK = 0.9  # compression ratio of gzip on doubles whose low bits are noise; measured 0.85 to 0.95
 _TIMELINE_ROW_BYTES = 260.0  # measured; falls with repeated values
 
 
@@ -21,9 +21,9 @@ class Storage:
     """Predicted bytes.
 
     Attributes:
-        row: of a sample in memory and in a segment.
-        segments: of all samples; they go when the dataset is complete.
-        free: on the disk of the run folder, as far as it can be told.
+        row: bytes per sample in memory and in a segment.
+        segments: size of all segments, which are deleted once the dataset is complete.
+        free: free space on the run folder's disk, as far as it is known.
     """
 
     row: float
@@ -34,12 +34,12 @@ class Storage:
 
     @property
     def needed(self) -> float:
-        """At the end all of them are there at once."""
+        """Space needed at the end, when all files exist at once."""
         return self.segments + self.dataset + self.timeline
 
     @property
     def problem(self) -> str | None:
-        """What is said where there is too little room; None where there is enough."""
+        """Message if there is too little room; None if there is enough."""
         if self.needed <= self.free:
             return None
         return (
@@ -51,8 +51,8 @@ class Storage:
 
 
 def storage(prepared: InitialValueProblem, place: Path) -> Storage:
-    """What a run in a folder, which need not exist, would take; a part of it where a guard or an event ends
-    it.
+    """Space that a run would take in a folder, which need not exist; less if a guard or an event ends the
+    run.
     """
     samples, output = prepared.clock.count, prepared.scene.config.output
     row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
@@ -65,15 +65,17 @@ def storage(prepared: InitialValueProblem, place: Path) -> Storage:
         segments=samples * row,
         dataset=samples * row * _SHRINK,
         timeline=shown * _TIMELINE_ROW_BYTES,
-        free=disk.free + float(replaced) if disk.total else math.inf,  # what has no size can't tell
+        free=disk.free + float(replaced)
+        if disk.total
+        else math.inf,  # a file system without a size can't tell
     )
 
 
 def refuse_too_large(prepared: InitialValueProblem, place: Path) -> None:
-    """Before a run that can only end at its last sample fills a disk.
+    """Refuse a run that can only end at its last sample and would fill the disk.
 
     Raises:
-        RunFolderError: what it is predicted to take doesn't fit.
+        RunFolderError: the predicted size doesn't fit.
     """
     limits = prepared.scene.config.limits
     guarded = (limits.wall_time, limits.max_steps, limits.max_drift) != (None, None, None)
@@ -85,10 +87,10 @@ def refuse_too_large(prepared: InitialValueProblem, place: Path) -> None:
 
 
 def refuse_too_large_for_memory(prepared: InitialValueProblem) -> None:
-    """Before a run in memory takes all there is.
+    """Refuse a run that would take more memory than there is.
 
     Raises:
-        RunFolderError: what it is predicted to take doesn't fit.
+        RunFolderError: the predicted size doesn't fit.
     """
     row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
     needed = 2 * row * prepared.clock.count  # the blocks, and the dataset made of them

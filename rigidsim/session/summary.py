@@ -1,4 +1,4 @@
-"""The honest summary of a run, filled once its end is known: cost, drifts, accuracy, warnings."""
+"""Filling in the summary of a run once its end is known: cost, drifts, accuracy, warnings."""
 
 from __future__ import annotations
 
@@ -58,16 +58,16 @@ def summarise(
     event_times: dict[str, EventTimes],
     chart_changes: ChartChanges | None,
 ) -> Summary:
-    """All but the digests of files that are still to be written.
+    """The summary without the digests of files that are still to be written.
 
     Args:
-        found: with the estimate of the errors, where there is one.
+        found: diagnostics, with the estimate of the errors if there is one.
         message: the status in words.
-        remarks: on how the session began; they stand before the warnings.
-        initial: values of the invariants, SI.
-        attributes: of the dataset.
-        time_reached: seconds.
-        events, event_times: how often each was found, and when.
+        remarks: remarks on how the session began; they precede the warnings.
+        initial: initial values of the invariants, SI.
+        attributes: attributes of the dataset.
+        time_reached: time reached, s.
+        events, event_times: how often each event was found, and when.
     """
     prepared, progress = found.prepared, found.progress
     scene, system = prepared.scene, prepared.system
@@ -109,7 +109,7 @@ def summarise(
 
 
 def _advice(found: Diagnostics) -> tuple[Advice, ...]:
-    """What would do better; without an estimate nobody knows."""
+    """Settings that would do better; empty without an estimate."""
     if found.estimate is None:
         return ()
     from rigidsim.session.advice import advice_on
@@ -118,7 +118,7 @@ def _advice(found: Diagnostics) -> tuple[Advice, ...]:
 
 
 def cost_so_far(prepared: InitialValueProblem, progress: Progress, phases: Phases, effort: Effort) -> Cost:
-    """What the run has taken up to now."""
+    """Cost of the run so far."""
     exponent = prepared.system.scaling.time
     return Cost(
         steps=progress.steps,
@@ -139,7 +139,9 @@ def _seconds(step: float, exponent: int) -> float | None:
 
 
 def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLog) -> float:
-    """Of the last sample, or of the event that ended the run, seconds; the start before the first sample."""
+    """Time of the last sample, or of the event that ended the run, s; the start time before the first
+    sample.
+    """
     clock = prepared.clock
     if progress.status is Status.EVENT and log.stop is not None:
         return clock.seconds(log.stop)
@@ -149,7 +151,7 @@ def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLo
 def closing_words(
     prepared: InitialValueProblem, progress: Progress, evaluator: Evaluator, log: EventLog
 ) -> str:
-    """The status in words: with which event and when, or where and why for a run that broke down."""
+    """The status in words: which event ended the run and when, or where and why it broke down."""
     text, words = progress.status.message, time_words(prepared.scene)
     if progress.status is Status.EVENT:
         ending = next(f for f in log.found if log.stops[f.index])
@@ -182,7 +184,7 @@ def closing_words(
 
 
 def chart_changes(prepared: InitialValueProblem, corrected: CorrectedStepper) -> ChartChanges | None:
-    """How often a run in Euler angles went from one chart to the other; None for other formulations."""
+    """How often a run in Euler angles changed charts; None for other formulations."""
     system = prepared.system
     if corrected.charts is None or system.partner is None:
         return None

@@ -1,4 +1,4 @@
-"""Wall and CPU seconds, of the phases of one session and of all sessions of a run."""
+"""Wall and CPU seconds of the phases of one session and of all sessions of a run."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ NOT_KEPT = "attempts_not_kept"
 
 @dataclass
 class Effort:
-    """What a run has cost over all its sessions.
+    """Cost of a run over all its sessions.
 
     Attributes:
-        sessions: this one included.
-        wall_seconds, cpu_seconds: of the sessions before this one.
+        sessions: number of sessions, including this one.
+        wall_seconds, cpu_seconds: seconds of the sessions before this one.
     """
 
     sessions: int = 1
@@ -29,12 +29,12 @@ class Effort:
 
     @property
     def wall(self) -> float:
-        """Of all sessions, seconds."""
+        """Wall seconds of all sessions."""
         return self.wall_seconds + time.perf_counter() - self.started
 
     @property
     def cpu(self) -> float:
-        """Of all sessions, seconds."""
+        """CPU seconds of all sessions."""
         return self.cpu_seconds + time.process_time() - self.cpu_started
 
 
@@ -52,18 +52,18 @@ class Phases:
         self._since = time.perf_counter(), time.process_time()
 
     def next(self, finished: str) -> None:
-        """Close the phase that was under way since the last one; a name given again adds up."""
+        """Close the current phase under a name; repeated names add up."""
         now = time.perf_counter(), time.process_time()
         for seconds, begin, end in zip((self.wall, self.cpu), self._since, now, strict=True):
             seconds[finished] = seconds.get(finished, 0.0) + end - begin
         self._since = now
 
     def engine(self, seconds: float) -> None:
-        """Note what the engine alone took, in all sessions; it is part of other phases."""
+        """Note the time of the engine alone in all sessions; it is part of other phases."""
         self.wall[ENGINE] = seconds
 
     def begin_again(self, *, keep: Iterable[str] = ("choose",)) -> Phases:
-        """For another attempt: what this one took is one phase of it, but for those to keep."""
+        """Phases for another attempt: this one's time counts as a single phase, except those to keep."""
         again = Phases()
         for old, new in ((self.wall, again.wall), (self.cpu, again.cpu)):
             kept = {name: old[name] for name in keep if name in old}

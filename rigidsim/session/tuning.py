@@ -1,4 +1,4 @@
-"""What a run spends on guards, saving and advice: costs alone, no recorded bit."""
+"""How much a run spends on guards, saving and advice; no recorded bit depends on it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class AdviceLimits:
     """When a run that resolved every rotation is compared with averaged models.
 
     Attributes:
-        steps: from which on it is: the windows in which both are followed have some 2e4 of them, 2e5 at most.
-        apart: rad, the farthest that axes may be for a model to be advised; two seconds of arc.
+        steps: least steps of such a run: the windows in which both are followed have 2e4 to 2e5 of them.
+        apart: largest distance of axes, rad, at which a model is advised; two seconds of arc.
     """
 
     steps: int = 1_000_000
@@ -24,7 +24,9 @@ class AdviceLimits:
 
 @dataclass(frozen=True)
 class Tuning:
-    """The defaults were measured, see each part; tests and studies of damage save far more often."""
+    """Intervals and limits of a run; the defaults were measured, see each part. Tests and studies of damage
+    save far more often.
+    """
 
     pacing: Pacing = field(default_factory=Pacing)
     segments: SegmentLimits = field(default_factory=SegmentLimits)

@@ -1,4 +1,4 @@
-"""What was understood of a config, as values to show; and what of it is suspicious."""
+"""How a config was understood, as values to show, and what in it is suspicious."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def body_of(scene: Scene) -> UnderstoodBody:
 
 
 def start_of(scene: Scene) -> Start:
-    """The state that the motion starts from; Euler angles in the sequence that the config has."""
+    """The state that the motion starts from; Euler angles in the config's sequence."""
     context, sequence = scene.context, scene.config.integrator.euler_sequence
     angles = scene.euler_angles
     if angles is None:
@@ -57,13 +57,13 @@ def span_of(scene: Scene) -> Span:
 
 
 def time_words(scene: Scene) -> TimeWords:
-    """How times of the scene are told in messages."""
+    """How times of the scene are written in messages."""
     attributes = {"epoch": scene.epoch, "time_unit": scene.config.time.unit}
     return TimeWords.of(attributes, float(scene.start), float(scene.samples.last))
 
 
 def cautions_of(scene: Scene) -> list[Caution]:
-    """What may be meant otherwise than it was understood, known before anything is run."""
+    """Values that may mean something other than was understood, found before anything runs."""
     found = [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(p)) for p in suspicious_angles(scene.config)]
     found += [Caution(WarningCode.TIME_WITHOUT_UNIT, str(p)) for p in suspicious_end(scene.config)]
     found += [Caution(WarningCode.NEVER_HAPPENS, str(p)) for p in unreachable_events(scene.events)]

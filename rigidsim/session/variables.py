@@ -1,4 +1,4 @@
-"""What a run's dataset holds along time: names, labels and where each comes from."""
+"""Variables that a run's dataset holds along time: names, labels and origin."""
 
 from __future__ import annotations
 
@@ -13,22 +13,26 @@ from rigidsim.solve.projection import LATE
 from rigidsim.store.variables import Variable, time_variable
 
 LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
-"""Of variables and dimensions."""
+"""Names of variables and dimensions."""
 
 
 def drift_name(invariant: str) -> str:
-    """Of the variable that holds an invariant's drift; its attribute ``drift_of`` names the invariant."""
+    """Name of the variable that holds an invariant's drift; its attribute ``drift_of`` names the
+    invariant.
+    """
     return f"{invariant}_drift"
 
 
 def put_back_name(invariant: str) -> str:
-    """Of what was put back of a projected invariant; its attribute ``put_back_of`` names the invariant."""
+    """Name of the variable with the corrections put back into a projected invariant, which its attribute
+    ``put_back_of`` names.
+    """
     return f"{invariant}_put_back"
 
 
 def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
-    """Time first, then dates where they are known, what is recorded, each invariant's drift, and what was put
-    back of those projected.
+    """Time first, then dates if known, recorded variables, each invariant's drift, and the corrections put
+    back into projected ones.
     """
     system, projected = prepared.system, prepared.projected_scalars
     time, *recorded = recorded_variables(prepared)
@@ -46,10 +50,10 @@ def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
 
 
 def unused_variables(prepared: InitialValueProblem, steps: int) -> set[str]:
-    """What was put back, where a run that is to project from a count of steps on has ended before.
+    """Variables of corrections put back, if the run ended before the step at which projection begins.
 
     Args:
-        steps: that it took.
+        steps: steps that the run took.
     """
     if not prepared.holds_late or steps > LATE:
         return set()
@@ -57,13 +61,13 @@ def unused_variables(prepared: InitialValueProblem, steps: int) -> set[str]:
 
 
 def dates_of(prepared: InitialValueProblem) -> Dates | None:
-    """The dates of samples; None where nobody knows what time 0 is."""
+    """Dates of samples; None if the date of time 0 is unknown."""
     scene = prepared.scene
     return None if scene.epoch is None else Dates(scene.epoch, scene.samples)
 
 
 def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
-    """Time, and what is recorded; each with residuals beyond double precision.
+    """Time and the recorded variables; each with residuals beyond double precision.
 
     In single precision time has one too, since its labels are exact to a double.
     """
@@ -99,7 +103,7 @@ def _drift(invariant: Invariant) -> Variable:
 
 
 def _put_back(invariant: Invariant, projected: Sequence[str]) -> Variable:
-    """What was put back of a projected invariant, along time.
+    """Variable of the corrections put back into a projected invariant along time.
 
     Args:
         projected: the invariant that each projected scalar belongs to.
@@ -117,7 +121,7 @@ def _put_back(invariant: Invariant, projected: Sequence[str]) -> Variable:
 
 
 def _scale(invariant: Invariant) -> dict[str, Any]:
-    """What its drifts are relative to."""
+    """Attributes with the scale that its drifts are relative to."""
     return {
         "scale": float(invariant.scale),
         "scale_units": invariant.units,

@@ -1,4 +1,4 @@
-"""How sound a run is, as its summary has it: one value for decisions, told elsewhere."""
+"""Verdict on a run's soundness from its summary, as one value for decisions; the wording is elsewhere."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rigidsim.store.summary_parts import WarningCode
 
 
 class Soundness(Enum):
-    """From best to worst."""
+    """Degrees of soundness, from best to worst."""
 
     SOUND = "sound"
     AMPLIFIED = "amplified"
@@ -22,12 +22,12 @@ class Soundness(Enum):
 
 @dataclass(frozen=True)
 class RunVerdict:
-    """On a run that ended.
+    """Verdict on a run that ended.
 
     Attributes:
-        share: largest drift of any invariant, or what was put back of it, over what rounding explains; None
-            where nothing was checked.
-        worst: the invariant that it is of; empty for none.
+        share: largest drift of any invariant, or correction put back, over what rounding explains; None
+            if nothing was checked.
+        worst: the invariant with that drift; empty for none.
     """
 
     soundness: Soundness
@@ -39,9 +39,11 @@ _GONE = {WarningCode.ATTITUDE_UNCERTAIN.value, WarningCode.RATES_UNCERTAIN.value
 
 
 def verdict_on(summary: Summary) -> RunVerdict:
-    """The worst that can be said: drifts that rounding does not explain, then digits that are gone; a motion
-    may amplify errors whatever its drifts. Of projected invariants what was put back tells: it is the drift
-    that would have been.
+    """The worst that can be said of a run: drifts that rounding does not explain, then lost digits.
+
+    A motion may amplify errors whatever its drifts. For projected invariants the corrections put back count,
+    since
+    they are the drift that would have been.
     """
     checked = {name: row for name, row in summary.invariants.items() if not row.numerical}
     shares = {

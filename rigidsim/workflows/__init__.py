@@ -1,1 +1,1 @@
-"""What a user asks for, one story a file: run, resume, verify, plan, tradeoff, export."""
+"""What a user asks for, one workflow per file: run, resume, verify, plan, tradeoff, export."""

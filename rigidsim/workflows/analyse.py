@@ -1,4 +1,4 @@
-"""``rigidsim analyse``: a run's secular rates and labelled lines, as a table, a dataset and a figure."""
+"""``rigidsim analyse``: secular rates and labelled lines of a run, as a table, a dataset and a figure."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def analyse(
             that the dataset's attribute ``config`` describes.
         variables: names of variables, or of their signals (``obliquity.figure``, ``polar_motion.m1+im2``); by
             default those that the scene is about.
-        lines: of each signal at most.
+        lines: largest number of lines per signal.
         floor: lines below this share of a signal's strongest are left out.
-        known: frequencies (rad/s) by name that replace the scene's, or stand where there is no scene.
+        known: frequencies (rad/s) by name, in place of the scene's or if there is no scene.
         window: order of the Hann window; by default what the lines' distances allow.
 
     Returns:
@@ -73,13 +73,13 @@ def _known(dataset: xarray.Dataset, given: Mapping[str, Any] | None) -> list[Kno
         return []
     try:
         scene = build_scene(parse(text, source="the dataset's config"))
-    except ConfigError:  # of another version: the numbers are there all the same
+    except ConfigError:  # the config is of another version: the numbers are valid all the same
         return []
     return known_frequencies(scene, driven=bool(dataset.attrs.get("python_loads")))
 
 
 def _attitude_error(run: Run) -> float | None:
-    """Of the run at its end, as it was certified or estimated."""
+    """Attitude error of the run at its end, as certified or estimated, rad; None if unknown."""
     accuracy = getattr(run.outcome, "accuracy", None)
     for name in ("certified", "estimated_attitude_error"):
         value = getattr(accuracy, name, None)
@@ -90,21 +90,21 @@ def _attitude_error(run: Run) -> float | None:
 
 @dataclass(frozen=True)
 class Saved:
-    """Where an analysis was written."""
+    """Paths to which an analysis was written."""
 
     dataset: Path
     figure: Path
 
 
 def save(analysis: Analysis, out: Path, figure: Path | None = None) -> Saved:
-    """Write dataset and figure, each visible only when it is whole.
+    """Write dataset and figure, each of which appears only when complete.
 
     Args:
         out: netCDF-4 file.
-        figure: PNG or SVG; by default beside it.
+        figure: PNG or SVG file; by default beside ``out``.
 
     Raises:
-        RigidsimError: they can't be written.
+        RigidsimError: a file can't be written.
     """
     from rigidsim.look.spectrum import save_spectrum
 

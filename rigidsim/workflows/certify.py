@@ -1,4 +1,4 @@
-"""A finished run held against an independent solution, where its config asks for an accuracy."""
+"""Certifying a finished run against an independent solution, if its config asks for an accuracy."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def certified(
     session: Session,
     loads: Sequence[Load] = (),
 ) -> tuple[AnyRun, bool]:
-    """A finished run's certificate, put into its summary, where ``accuracy`` asks for one.
+    """Certify a finished run, if ``accuracy`` asks for it, and put the certificate into its summary.
 
     Args:
-        session: that the run was made in; the certificate's cost is part of its.
+        session: the run's session, to whose cost the certificate's is added.
 
     Returns:
-        The run, and False where the accuracy was not kept.
+        The run, and False if the accuracy was not kept.
     """
     integrator, summary = experiment.config.integrator, result.outcome
     accuracy, length = wanted(experiment), integrator.accuracy_position
@@ -62,7 +62,7 @@ def certified(
     if choice is not None:
         known |= {"chosen": choice.setting.title, "chosen_why": choice.why, "forecast": choice.forecast}
     cautions = summary.cautions
-    if doubt is None:  # what is certified needs no estimate
+    if doubt is None:  # a certified error needs no estimate
         cautions = [c for c in cautions if c.code is not WarningCode.ATTITUDE_UNCERTAIN]
     else:
         cautions.append(Caution(WarningCode.NOT_CERTIFIED, doubt))

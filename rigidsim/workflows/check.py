@@ -1,4 +1,4 @@
-"""Validation alone: whether a config could be run, and what was understood of it."""
+"""Validation only: whether a config could be run, and how it was understood."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from rigidsim.workflows.sweeps.members import recording
 
 @dataclass(frozen=True)
 class Checked:
-    """What a check found.
+    """Result of a check.
 
     Attributes:
         problems: why it can't be run; empty for a valid config.
-        cautions: what may be meant otherwise.
-        body, start, time: what was understood; None where it can't be run.
+        cautions: values that may have been meant differently.
+        body, start, time: how the config was understood; None if it can't be run.
     """
 
     source: str
@@ -39,11 +39,11 @@ class Checked:
 
     @property
     def valid(self) -> bool:
-        """Whether it can be run."""
+        """Whether the config can be run."""
         return not self.problems
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Values for JSON."""
         return {
             "source": self.source,
             "valid": self.valid,
@@ -60,7 +60,7 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
     """Validate a config as far as ``run`` would before its first step, and write nothing.
 
     Args:
-        overrides: ``KEY=VALUE`` texts, as of ``rigidsim.load``.
+        overrides: ``KEY=VALUE`` texts, as for ``rigidsim.load``.
     """
     try:
         experiment = load(path, overrides=overrides)

@@ -1,4 +1,4 @@
-"""``rigidsim export``: the dataset of a run or a sweep in the formats of other tools."""
+"""``rigidsim export``: the dataset of a run or a sweep in other tools' formats."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rigidsim.store.run import SavedRun
 from rigidsim.store.variables import parts_in
 from rigidsim.workflows.read import parse
 
-_PART_BITS = 53  # of a double: a value that n of them hold has n times as many at most
+_PART_BITS = 53  # bits of a double: a value held by n of them has at most n times as many
 
 if TYPE_CHECKING:
     import xarray
@@ -38,7 +38,7 @@ def export(
     angle_unit: str | None = None,
     block_numbers: int = BLOCK_NUMBERS,
 ) -> list[Path]:
-    """Write a run, finished or partial, or the members of a finished sweep in another format; block by block,
+    """Write a run, finished or partial, or the members of a finished sweep in another format, block by block
     so that memory stays small.
 
     Args:
@@ -48,17 +48,17 @@ def export(
             parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``; of a
             sweep the file has a row per member, and whole series, occurrences of an event and spectral lines
             go to long tables beside it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
-        force: replace what is there.
-        naming: what the run's config leaves open of epoch, axes and names, for aem and oem; empty for sweeps.
-        angle_unit: that angles are written in, one of ``rigidsim.look.angle_units.ANGLE_UNITS``; rad by
+        force: replace existing files.
+        naming: epoch, axes and names that the run's config leaves open, for aem and oem; empty for sweeps.
+        angle_unit: unit of angles, one of ``rigidsim.look.angle_units.ANGLE_UNITS``; rad by
             default. For csv, parquet and zarr.
-        block_numbers: of a sweep that are held in memory at once; no digit depends on it.
+        block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
 
     Returns:
-        What was written; the table along time, or of the members, first.
+        The files written; the table along time, or of the members, first.
 
     Raises:
-        RigidsimError: unknown format or unit, a package is missing, or the format can't hold what is saved.
+        RigidsimError: unknown format or unit, a missing package, or data that the format can't hold.
         RunFolderError: the run is damaged or empty, or the sweep isn't finished.
     """
     found = format_named(file_format)
@@ -81,7 +81,7 @@ def _unit(name: str | None, file_format: str, found: Format) -> AngleUnit | None
     """The unit of angles; None for the format's own.
 
     Raises:
-        RigidsimError: it is unknown, or the format prescribes another.
+        RigidsimError: the unit is unknown, or the format prescribes another.
     """
     unit = None if name is None else angle_unit_named(name)
     if unit is not None and not found.angles:
@@ -92,7 +92,7 @@ def _unit(name: str | None, file_format: str, found: Format) -> AngleUnit | None
 
 
 Read = tuple[Sequence[Table], TableSource]
-"""Tables of an open dataset, the main one first, and what they are of."""
+"""Tables of an open dataset, the main one first, and their source."""
 
 
 @contextmanager
@@ -114,7 +114,7 @@ def _sweep_read(sweep: SavedSweep, unit: AngleUnit | None, block_numbers: int) -
 
 
 def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | None) -> None:
-    """What holds a single motion, or is said of one; and sweeps that aren't finished."""
+    """Refuse formats that hold a single motion, naming for one, and unfinished sweeps."""
     if file_format not in FOR_SWEEPS:
         raise RigidsimError(
             f"--format: given {file_format}, which holds a single motion, but {sweep.place} is a sweep; "
@@ -133,7 +133,7 @@ def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | Non
 def _written(
     tables: Sequence[Table], target: Path, found: Format, source: TableSource, force: bool
 ) -> list[Path]:
-    """Write the tables that a format takes, the first to the target itself."""
+    """Write the tables that a format supports, the first to the target itself."""
     kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
     for path in kept:
         _refuse_existing(path, found, force)
@@ -144,7 +144,7 @@ def _written(
 
 
 def _bits(dataset: xarray.Dataset) -> int:
-    """Of the run's precision."""
+    """Bits of the run's precision."""
     bits: Any = dataset.attrs.get("precision_bits")
     bits = bits.item() if hasattr(bits, "item") else bits
     if not isinstance(bits, int) or not 1 <= bits <= 2000:
@@ -153,9 +153,9 @@ def _bits(dataset: xarray.Dataset) -> int:
 
 
 def _bits_of_members(dataset: xarray.Dataset) -> int:
-    """Enough to tell all members' numbers apart: those of the config's precision, where it is one for all.
+    """Bits that tell all members' numbers apart: those of the config's precision, if all share one.
 
-    Where precision is swept, or left to ``accuracy``, as many as the dataset's residuals can hold.
+    If precision is swept, or left to ``accuracy``, as many as the dataset's residuals can hold.
     """
     config = parse(str(dataset.attrs["config"]), source="the sweep's config").config
     integrator, axes = config.integrator, config.sweep.axes if config.sweep else {}
@@ -166,7 +166,7 @@ def _bits_of_members(dataset: xarray.Dataset) -> int:
 
 
 def _beside(target: Path, table: Table) -> Path:
-    """The file of a table: that of samples, or of members, has the name itself."""
+    """File of a table; that of samples, or of members, is the target itself."""
     return target if table.is_main else target.with_name(f"{target.stem}.{table.dim}{target.suffix}")
 
 
@@ -189,7 +189,7 @@ def _refuse_existing(path: Path, found: Format, force: bool) -> None:
 
 @contextmanager
 def _replacing(path: Path, found: Format) -> Iterator[Path]:
-    """A temporary path that takes the place of ``path`` when all went well; nothing is left otherwise."""
+    """A temporary path that replaces ``path`` if all goes well; nothing is left otherwise."""
     try:
         with (atomic.replacing if found.folder is None else atomic.replacing_folder)(path) as new:
             yield new

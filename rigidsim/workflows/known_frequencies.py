@@ -1,4 +1,4 @@
-"""The frequencies that a scene is known to have, from its config: what the labels of lines are made of.
+"""Known frequencies of a scene, from its config, with which spectral lines are labelled.
 
 Free bodies and heavy tops have theirs from the closed form (elliptic functions), orbits from their elements,
 ephemerides from mean elements, librations on a circular orbit from the linearised equations.
@@ -19,9 +19,9 @@ from rigidsim.solve.closed_form import find_closed_form
 from rigidsim.solve.closed_form.free import AsymmetricFree, SymmetricFree
 from rigidsim.solve.closed_form.heavy import HeavyTop
 
-_LIBRATION = 0.08  # by how much a libration of finite amplitude may be slower than a small one
-_SPIN = 0.02  # by how much torques may change spin and wobble
-_WOBBLE = 1e-5  # relative, by how much they change that of a symmetric body
+_LIBRATION = 0.08  # relative amount by which a libration of finite amplitude may be slower than a small one
+_SPIN = 0.02  # relative amount by which torques may change spin and wobble
+_WOBBLE = 1e-5  # the same for the wobble of a symmetric body
 _CENTURY = 36525 * 86400
 _DELAUNAY = {
     "l": "1717915923.2178",
@@ -31,15 +31,16 @@ _DELAUNAY = {
     "Om": "-6962890.5431",
 }
 """Arcsec a century: mean anomalies of Moon and Sun, argument of the Moon's latitude, elongation, node of date
-(Simon et al. 1994, A&A 282, 663; IERS Conventions 2010, equation 5.43)."""
-_DELAUNAY_ERROR = 40.0  # arcsec a century: how much they change in one
+(Simon et al. 1994, A&A 282, 663; IERS Conventions 2010, equation 5.43).
+"""
+_DELAUNAY_ERROR = 40.0  # arcsec a century: how much they change in a century
 
 
 def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
-    """All of a scene's, rad/s.
+    """All known frequencies of a scene, rad/s.
 
     Args:
-        driven: whether loads act of which the scene knows nothing; then there is no closed form.
+        driven: whether loads unknown to the scene act; there is no closed form then.
     """
     closed = None if scene.free_flight and scene.loads else find_closed_form(scene, driven=driven)
     if closed is not None:
@@ -108,13 +109,15 @@ def _delaunay(scene: Scene) -> list[Known]:
 
 
 def _body_vectors(scene: Scene, vector: Vector) -> Vector:
-    """Of space axes, in principal axes at the start."""
+    """A space-axes vector resolved along the principal axes at the start."""
     body = apply(transpose(rotation_matrix(scene.quaternion)), vector)
     return [dot(axis, body) for axis in scene.body.principal_axes]
 
 
 def _librations(scene: Scene, orbit: Any) -> list[Known]:
-    """Small oscillations about the rest in a circular orbit that the body starts next to; none elsewhere."""
+    """Small oscillations about the equilibrium in a circular orbit near which the body starts; none
+    elsewhere.
+    """
     context = scene.context
     if not (orbit.circular and orbit.fixed_plane) or scene.free_flight:
         return []
@@ -149,7 +152,7 @@ def _librations(scene: Scene, orbit: Any) -> list[Known]:
 
 
 def _orbit_axes(context: Any, orbit: Any) -> tuple[Vector, Vector]:
-    """Normal, and direction of the source at time zero, space axes."""
+    """Orbit normal, and direction of the source at time zero, space axes."""
     node, tilt = orbit.ascending_node, orbit.inclination
     along = orbit.periapsis + orbit.mean_anomaly
     c, s = context.cos, context.sin
@@ -163,7 +166,7 @@ def _orbit_axes(context: Any, orbit: Any) -> tuple[Vector, Vector]:
 
 
 def _of_spin(scene: Scene) -> list[Known]:
-    """Of a body that turns about its axis of largest or smallest moment, torques left out."""
+    """Spin and wobble of a body that turns about its axis of largest or smallest moment, without torques."""
     context = scene.context
     moments, axes = scene.body.principal_moments, scene.body.principal_axes
     rates = [dot(axis, scene.angular_velocity) for axis in axes]

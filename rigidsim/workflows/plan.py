@@ -36,8 +36,8 @@ from rigidsim.workflows.read import Given, as_experiment
 _PILOT_SECONDS = 0.5
 _BASE_MEMORY = 170e6  # interpreter, libraries and compiled code
 _COMPRESSION = 2.5e-8  # seconds a byte: gzip 4 with shuffle writes about 40 MB/s
-_BUFFERING = 2e-7  # seconds a sample
-_EVALUATED = {True: 4096, False: 16}  # samples, in precisions with cheap arithmetic and without
+_BUFFERING = 2e-7  # seconds per sample
+_EVALUATED = {True: 4096, False: 16}  # samples to evaluate, in precisions with cheap arithmetic and without
 
 
 def plan(
@@ -51,9 +51,9 @@ def plan(
     """Explain and predict a run; integrates for about half a second and writes nothing.
 
     Args:
-        experiment, changes, loads: as of ``rigidsim.run``.
-        out: folder of the run folders, on whose disk there is room or not.
-        pilot_seconds: CPU seconds to integrate, at most; some thousands of steps tell the mean.
+        experiment, changes, loads: as for ``rigidsim.run``.
+        out: folder of the run folders, whose disk is checked for room.
+        pilot_seconds: largest CPU time of the pilot, s; some thousands of steps give the mean.
 
     Returns:
         A JSON-like dictionary: states, reasons, invariants, steps, seconds, bytes, warnings.
@@ -155,7 +155,7 @@ def plan(
 def _seconds_per_sample(
     prepared: InitialValueProblem, corrected: CorrectedStepper, evaluator: Evaluator, row: float
 ) -> float:
-    """What a sample of so many bytes costs."""
+    """Cost of a sample that takes ``row`` bytes, s."""
     count = _EVALUATED[prepared.precision.cheap]
     states = np.repeat(prepared.precision.array(prepared.system.initial)[None, :], count, axis=0)
     times = np.repeat(prepared.clock.internal(0, 1), count)

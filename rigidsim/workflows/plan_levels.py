@@ -1,4 +1,4 @@
-"""What each level of model would cost and leave out: ``plan``'s part on ``[model]``."""
+"""Comparison of model levels, cost and error: ``plan``'s part on ``[model]``."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
 _PILOT_SECONDS = 0.2
-_LARGEST_CHUNK = 1024  # of steps: calls cost next to nothing
+_LARGEST_CHUNK = 1024  # steps: at this length a call's overhead is negligible
 
 
 def compared_levels(
     experiment: Experiment, choice: LevelChoice | None, loads: Sequence[Load] = ()
 ) -> list[dict[str, Any]]:
-    """All levels, the cheapest first, where the config says anything of models.
+    """All levels, the cheapest first, if the config says anything about models.
 
     Args:
-        experiment: as it was given.
-        choice: what ``level = "auto"`` came to, whose measurements aren't repeated.
+        experiment: the experiment as given.
+        choice: result of ``level = "auto"``, whose measurements aren't repeated.
 
     Returns:
         For JSON: the level; ``error_rad``, the modelling error of axes forecast from the beginning,
-        None where there is none; ``steps`` and ``cpu_seconds`` of the integration, from a short pilot; and
-        why it isn't taken, empty for the one that is.
+        None if there is none; ``steps`` and ``cpu_seconds`` of the integration, from a short pilot; and
+        why it isn't chosen, empty for the one that is.
     """
     if "model" not in experiment.config.model_fields_set:
         return []
@@ -61,7 +61,7 @@ def compared_levels(
 
 
 def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seconds: float) -> Pilot:
-    """The first steps of a motion, corrections included, for so many seconds of CPU time."""
+    """The first steps of a motion, corrections included, within so many CPU seconds."""
     return run_pilot(
         corrected.stepper,
         prepared.clock,

@@ -1,4 +1,4 @@
-"""Reading experiments with every kind of load and every observable known."""
+"""Reading experiments once all kinds of loads and all observables are registered."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Given = Experiment | str | Path | Mapping[str, Any]
 
 
 def as_experiment(given: Given, changes: Mapping[str, Any] | None = None) -> Experiment:
-    """What is given as an experiment, with some values replaced.
+    """Convert what is given to an experiment, with some values replaced.
 
     Raises:
         ConfigError: with every problem found.

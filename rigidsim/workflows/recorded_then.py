@@ -1,4 +1,4 @@
-"""What a run did by default when it began, where that was less than it would be now."""
+"""Defaults that were in force when a run began, if they have changed since."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from rigidsim.store import netcdf
 from rigidsim.store.attributes import RootAttributes, read_attributes
 
 _WITHOUT_DIRECTIONS = 4
-"""Schema versions below this one recorded no axes, angles of axes and polar motion by default, and don't
-say what they record."""
+"""Earlier schema versions recorded no axes, their angles or polar motion by default, and don't say what they
+record.
+"""
 
 
 def as_begun(experiment: Experiment, saved: Path) -> Experiment:
-    """The experiment that records what its run does, and projects what it does, where its config says
-    nothing of them; the text stays as it is.
+    """The experiment with the recording and projection of its begun run made explicit where the config leaves
+    them open; the text stays as it is.
 
     Args:
-        saved: a file of the run, which says so, or of an earlier version, which holds it.
+        saved: a file of the run, which tells; one of an earlier version tells by its contents.
     """
     found = read_attributes(saved)
     experiment = _projecting(experiment, found)
@@ -41,7 +42,9 @@ def as_begun(experiment: Experiment, saved: Path) -> Experiment:
 
 
 def _projecting(experiment: Experiment, found: RootAttributes) -> Experiment:
-    """``hold_invariants`` was false where nothing was said, before it was "auto"."""
+    """Set ``hold_invariants`` to false if the config leaves it open and the run began before "auto" was its
+    default.
+    """
     integrator = experiment.config.integrator
     if "hold_invariants" in integrator.model_fields_set or found.hold_invariants:
         return experiment

@@ -1,4 +1,4 @@
-"""Resuming a run that was interrupted, killed or stopped, and prolonging a finished one, to the bit."""
+"""Resuming a run that was interrupted, killed or stopped, and prolonging a finished one, bit for bit."""
 
 from __future__ import annotations
 
@@ -59,18 +59,18 @@ def resume(
     Args:
         path: run folder.
         until: a later end, as in ``[time] end``; a finished run is prolonged to it.
-        overrides: ``limits.KEY=VALUE`` texts, or ``{"limits.KEY": value}``: guards of this session in place
+        overrides: ``limits.KEY=VALUE`` texts, or ``{"limits.KEY": value}``: guards for this session in place
             of the config's.
-        observer, progress: as of ``rigidsim.run``.
-        loads: those that the run was begun with.
-        tuning: as of ``rigidsim.run``.
+        observer, progress: as for ``rigidsim.run``.
+        loads: loads that the run was begun with.
+        tuning: as for ``rigidsim.run``.
 
     Returns:
         The run. Its dataset is bit for bit that of a run in one go, on the same versions and CPU features;
-        on others the summary says so. One that is complete is returned as it is, and the observer told.
+        on others the summary says so. A complete run is returned as it is, and the observer told.
 
     Raises:
-        RunFolderError: no run, one in use, one that can't be written, or one whose config or segments were
+        RunFolderError: the run doesn't exist, is in use, can't be written, or its config or segments were
             changed.
         ConfigError: a bad ``until`` or override.
     """
@@ -87,7 +87,7 @@ def resume(
         if until is not None:
             experiment = _prolonged(experiment, until)
         experiment = _guarded(experiment, overrides)
-        # a run that was killed while its dataset was completed has both, and is completed again
+        # a run that was killed while its dataset was being completed has both, and is completed again
         finished = folder.dataset.exists() and not folder.segments.exists()
         if finished and until is None:
             return _as_it_is(folder, experiment, session, loads)
@@ -117,10 +117,10 @@ def resume(
 
 
 def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads: Sequence[Load]) -> SavedRun:
-    """A run whose dataset is complete; what a Ctrl-C left out after that is made up for.
+    """A run whose dataset is complete; finishes what a Ctrl-C left out after that.
 
     Raises:
-        RunFolderError: that can't be written.
+        RunFolderError: the folder can't be written.
     """
     done = open_run(folder.path)
     summary = done.outcome
@@ -174,7 +174,7 @@ def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
 
 
 def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
-    """The same experiment, and text, under other guards."""
+    """The same experiment and text with other guards."""
     if not overrides:
         return experiment
     limits = experiment.having(overrides).config.limits
@@ -182,7 +182,7 @@ def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
 
 
 def _prolonged(experiment: Experiment, until: str) -> Experiment:
-    """The same experiment to a later end, with samples as far apart as before."""
+    """The same experiment to a later end, with the same sampling interval."""
     from rigidsim.scene.scene import build_scene
 
     before = build_scene(experiment).samples
@@ -204,10 +204,10 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
 
 
 def _of_finished(folder: RunFolder) -> Chain:
-    """A finished run's dataset and its checkpoint, as what it is prolonged from.
+    """A finished run's dataset and its checkpoint as a chain of segments from which it is prolonged.
 
     Raises:
-        RunFolderError: it ended otherwise than at its last sample, or a file is damaged.
+        RunFolderError: the run didn't end at its last sample, or a file is damaged.
     """
     found = read_attributes(folder.dataset)
     if found.status != Status.FINISHED.value:
@@ -224,7 +224,7 @@ def _of_finished(folder: RunFolder) -> Chain:
 
 
 def _set_aside(chain: Chain, folder: RunFolder) -> Caution:
-    """Move what doesn't belong, so that it is neither read nor lost."""
+    """Move segments that don't belong out of the way, so that they are neither read nor lost."""
     folder.set_aside.mkdir(exist_ok=True)
     for path in chain.spoiled:
         target, number = folder.set_aside / path.name, 0
@@ -241,10 +241,10 @@ def _set_aside(chain: Chain, folder: RunFolder) -> Caution:
 
 
 def _continued(experiment: Experiment, last: Path) -> Experiment:
-    """The experiment with what was given when the run began, and the later end that it has since.
+    """The experiment with its values when the run began, and the later end that it has since been given.
 
     Raises:
-        RunFolderError: it is another experiment than the last saved file's.
+        RunFolderError: the experiment isn't that of the last saved file.
     """
     begun = embedded(last)
     ends: list[str] = []
@@ -260,7 +260,7 @@ def _continued(experiment: Experiment, last: Path) -> Experiment:
 
 
 def _prolongs(experiment: Experiment, begun: Experiment, ends: Sequence[str]) -> bool:
-    """Whether it is the experiment that was begun, but for a later end."""
+    """Whether the experiment is the one that was begun, except for a later end."""
     from rigidsim.scene.scene import build_scene
 
     if begun.having(ends).text != experiment.text:
@@ -269,10 +269,10 @@ def _prolongs(experiment: Experiment, begun: Experiment, ends: Sequence[str]) ->
 
 
 def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
-    """What differs from the run's beginning in versions or machine; empty where nothing does.
+    """Differences in versions or machine from the run's beginning; empty if there are none.
 
     Raises:
-        RunFolderError: it is another experiment.
+        RunFolderError: the segments are of another experiment.
     """
     last = chain.paths[-1]
     saved = read_attributes(last)
@@ -298,7 +298,7 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
 
 
 def _same_times(prepared: InitialValueProblem, chain: Chain) -> None:
-    """A grid to a later end must begin with the very times that are saved."""
+    """Require that a grid to a later end begins with exactly the times that are saved."""
     first = 0
     for path in chain.paths:
         with netcdf.reading(path) as file:

@@ -1,4 +1,4 @@
-"""Running an experiment: choose what it asks to be chosen, run, certify, and try again where that fails."""
+"""Running an experiment: choose what the config leaves to be chosen, run, certify, and retry on failure."""
 
 from __future__ import annotations
 
@@ -71,13 +71,13 @@ def run(
 
     Args:
         experiment: from ``load`` or ``Experiment.from_dict``, the path of a config, or a dictionary.
-        changes: values to replace, ``{"time.end": 10}``, as of ``Experiment.replace``.
+        changes: values to replace, ``{"time.end": 10}``, as for ``Experiment.replace``.
         out: folder of the run folders; None: nothing is written, and the run's ``dataset`` is in memory.
         force: replace a run of the same name.
-        observer: is told how it goes.
-        progress: whether a bar shows how it goes; None: in notebooks.
-        loads: loads of one's own, beside those of the config, which alone can't reproduce the run then.
-        tuning: how often to look up and save, and when to look for a cheaper model; no bit depends on it.
+        observer: receives the run's progress.
+        progress: whether to show a progress bar; None: only in notebooks.
+        loads: your own loads besides the config's, which then can't reproduce the run by itself.
+        tuning: how often to check and save, and when to look for a cheaper model; no bit depends on it.
 
     Returns:
         The run; its ``status`` tells how it ended, which need not be "finished".
@@ -101,7 +101,7 @@ def _run_a_level(
     loads: Sequence[Load],
     tuning: Tuning,
 ) -> Run:
-    """The level given, or the cheapest whose measured error is within what is asked for."""
+    """Run the given level, or the cheapest one whose measured error is within the requested accuracy."""
     failed: list[str] = []
     while experiment.config.model.level == AUTO:
         from rigidsim.accuracy.models.level import choose_level

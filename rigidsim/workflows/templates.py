@@ -24,14 +24,14 @@ SCENES = (
     "torque",
     "magnet",
 )
-"""Names of all templates, simple ones first."""
+"""Names of all templates, the simplest first."""
 
 
 def template(scene: str) -> str:
     """The text of a template.
 
     Raises:
-        RigidsimError: there is none of this name.
+        RigidsimError: there is no template of this name.
     """
     if scene not in SCENES:
         raise RigidsimError(
@@ -41,7 +41,7 @@ def template(scene: str) -> str:
 
 
 def described() -> dict[str, str]:
-    """Each template's description."""
+    """Description of each template."""
     return {scene: str(tomllib.loads(template(scene))["description"]) for scene in SCENES}
 
 
@@ -49,10 +49,10 @@ def write_new(scene: str, name: str | None = None, folder: Path = Path()) -> Pat
     """Write a template as ``NAME.toml``; an existing file is never replaced.
 
     Args:
-        name: of the experiment and its file; by default the scene's.
+        name: name of the experiment and its file; by default the scene's.
 
     Raises:
-        RigidsimError: no such scene, a name that no run folder can have, or a file that can't be written.
+        RigidsimError: unknown scene, a name that no run folder can have, or a file that can't be written.
     """
     text = template(scene)
     name = scene if name is None else name.removesuffix(".toml")

@@ -1,7 +1,7 @@
-"""``rigidsim tradeoff``: measure a scene's settings, save the measurement, draw it, and say what to use.
+"""``rigidsim tradeoff``: measure a scene's settings, save and draw the measurement, and say what to use.
 
-The settings are compared by the attitude, which every one of them carries for that, whatever the config
-records. Of a long motion the beginning is measured, as far as a budget of time allows, and nothing is
+The settings are compared by the attitude, which each of them carries for this purpose, whatever the config
+records. For a long motion the beginning is measured, as far as a time budget allows, and nothing is
 extrapolated.
 """
 
@@ -32,11 +32,11 @@ DATASET, FIGURE = "tradeoff.h5", "tradeoff.png"
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """A measurement as labelled data, and what it says.
+    """A measurement as labelled data, and the advice drawn from it.
 
     Attributes:
         dataset: dimension ``setting``; see ``dataset_of``.
-        folder: where it was saved; None where it wasn't.
+        folder: where it was saved; None if it wasn't.
     """
 
     dataset: xarray.Dataset
@@ -44,11 +44,13 @@ class Tradeoff:
 
     @property
     def advice(self) -> list[BestSetting]:
-        """For each decade of accuracy that some setting reaches, the cheapest; equal neighbours joined."""
+        """The cheapest setting for each decade of accuracy that some setting reaches; equal neighbours are
+        merged.
+        """
         return advice(self.dataset)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Values for JSON."""
         data = self.dataset
         rows = []
         for n in range(data.sizes["setting"]):
@@ -108,11 +110,11 @@ def tradeoff(
 
     Args:
         out: folder in which ``NAME_tradeoff`` is made; None saves nothing.
-        budget: seconds that it may take, roughly.
-        repeats: fresh processes in which speeds are taken.
-        full: every tolerance in every formulation and precision.
+        budget: approximate time limit, s.
+        repeats: number of fresh processes in which speeds are measured.
+        full: measure every tolerance in every formulation and precision.
         force: replace an earlier measurement.
-        told: called with what is being done.
+        told: called with a description of each stage.
 
     Raises:
         ConfigError: the config can't be run.
@@ -142,7 +144,7 @@ def tradeoff(
 
 
 def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Dataset:
-    """With what averaged models leave out and cost, where the config says anything of models.
+    """The dataset with errors and costs of averaged models, if the config says anything about models.
 
     Added along ``model``: ``model_error``, rad, of axes at the end of the whole motion; ``model_cpu_ratio``,
     over the cost of the full model in the default setting, both from short pilots.
@@ -167,10 +169,10 @@ def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Datas
 
 
 def save(dataset: xarray.Dataset, folder: Path) -> None:
-    """Write dataset and figure, each visible only when it is whole.
+    """Write dataset and figure, each of which appears only when complete.
 
     Raises:
-        RunFolderError: they can't be written.
+        RunFolderError: a file can't be written.
     """
     from rigidsim.look.work_precision import save_work_precision
     from rigidsim.store import atomic

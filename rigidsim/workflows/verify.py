@@ -1,4 +1,4 @@
-"""Is a run what its config gives, bit for bit? Integrated again and compared, number by number."""
+"""Verifying a run bit for bit: integrated again from its config and compared number by number."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Difference:
     """The first place where two datasets differ.
 
     Attributes:
-        sample: along the variable's first dimension.
-        saved, again: the values there; size: their distance.
+        sample: index along the variable's first dimension.
+        saved, again: both values there; ``size`` is their distance.
     """
 
     variable: str
@@ -52,16 +52,16 @@ class Difference:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a verification found.
+    """Result of a verification.
 
     Attributes:
         identical: every number of every variable agrees in every bit, the files are whole, and the summary's
             claims hold.
-        problems: what is wrong with the files themselves, or with what the summary claims, in words.
-        difference: the first one, or None.
+        problems: faults of the files themselves, or of the summary's claims, in words.
+        difference: the first difference, or None.
         differing: names of all variables that differ.
         environment: versions and machine features that changed since, which can explain it.
-        samples: compared.
+        samples: number of samples compared.
     """
 
     path: str
@@ -73,7 +73,7 @@ class Verdict:
     samples: int = 0
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Values for JSON."""
         found = None
         if self.difference is not None:
             d = self.difference
@@ -91,15 +91,15 @@ class Verdict:
 
 
 def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
-    """Integrate a run's embedded config again and compare everything recorded, and what the summary claims.
+    """Integrate a run's embedded config again and compare all recorded numbers and the summary's claims.
 
     Args:
         path: run folder with a dataset, or a dataset alone.
-        observer: is told how the integration goes.
+        observer: receives the integration's progress.
 
     Raises:
-        RunFolderError: no dataset there, or one that no config can reproduce.
-        ConfigError: the embedded config isn't one.
+        RunFolderError: there is no dataset, or one that no config can reproduce.
+        ConfigError: the embedded config isn't valid.
         KeyboardInterrupt: the integration was interrupted; nothing was compared.
     """
     dataset, folder = _dataset(Path(path))
@@ -149,11 +149,11 @@ def _scratch() -> tempfile.TemporaryDirectory[str]:
 
 
 def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
-    """The experiment that a dataset was made by; ``overrides`` as in ``rigidsim.load``.
+    """The experiment that a dataset was made from; ``overrides`` as in ``rigidsim.load``.
 
     Raises:
-        RunFolderError: it is no dataset of rigidsim.
-        ConfigError: the config in it isn't one.
+        RunFolderError: the file isn't a dataset of rigidsim.
+        ConfigError: the config in it isn't valid.
     """
     found = root_attributes(dataset)
     text, given, settings = (found.get(name) for name in ("config", "config_given", "config_set"))
@@ -177,7 +177,7 @@ def _dataset(path: Path) -> tuple[Path, RunFolder | None]:
 
 
 def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
-    """What the files themselves tell, before anything is integrated."""
+    """Faults that the files themselves show, before anything is integrated."""
     problems = []
     try:
         if read_seal(dataset) is not None or root_attributes(dataset).get("schema_version", 1) > 1:
@@ -217,7 +217,7 @@ def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Differe
         names = {*_numbers(one), *_numbers(other)}
         if version < 4:  # no dates
             names -= {n for n in names if n not in one and _is_date(other[n])}
-        if version < 3:  # nothing put back along time
+        if version < 3:  # no corrections put back along time
             names -= {n for n in names if n not in one and "put_back_of" in other[n].attrs}
         samples = int(one["time"].shape[0])
         for name in sorted(names):
@@ -239,7 +239,7 @@ def _numbers(file: h5py.File) -> Iterator[str]:
 
 
 def _is_date(item: h5py.Dataset) -> bool:
-    """Whether it follows from the epoch and the time alone; residuals name what they belong to."""
+    """Whether a variable follows from the epoch and the time alone; residuals name what they belong to."""
     return "time_scale" in item.attrs or item.attrs.get("residual_of") == "julian_date"
 
 

@@ -1,4 +1,4 @@
-"""What a run's ``summary.json`` claims, held against the same experiment run again.
+"""Verifying the claims of a run's ``summary.json`` against the same experiment run again.
 
 Only what follows from the config is compared, as the fields of ``Summary`` are marked: times, machine facts,
 how often a run was interrupted, and certificates (which stand for another run) are left out.
@@ -19,15 +19,15 @@ from rigidsim.store.summary_fields import Claim
 
 
 def summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: int) -> list[str]:
-    """The first claim of a summary that running again doesn't confirm, in words; none where all hold.
+    """The first claim of a summary that running again doesn't confirm, in words; empty if all hold.
 
     Args:
         saved, again: summaries; the saved one may be of an older version, which claimed less.
         version: schema version of the dataset beside it.
     """
     if not isinstance(saved, Summary):
-        return []  # of a run that was killed: it claims nothing
-    # with a dataset there is, only its timeline, or its segments' removal, can have been interrupted
+        return []  # a run that was killed claims nothing
+    # once there is a dataset, an interruption can only have hit its timeline or its segments' removal
     ended = saved.status != Status.INTERRUPTED.value
     claims = (_claims(summary, version, ended=ended) for summary in (saved, again))
     found = list(_differences("", *claims))
@@ -38,7 +38,7 @@ def summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: int
 
 
 def _claims(part: BaseModel, version: int, *, ended: bool) -> dict[str, Any]:
-    """The fields that are marked as claims, here and in what is in here, as plain values."""
+    """The fields marked as claims, in this part and in parts within, as plain values."""
     found: dict[str, Any] = {}
     given = part.model_dump(mode="json", exclude_unset=True)
     for name, field in type(part).model_fields.items():
@@ -62,7 +62,7 @@ _ABSENT = object()
 
 
 def _differences(name: str, saved: Any, again: Any) -> Iterator[str]:
-    """Claims that differ; one that is absent from an older summary is none."""
+    """Claims that differ; one that is missing in an older summary doesn't count."""
     if isinstance(saved, Mapping) and isinstance(again, Mapping):
         for key in [*again, *(k for k in saved if k not in again)]:
             there, inner = saved.get(key, _ABSENT), f"{name}.{key}".lstrip(".")
@@ -84,7 +84,9 @@ def _short(value: Any) -> str:
 
 
 def timeline_problems(saved: Brief, folder: RunFolder) -> list[str]:
-    """Whether the timeline that a summary names is there and as it was drawn; older ones name none."""
+    """Problems with the timeline that a summary names, if it is missing or changed; older summaries name
+    none.
+    """
     if not isinstance(saved, Summary) or saved.timeline_sha256 is None:
         return []
     if not folder.timeline.is_file() or folder.timeline.is_symlink():

@@ -1,4 +1,4 @@
-"""``rigidsim view``: one run or several in the viewer, a running one as it goes on, or drawn to a file."""
+"""``rigidsim view``: runs in the viewer, a running one followed as it goes on, or drawn to a file."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Told = Callable[[int, int], None]
 
 
 def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[str, Run]]:
-    """Runs with the names that they are to have on the screen, each different.
+    """Runs with their names on the screen, each different.
 
     Args:
-        paths: run folders; with ``members`` the folder of one sweep.
-        members: of the sweep, which are run by themselves for it.
+        paths: run folders; with ``members``, the folder of one sweep.
+        members: members of the sweep, each run by itself for this purpose.
 
     Raises:
-        RunFolderError: no run there, or a sweep without members chosen, or members of what is no sweep.
+        RunFolderError: no run there, a sweep without chosen members, or members without a sweep.
         ConfigError: there is no such member.
     """
     if members:
@@ -61,7 +61,7 @@ def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, R
 
 
 def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
-    """Open runs in the viewer, side by side where they are several, and wait until it is closed.
+    """Open runs in the viewer, side by side if there are several, and wait until it is closed.
 
     A single run that another process is working on is followed: the picture grows with what is saved.
 
@@ -91,11 +91,11 @@ def render(
     """Draw runs to a PNG picture, or a GIF or MP4 film, without a screen.
 
     Args:
-        seconds: that a film lasts.
-        told: of its progress, frames done and in all.
+        seconds: duration of a film.
+        told: called with its progress: frames done and total.
 
     Raises:
-        RunFolderError: it can't be drawn or written; the message says what is to be installed.
+        RunFolderError: the picture can't be drawn or written; the message says what to install.
     """
     from rigidsim.look import film
     from rigidsim.look.viewer import NoGraphics
@@ -110,7 +110,7 @@ def render(
 
 @contextmanager
 def _new(target: Path) -> Iterator[Path]:
-    """A file of the target's suffix that takes its place once it is whole."""
+    """A temporary file of the target's suffix that replaces the target once complete."""
     try:
         with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
             new = Path(scratch) / f"new{target.suffix}"
@@ -123,10 +123,10 @@ def _new(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
-    """The recording of a run, or one of several side by side that goes when the block ends.
+    """The recording of a run, or a temporary one of several runs side by side.
 
     Raises:
-        RunFolderError: it can't be drawn.
+        RunFolderError: a run can't be drawn.
     """
     if len(named) == 1:
         run = named[0][1]
@@ -156,7 +156,7 @@ def _follow(run: SavedRun, *, web: bool) -> int:
 
 
 def so_far(run: SavedRun) -> tuple[xarray.Dataset | None, bool]:
-    """What is saved of a run now, None before its first segment, and whether it goes on."""
+    """What is saved of a run now (None before its first segment), and whether the run goes on."""
     going_on = run.folder.at_work
     try:
         return open_run(run.folder.path).opened(indexed=False), going_on

@@ -1,1 +1,1 @@
-"""How far a run is, while it goes on: here or in another terminal."""
+"""Progress of a run while it goes on, here or in another terminal."""

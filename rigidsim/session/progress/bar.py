@@ -21,11 +21,11 @@ _WIDE = 100  # columns from which simulated time has room
 
 
 class TerminalObserver(Observer):
-    """Draws one line: a bar, steps per second and time left; simulated time too where there is room.
+    """Draws one line: a bar, steps per second and time left, and simulated time if there is room.
 
     Args:
-        console: that it draws on; stderr by default.
-        clock: tells the time, seconds.
+        console: console to draw on; stderr by default.
+        clock: returns the time, s.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class TerminalObserver(Observer):
             )
 
     def _draw(self, title: str, total: float | None = None) -> None:
-        """One bar in place of the last; it runs to and fro where its end isn't known."""
+        """Draw one bar in place of the last; it moves to and fro if its end isn't known."""
         if self._task is not None:
             self._bar.remove_task(self._task)
         self._task = self._bar.add_task("", total=total, title=title, said="")

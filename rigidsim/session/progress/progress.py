@@ -26,7 +26,7 @@ class LineObserver(Observer):
     """One plain line every few seconds.
 
     Args:
-        clock: tells the time, seconds.
+        clock: returns the time, s.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -104,7 +104,7 @@ class LineObserver(Observer):
 
 
 def observer(*, notebook: bool = False) -> TerminalObserver | LineObserver:
-    """The one that suits stderr, or a notebook; use it in a ``with``."""
+    """The observer that suits stderr, or a notebook; use it in a ``with``."""
     if notebook:  # the bar is a widget there
         widgets = find_spec("ipywidgets") is not None
         if not widgets:
@@ -123,8 +123,8 @@ def watched(given: Observer | None, progress: bool | None) -> Iterator[Observer]
     """The observer of a run.
 
     Args:
-        given: one of the caller's.
-        progress: whether a bar shows how it goes where none is given; None: in notebooks.
+        given: the caller's own observer, if any.
+        progress: whether to show a bar if no observer is given; None: only in notebooks.
     """
     if given is not None or not (in_notebook() if progress is None else progress):
         yield given or Observer()

@@ -1,4 +1,4 @@
-"""What a progress bar and plain lines say alike."""
+"""Wording shared by the progress bar and plain lines."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ def rate_text(value: float) -> str:
 
 
 class Pace:
-    """How fast a session goes, by what it did itself.
+    """Pace of a session, from what it did itself.
 
     Args:
-        steps: taken before it.
-        fraction: of the run that was done before it.
+        steps: steps taken before it.
+        fraction: fraction of the run that was done before it.
     """
 
     def __init__(self, steps: int = 0, fraction: float = 0.0) -> None:
         self._steps, self._fraction = steps, fraction
 
     def words(self, elapsed: float, steps: int, fraction: float) -> tuple[str, str]:
-        """Steps a second, and the time to go.
+        """Steps per second and the time left, in words.
 
         Args:
             elapsed: seconds since the session began.
-            steps, fraction: of the whole run.
+            steps, fraction: steps taken and fraction done of the whole run.
         """
         share = (fraction - self._fraction) / (1 - self._fraction) if self._fraction < 1 else 1.0
         return rate_text((steps - self._steps) / max(elapsed, 1e-9)), left(elapsed, share)

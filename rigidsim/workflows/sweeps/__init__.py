@@ -1,1 +1,1 @@
-"""Many members of one experiment: checked, planned, computed tile by tile, here or on a cluster."""
+"""Sweeps: members of one experiment, checked, planned, and computed tile by tile, here or on a cluster."""

@@ -1,4 +1,4 @@
-"""Members of a tile in batches: families that share their equations, and what is left to run one by one."""
+"""Running a tile's members in batches: families that share equations, and the rest one by one."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ from rigidsim.store.summary_parts import WarningCode
 from rigidsim.store.variables import Variable
 
 _ONE_BY_ONE = ("frequencies",)
-"""What is kept of single runs alone."""
+"""Items that only single runs can provide."""
 
 
 @dataclass
 class Batched:
-    """What a batch made of a tile's members.
+    """Result of running a tile's members in batches.
 
     Attributes:
-        results: of those that it ran, or that no run accepts.
-        members: their places in the tile.
-        left: places of those that are to be run one by one.
-        why: these are, of the first of them; empty where none is.
-        estimating: seconds of CPU that estimates of errors took.
+        results: results of members that were run, or that no run accepts.
+        members: places of those members in the tile.
+        left: places of members still to be run one by one.
+        why: reason why the first of these is left; empty if none is.
+        estimating: CPU seconds spent on error estimates.
     """
 
     results: list[MemberResults]
@@ -59,7 +59,7 @@ class Batched:
 
 
 def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
-    """Code of the reason that no member of a sweep runs in a batch; empty where some may."""
+    """Code of the reason why no member of a sweep can run in a batch; empty if some may."""
     for item in _ONE_BY_ONE:
         if item in keep:
             return item
@@ -72,10 +72,10 @@ def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
 
 
 class BatchTiles:
-    """The families of a sweep, traced and compiled once in a process.
+    """Families of a sweep, traced and compiled once per process.
 
     Args:
-        hidden: what is recorded for indicators alone.
+        hidden: variables recorded only for indicators.
     """
 
     def __init__(self, sweep: Sweep, hidden: Sequence[str]) -> None:
@@ -87,7 +87,7 @@ class BatchTiles:
         self._estimates: dict[int, MemberEstimates] = {}
 
     def run(self, members: Sequence[int], keep: Sequence[str]) -> Batched:
-        """Run as many members as can be run together."""
+        """Run all members that can be run together."""
         families = Families(Members.of(self._sweep, members, self._axes))
         families.known = self._known
         found = families.sort()
@@ -109,14 +109,14 @@ class BatchTiles:
         return done
 
     def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], bool]:
-        """Of some members those that no run accepts; nothing is integrated.
+        """Members that no run accepts; nothing is integrated.
 
         Args:
-            most: of them, after which no more are looked for.
+            most: number after which the search stops.
 
         Returns:
-            What is wrong with each, and whether any member at all shares its equations with others: of those
-            that don't nothing is known.
+            What is wrong with each, and whether any member shares its equations with others; nothing is
+            known about members that don't.
         """
         families = Families(Members.of(self._sweep, members, self._axes), most)
         families.known = self._known
@@ -185,7 +185,7 @@ class BatchTiles:
 
 
 def _lost(block: BatchBlock) -> np.ndarray:
-    """Members of which a recorded variable isn't defined past a sample at which it is, (members,)."""
+    """Members in which a recorded variable becomes undefined after having been defined, (members,)."""
     found = np.zeros(len(block.members), dtype=bool)
     for values in block.values.values():
         bad = np.asarray(np.isnan(values).reshape(*values.shape[:2], -1).any(axis=2))
@@ -205,15 +205,15 @@ def _outcome_codes(statuses: np.ndarray) -> np.ndarray:
 
 
 def rows_of(kept: Kept, rows: np.ndarray) -> Kept:
-    """What was kept of some of the members, in the order given."""
+    """Kept variables of the given members, in the given order."""
     return {name: KeptVariable(v.dims, v.values[rows], v.attributes, v.item) for name, v in kept.items()}
 
 
 def in_order(parts: Sequence[MemberResults], members: Sequence[np.ndarray]) -> MemberResults:
-    """Groups of a tile's members as one, each at its place.
+    """Groups of a tile's members joined, each member at its place.
 
     Args:
-        members: places of each group's members.
+        members: places of the members of each group.
     """
     places = np.concatenate(members)
     whole = MemberResults.together(parts)

@@ -1,4 +1,4 @@
-"""What can be refused of a sweep before any of its members runs."""
+"""Checks that refuse a sweep before any of its members runs."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.members import batches_of
 
 _ALL = 200
-"""As many members are all worked out; of more, each value of each axis once, and the corners, and all of them
-by their numbers alone, where these decide."""
+"""Up to this many members are all worked out. Of more, each value of each axis is tried once, plus the
+corners, and all members by their numbers alone if these decide.
+"""
 _OF_AN_AXIS = 400
 _MOST_CORNERS = 64
 _MOST_TOLD = 10
 _AT_ONCE = 16_384
 QUICK = 1_000_000
-"""As many members are all looked at where a plan is asked for; a sweep looks at all."""
+"""Up to this many members are all checked for a plan; a sweep checks all."""
 
 
 def check_sweep(sweep: Sweep, *, every: bool = True) -> InitialValueProblem:
-    """Refuse a sweep with a member that can't be run; the first member, prepared.
+    """Refuse a sweep with a member that can't be run; returns the first member, prepared.
 
     Args:
-        every: of more than ``_ALL`` members look at each one's numbers, too: 20 s for a million of them.
+        every: check each member's numbers even if there are more than ``_ALL``: 20 s per million members.
 
     Raises:
         ConfigError: names members and keys.
@@ -60,7 +61,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True) -> InitialValueProblem:
 
 
 def _of_families(sweep: Sweep) -> list[Problem]:
-    """What is wrong with any member at all, where members share equations: their numbers alone tell it."""
+    """Problems of any member, if members share equations so that their numbers alone tell."""
     if why_alone(sweep, ()) not in ("", "wall_time", "asked"):
         return []
     batches = batches_of(sweep.experiment.text)
@@ -75,7 +76,7 @@ def _of_families(sweep: Sweep) -> list[Problem]:
 
 
 def _tried(sweep: Sweep) -> Iterator[int]:
-    """Members that are worked out before anything runs."""
+    """Members that are worked out in full before anything runs."""
     if sweep.count <= _ALL:
         yield from range(1, sweep.count)
         return
@@ -108,7 +109,7 @@ def _refuse_names(sweep: Sweep) -> None:
 
 
 def _refuse_what_none_has(sweep: Sweep) -> None:
-    """What is to be kept, and needs something that the config doesn't have."""
+    """Refuse items to be kept that need something the config doesn't have."""
     keep = sweep.table.keep
     for name in ("events", "section"):
         if name in keep and not sweep.base.config.events:

@@ -3,9 +3,9 @@
 The workers need rigidsim and nothing of this machine's disk. Only a few tiles for each of their threads are
 out at any time, so that neither the scheduler nor this process ever holds many.
 
-A tile that is done lies on the worker that computed it until it is fetched. Where that worker dies first, the
-tile is computed again, and whoever fetches it waits meanwhile, for ever where no worker is left. So a thread
-fetches, and this one goes on looking whether there are workers.
+A finished tile stays on the worker that computed it until it is fetched. If that worker dies first, the
+tile is computed again, and whoever fetches it waits meanwhile, for ever if no worker is left. So a thread
+fetches, while this one keeps checking whether there are workers.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rigidsim.store.sweeps.generation import Generation
 from rigidsim.workflows.sweeps.members import tile_image
 from rigidsim.workflows.sweeps.ways import task
 
-_AHEAD = 2  # tiles for each thread
+_AHEAD = 2  # tiles out for each thread
 _MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
 _LOOK_SECONDS = 5
 _TELL_SECONDS = 0.2
@@ -33,9 +33,9 @@ class Cluster:
     """A Dask scheduler's workers.
 
     Args:
-        address: of the scheduler, such as ``tcp://10.0.0.1:8786``.
-        patience: seconds in which it must answer.
-        alone: seconds without any worker after which nobody waits any more.
+        address: address of the scheduler, such as ``tcp://10.0.0.1:8786``.
+        patience: seconds within which it must answer.
+        alone: seconds without any worker after which to give up.
     """
 
     def __init__(self, address: str, patience: float = 20.0, alone: float = 120.0) -> None:
@@ -46,7 +46,7 @@ class Cluster:
 
         Raises:
             RigidsimError: Dask isn't installed, or no scheduler answers.
-            StoppedError: workers die again and again at the same tile, or the scheduler went.
+            StoppedError: workers die repeatedly at the same tile, or the scheduler disappeared.
         """
         distributed = _distributed()
         try:
@@ -59,7 +59,7 @@ class Cluster:
         with client:
             try:
                 yield from self._stream(distributed, client, generation, list(reversed(tiles)))
-            except (OSError, RuntimeError) as error:  # what Dask raises of a connection that is gone
+            except (OSError, RuntimeError) as error:  # what Dask raises if a connection is gone
                 if client.status == "running":
                     raise
                 raise StoppedError(
@@ -102,7 +102,7 @@ class Cluster:
 
 
 class _ClusterWorkers:
-    """Those of a scheduler, and since when there is none.
+    """Workers of a scheduler, and since when there have been none.
 
     Args:
         alone: seconds that this may last.
@@ -113,7 +113,7 @@ class _ClusterWorkers:
         self._since: float | None = None
 
     def threads(self) -> int:
-        """How many they have together.
+        """Total number of their threads.
 
         Raises:
             StoppedError: there has been no worker for too long.
@@ -134,7 +134,7 @@ class _ClusterWorkers:
 
 
 def _fetched(future: Any, workers: _ClusterWorkers) -> bytes:
-    """A tile that was done, which may have gone since with its worker: then it is computed again.
+    """Bytes of a finished tile; if its worker is gone, the tile is computed again first.
 
     Raises:
         StoppedError: there has been no worker for too long.
@@ -144,7 +144,7 @@ def _fetched(future: Any, workers: _ClusterWorkers) -> bytes:
     def fetch() -> None:
         try:
             fetched.set_result(future.result())
-        except BaseException as error:  # for whoever waits
+        except BaseException as error:  # passed on to the waiting thread
             fetched.set_exception(error)
 
     Thread(target=fetch, name="rigidsim fetch", daemon=True).start()  # ends with the client at the latest
@@ -154,7 +154,7 @@ def _fetched(future: Any, workers: _ClusterWorkers) -> bytes:
 
 
 def _first_done(distributed: Any, client: Any, futures: list[Any]) -> Any:
-    """One that ended; None where none does within some seconds."""
+    """A future that has ended; None if none does within some seconds."""
     try:
         with client.as_current():
             found = distributed.wait(futures, timeout=_LOOK_SECONDS, return_when="FIRST_COMPLETED")
@@ -162,7 +162,7 @@ def _first_done(distributed: Any, client: Any, futures: list[Any]) -> Any:
         return None
     except distributed.CancelledError:  # one of them was lost with the worker that had it
         lost = next((future for future in futures if future.status == "cancelled"), None)
-        if lost is None:  # it isn't told yet which
+        if lost is None:  # which one isn't known yet
             time.sleep(_TELL_SECONDS)
         return lost
     return next(iter(found.done), None)

@@ -1,4 +1,4 @@
-"""Members of a sweep, computed tile by tile: in a batch where that is possible, else one by one."""
+"""Computing members of a sweep tile by tile: in batches if possible, otherwise one by one."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ _LINES = 5  # of each signal's spectrum
 
 @lru_cache(maxsize=4)
 def sweep_of(config: str) -> Sweep:
-    """The sweep of a config's text, worked out once in a process."""
+    """The sweep of a config's text, worked out once per process."""
     return recording(Sweep.of(parse(config, source="the sweep's config")))
 
 
 INDICATORS = ("megno", "fli", "lyapunov")
-"""What is kept of how a tangent vector grew, which is recorded for it."""
+"""Items that need a tangent vector's growth, which is recorded for them."""
 
 
 def recording(sweep: Sweep) -> Sweep:
-    """A sweep whose members record what is to be kept of them.
+    """The sweep with its members recording everything that is to be kept.
 
     Raises:
-        ConfigError: the base experiment can't be run, so that nobody knows what it records.
+        ConfigError: the base experiment can't be run, so that its recorded variables are unknown.
     """
     output = sweep.base.config.output
     if not set(sweep.table.keep) & set(INDICATORS) or GROWTH in (output.record or ()):
@@ -58,7 +58,7 @@ def recording(sweep: Sweep) -> Sweep:
 
 
 def hidden_of(sweep: Sweep) -> tuple[str, ...]:
-    """What is recorded for indicators alone."""
+    """Variables recorded only for indicators."""
     asked = sweep.experiment.config.output.record
     return () if asked is not None and GROWTH in asked else (GROWTH,)
 
@@ -67,11 +67,11 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> byte
     """Run some members; returns the sealed file of their tile.
 
     Args:
-        config: of the sweep.
-        keep: items to be kept, as of ``items_of``.
+        config: the sweep's config text.
+        keep: items to be kept, as in ``items_of``.
 
     Raises:
-        KeyboardInterrupt: it was interrupted.
+        KeyboardInterrupt: the computation was interrupted.
     """
     began, cpu = time.perf_counter(), time.process_time()
     sweep = sweep_of(config)
@@ -97,7 +97,7 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> byte
 
 
 def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> MemberResults:
-    """Run some members of a sweep, and keep what is asked for of each."""
+    """Run some members of a sweep and keep the items asked for."""
     events = [event.name for event in sweep.base.config.events]
     most = sweep.table.most_events
     more = frequencies_of if "frequencies" in keep else None
@@ -115,7 +115,7 @@ def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> Me
 
 @lru_cache(maxsize=4)
 def batches_of(config: str) -> BatchTiles:
-    """The families of a config's sweep, traced once in a process."""
+    """The families of a config's sweep, traced once per process."""
     sweep = sweep_of(config)
     return BatchTiles(sweep, hidden_of(sweep))
 
@@ -135,7 +135,7 @@ def single_member(experiment: Experiment, member: int) -> Experiment:
 
 
 def alone(sweep: Sweep, member: int) -> Experiment:
-    """A member as it is run by itself."""
+    """The experiment of a member run by itself."""
     return sweep.experiment_of(member)
 
 
@@ -144,7 +144,7 @@ def _run_alone(sweep: Sweep, member: int) -> MemoryRun:
 
 
 def frequencies_of(result: MemoryRun) -> Kept:
-    """The strongest lines of each signal, and its secular rate; nothing where it can't be analysed."""
+    """The strongest lines of each signal, and its secular rate; empty if it can't be analysed."""
     try:
         found = analyse(result, lines=_LINES)
     except RigidsimError:

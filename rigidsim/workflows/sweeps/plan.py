@@ -1,4 +1,4 @@
-"""What a sweep will cost, and how many of its members are a tile."""
+"""Cost of a sweep, and the number of members per tile."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _LARGEST_TILE = 8192
 _FEW = 64
 _TILES_OF_FEW = 16
 _LARGEST_TILE_BYTES = 64e6
-_BUILD_SECONDS = 0.2  # equations compiled anew for each member that runs by itself
-_BATCH_SECONDS = 2e-5  # what is done for a member of a batch beside its integration
+_BUILD_SECONDS = 0.2  # seconds to compile equations for each member that runs by itself
+_BATCH_SECONDS = 2e-5  # seconds of overhead per member of a batch besides its integration
 _TRIED = 64
-_ESTIMATED = 2.5  # a member of a batch with its estimated errors, over one without
+_ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one without
 
 
 def tile_length(sweep: Sweep) -> int:
-    """Members that are computed and saved at once: some seconds of work."""
+    """Number of members computed and saved at once: some seconds of work."""
     if sweep.table.tile is not None:
         return sweep.table.tile
     if sweep.count <= _FEW:
@@ -46,7 +46,7 @@ def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
 
 
 def _side_by_side(sweep: Sweep) -> bool:
-    """Whether members run in batches, as far as some of them tell."""
+    """Whether members run in batches, judged by some of them."""
     if why_alone(sweep, sweep.table.keep):
         return False
     some = range(0, sweep.count, -(-sweep.count // _TRIED))
@@ -55,7 +55,7 @@ def _side_by_side(sweep: Sweep) -> bool:
 
 
 def _length(sweep: Sweep, seconds: float, size: float) -> int:
-    """Of tiles whose members take so many seconds and bytes each."""
+    """Tile length for members that take so many seconds and bytes each."""
     most = min(_SECONDS_OF_A_TILE / seconds, _LARGEST_TILE_BYTES / size)
     length = 8
     while length < _LARGEST_TILE and 2 * length <= most and 32 * length < sweep.count:
@@ -64,7 +64,7 @@ def _length(sweep: Sweep, seconds: float, size: float) -> int:
 
 
 def bytes_of_member(sweep: Sweep, prepared: InitialValueProblem) -> float:
-    """What the dataset holds of a member, before it is compressed."""
+    """Bytes of a member in the dataset before compression."""
     keep = sweep.table.keep
     variables = [v for v in dataset_variables(prepared) if v.name != "time"]
     recorded = [v for v in variables if "drift_of" not in v.attributes]

@@ -1,4 +1,4 @@
-"""What is told of all members of a sweep together: how they ended, what to know of them, what it took."""
+"""Summary of all members of a sweep: how they ended, warnings, errors, and the cost."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _NOT_ESTIMATED = (
     "attitude_error is nan): rigidsim run CONFIG --member N estimates one, --force runs all of them again"
 )
 _ERRORS = {"attitude": "rad", "position": "m"}
-"""What is estimated of members, and its units."""
+"""Estimated errors of members, and their units."""
 
 
 @dataclass
 class _Counted:
-    """What is told of all members together."""
+    """Counts over all members."""
 
     outcomes: np.ndarray
     warned: np.ndarray
@@ -35,7 +35,7 @@ class _Counted:
 def summary_of(
     wanted: Sweep, sources: Sources, reader: TileReader, found: Gathered, wall: float, cpu: float
 ) -> dict[str, Any]:
-    """What ``summary.json`` says of a sweep that is complete.
+    """Contents of ``summary.json`` for a complete sweep.
 
     Args:
         wall, cpu: seconds of this process.
@@ -131,7 +131,7 @@ def _count(sources: Sources, reader: TileReader) -> _Counted:
 
 
 def _told(errors: np.ndarray, units: str) -> dict[str, Any]:
-    """Of the estimated errors of all members that have one."""
+    """Statistics of the estimated errors of all members that have one."""
     if not len(errors):
         return {"members": 0}
     return {

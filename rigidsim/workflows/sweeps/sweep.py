@@ -30,22 +30,22 @@ from rigidsim.workflows.sweeps.ways import OneProcess, Way
 
 
 class SweepObserver:
-    """Is told how a sweep goes. Does nothing by itself."""
+    """Receives a sweep's progress; the base class does nothing."""
 
     def checking(self, sweep: Sweep) -> None:
-        """Members are about to be worked out, before anything runs."""
+        """Members are about to be checked, before anything runs."""
 
     def started(self, folder: Path, members: int, done: int) -> None:
-        """So many members are to be run, of which so many are there already."""
+        """``members`` are to be run, of which ``done`` are complete already."""
 
     def progressed(self, done: int) -> None:
-        """So many members are there."""
+        """``done`` members are complete."""
 
     def completing(self) -> None:
-        """All are there; the dataset is being written."""
+        """All members are complete; the dataset is being written."""
 
     def nothing_left(self) -> None:
-        """The sweep was complete before."""
+        """The sweep was already complete."""
 
 
 def sweep(
@@ -61,17 +61,17 @@ def sweep(
 ) -> SavedSweep:
     """Run every member of a config's ``[sweep]``, and save them as one dataset in ``out/<name>/``.
 
-    A folder that holds a part of the same sweep is completed; where axes are longer or more is kept than
+    A folder that holds a part of the same sweep is completed; if axes are longer or more is kept than
     before, only what is new is computed.
 
     Args:
         experiment: from ``load`` or ``Experiment.from_dict``, the path of a config, or a dictionary.
-        changes: values to replace, as of ``Experiment.replace``.
-        force: replace whatever run or sweep lies there.
-        workers: processes on this machine.
+        changes: values to replace, as for ``Experiment.replace``.
+        force: replace whatever run or sweep is there.
+        workers: number of processes on this machine.
         scheduler: address of a Dask scheduler whose workers run the members; needs ``rigidsim[cluster]``.
-        tiles: first and stop of a share of the tiles, for one of several processes that share the folder.
-        observer: is told how it goes.
+        tiles: first and stop of the share of tiles computed by this one of several processes on the folder.
+        observer: receives the sweep's progress.
 
     Raises:
         ConfigError: no sweep, or one of its members can't be run; nothing was written.
@@ -92,14 +92,14 @@ _CALL = re.compile(r"\s*(linspace|logspace|step)\s*\((.*)\)\s*")
 
 
 def scanned(experiment: Experiment, scan: Sequence[str]) -> Experiment:
-    """An experiment with axes given beside it.
+    """An experiment with additional sweep axes.
 
     Args:
         scan: ``KEY=SPEC`` texts: a TOML array of values, ``linspace(from, to, count)``, ``logspace(..)``,
             ``step(from, step, count)``, or a TOML table as ``[sweep] axes`` has it.
 
     Raises:
-        ConfigError: one can't be read.
+        ConfigError: a text can't be read.
     """
     settings = []
     for text in scan:
@@ -122,7 +122,7 @@ def resume_sweep(
     """Complete a sweep that was interrupted or killed.
 
     Raises:
-        RunFolderError: no sweep there, or it can't be written.
+        RunFolderError: there is no sweep, or it can't be written.
     """
     folder = open_sweep(path).folder
     generations = folder.generations()
@@ -182,7 +182,7 @@ def run_sweep(
             observer.completing()
             return _completed(wanted, folder, time.perf_counter() - began, time.process_time() - cpu)
     except RunFolderError:
-        if share is not None and folder.at_work:  # others complete it
+        if share is not None and folder.at_work:  # other processes complete it
             return open_sweep(folder.path)
         raise
 
@@ -197,12 +197,12 @@ def _complete(wanted: Sweep, folder: SweepFolder) -> bool:
 
 
 def _known(wanted: Sweep, folder: SweepFolder) -> bool:
-    """Whether it was begun before, which it is after all its members were checked."""
+    """Whether the sweep was begun before, which implies that all its members were checked."""
     return any(g.config_sha256 == wanted.experiment.sha256 for g in folder.generations()[-1:])
 
 
 def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
-    """A folder whose sweep has other members altogether is left alone."""
+    """Refuse a folder whose sweep has different members altogether."""
     for generation in folder.generations()[-1:]:
         then = sweep_of(generation.config)
         if identity(then) != identity(wanted):
@@ -213,7 +213,7 @@ def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
 
 
 def identity(sweep: Sweep) -> str:
-    """What members share: the config without what is swept, and without what no number depends on."""
+    """What members share: the config without swept values and without values that no number depends on."""
     tables = parse_toml(sweep.experiment.text, sweep.experiment.source)
     alone = not tables.get("sweep", {}).get("batch", True)
     for key in ("name", "description", "sweep"):
@@ -228,7 +228,7 @@ def identity(sweep: Sweep) -> str:
 
 
 def _generation(wanted: Sweep, folder: SweepFolder, *, exclusive: bool) -> Generation:
-    """The one that is to be worked on: the latest where it is of this config, else a new one."""
+    """The generation to work on: the latest if it is of this config, otherwise a new one."""
     generations = folder.generations()
     if generations and generations[-1].config_sha256 == wanted.experiment.sha256:
         return generations[-1]
@@ -246,7 +246,7 @@ def _run_tiles(
     share: tuple[int, int] | None,
     observer: SweepObserver,
 ) -> KeyboardInterrupt | None:
-    """Compute the tiles that are missing; returns what interrupted it."""
+    """Compute the missing tiles; returns what interrupted the work, if anything."""
     present = folder.present(generation)
     first, stop = (0, generation.tiles) if share is None else share
     ours = range(max(first, 0), min(stop, generation.tiles))
@@ -265,7 +265,7 @@ def _run_tiles(
 
 
 def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> SavedSweep:
-    """The dataset and the summary, from tiles that are all there."""
+    """Write dataset and summary once all tiles are there."""
     generations = folder.generations()
     sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
     reader = TileReader(folder, generations)

@@ -1,4 +1,4 @@
-"""Is a sweep what its config gives, bit for bit? Some members, drawn at random, run again and compared."""
+"""Verifying a sweep bit for bit: some members, drawn at random, are run again and compared."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ if TYPE_CHECKING:
     import xarray
 
 MEMBERS = 100
-"""Run again where nobody says how many."""
-_HELD = 64e6  # bytes of a variable that are read at once; of larger ones the members are read one by one
+"""Number of members that are run again by default."""
+_HELD = 64e6  # bytes of a variable that are read at once; larger ones are read member by member
 
 
 def verify_sweep(
     path: str | Path, *, members: int = MEMBERS, seed: int | None = None, together: int | None = None
 ) -> Verdict:
-    """Run some members of a sweep again, beside other neighbours than before, and compare all that was kept.
+    """Run some members of a sweep again, in other company than before, and compare everything that was kept.
 
     Args:
         path: folder of a finished sweep.
-        members: how many, at most all of them.
-        seed: of the draw; another each time by default.
-        together: that are run at once; all by default. No bit depends on it.
+        members: number of members, at most all of them.
+        seed: seed of the draw; different each time by default.
+        together: members run at once; all by default. No bit depends on it.
 
     Returns:
-        As of ``verify``; its samples are members.
+        See ``verify``; its samples are members here.
 
     Raises:
-        ConfigError: less than one member is asked for.
-        RunFolderError: no sweep there, one that isn't finished, or whose files are damaged.
+        ConfigError: fewer than one member is asked for.
+        RunFolderError: there is no sweep, it isn't finished, or its files are damaged.
     """
     if members < 1:
         raise ConfigError(Problem("--members", f"given {members}; one or more are allowed"))
@@ -71,7 +71,7 @@ def verify_sweep(
 
 
 def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[str]:
-    """What dataset and summary say of themselves that isn't so."""
+    """False statements of dataset and summary about themselves."""
     problems = []
     if dataset.attrs.get("config_sha256") != sweep.experiment.sha256:
         problems.append(f"{saved.folder.dataset}: embeds another config than its config_sha256 says")
@@ -86,10 +86,10 @@ def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[
 def _differences(
     dataset: xarray.Dataset, sweep: Sweep, members: Sequence[int], again: Kept, held: dict[str, np.ndarray]
 ) -> list[tuple[str, int, float, float]]:
-    """Of each variable the first of some members in which any bit differs: its place, both numbers.
+    """For each variable the first member in which any bit differs: its place, and both numbers.
 
     Args:
-        held: variables that were read before.
+        held: variables that have been read already.
     """
     found = []
     for name, variable in sorted(again.items()):
@@ -112,9 +112,9 @@ def _differences(
 def _saved(
     dataset: xarray.Dataset, name: str, sweep: Sweep, members: Sequence[int], held: dict[str, np.ndarray]
 ) -> np.ndarray:
-    """Values of members, (members, ...)."""
+    """Saved values of members, (members, ...)."""
     variable = dataset[name]
-    if variable.dims[: len(sweep.dims)] != sweep.dims:  # the times that all have
+    if variable.dims[: len(sweep.dims)] != sweep.dims:  # times that all members share
         return np.broadcast_to(variable.values, (len(members), *variable.shape))
     if name not in held and variable.nbytes <= _HELD:
         held[name] = variable.values.reshape(sweep.count, *variable.shape[len(sweep.dims) :])
@@ -126,7 +126,7 @@ def _saved(
 
 
 def _environment(then: dict[str, Any]) -> list[str]:
-    """Versions and the processor, where they aren't those of the sweep."""
+    """Versions and processor features that differ from those of the sweep."""
     now = {f"version_{name}": version for name, version in provenance.versions().items()}
     now["cpu_model"] = provenance.cpu_model()
     changed = {name: value for name, value in now.items() if then.get(name) not in (None, value)}

@@ -1,4 +1,4 @@
-"""Ways to compute tiles: here, in other processes, or on a cluster."""
+"""Ways to compute tiles: in this process, in others, or on a cluster."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from rigidsim.workflows.sweeps.members import tile_image
 
 
 class Way(Protocol):
-    """Computes tiles; no bit of them depends on which way it is."""
+    """Computes tiles; no bit depends on which way is used."""
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
-        """Numbers and sealed files of tiles, in whatever order they come.
+        """Numbers and sealed files of tiles, in any order.
 
         Raises:
-            KeyboardInterrupt: it was interrupted.
-            RigidsimError: no more of them can be computed.
+            KeyboardInterrupt: the work was interrupted.
+            RigidsimError: no more tiles can be computed.
         """
 
 
 class OneProcess:
-    """In this process, one after the other."""
+    """Computes tiles in this process, one after the other."""
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
         """See ``Way``."""
@@ -31,6 +31,6 @@ class OneProcess:
 
 
 def task(generation: Generation, tile: int) -> tuple[str, list[int], tuple[str, ...]]:
-    """What ``tile_image`` takes."""
+    """Arguments of ``tile_image`` for a tile."""
     work, _ = generation.work_of(tile)
     return generation.config, generation.members_of(tile).tolist(), work.keep

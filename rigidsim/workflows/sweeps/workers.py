@@ -1,8 +1,8 @@
-"""Tiles computed by several processes of this machine; a worker that dies costs the tile that it was at.
+"""Tiles computed by several processes of this machine; a worker that dies costs only the tile it worked on.
 
-Workers leave tiles in files and send back no more than their sizes. A process that is killed while it writes
-a long answer into the pipe of a ``ProcessPoolExecutor`` leaves half of it there, for whose other half the
-pool waits for ever; what fits one write (``PIPE_BUF``, at least 512 bytes) arrives whole or not at all.
+Workers leave tiles in files and send back only their sizes. A process that is killed while it writes
+a long answer into the pipe of a ``ProcessPoolExecutor`` leaves half of it there, and the pool waits for the
+rest for ever; what fits one write (``PIPE_BUF``, at least 512 bytes) arrives whole or not at all.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from rigidsim.workflows.sweeps.members import tile_image
 from rigidsim.workflows.sweeps.ways import task
 
 _MOST_DEATHS = 5
-"""Workers that may die while a tile is in work; all tiles in work are blamed for each."""
+"""Deaths of workers after which a tile is given up; each counts against all tiles in work."""
 _WATCH_SECONDS = 1.0
 
 
 class Workers:
-    """Processes that compute tiles; this one saves them.
+    """Worker processes that compute tiles, which this process saves.
 
     Args:
-        count: of processes.
+        count: number of processes.
     """
 
     def __init__(self, count: int) -> None:
@@ -45,7 +45,7 @@ class Workers:
         """See ``Way``.
 
         Raises:
-            StoppedError: workers die again and again at the same tile.
+            StoppedError: workers die repeatedly at the same tile.
         """
         with tempfile.TemporaryDirectory(prefix="rigidsim-tiles-") as between:
             yield from self._images(generation, tiles, Path(between))
@@ -60,8 +60,8 @@ class Workers:
             running: dict[Future[int], int] = {}
             try:
                 while waiting or running:
-                    while waiting and len(running) < 2 * self._count:  # one ahead for each
-                        tile = waiting[-1]  # waits on where the pool broke a moment ago and takes no more
+                    while waiting and len(running) < 2 * self._count:  # one task ahead for each worker
+                        tile = waiting[-1]  # keeps waiting if the pool broke just now and takes no more
                         file = between / str(tile)
                         running[pool.submit(leave_tile, file, *task(generation, tile))] = tile
                         waiting.pop()
@@ -92,7 +92,7 @@ class Workers:
 
 
 def leave_tile(file: Path, *of: Any) -> int:
-    """Compute a tile (see ``tile_image``) and leave it in a file; its size in bytes."""
+    """Compute a tile (see ``tile_image``) and leave it in a file; returns its size in bytes."""
     return file.write_bytes(tile_image(*of))
 
 
@@ -101,10 +101,10 @@ def _processes(pool: ProcessPoolExecutor) -> list[Any]:
 
 
 def _refuse_dead(pool: ProcessPoolExecutor) -> None:
-    """The pool looks for deaths among the workers that it had when it last looked up; this one among all.
+    """Raise if any worker has died; the pool itself watches only the workers it had when it last looked.
 
     Raises:
-        BrokenProcessPool: one has ended.
+        BrokenProcessPool: a worker has ended.
     """
     if not all(process.is_alive() for process in _processes(pool)):
         raise BrokenProcessPool("a worker died")
@@ -121,7 +121,7 @@ def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
 
 
 def _end(pool: ProcessPoolExecutor) -> None:
-    """Nobody waits for what is in work."""
+    """End the workers at once; their results are no longer needed."""
     processes = _processes(pool)
     pool.shutdown(wait=False, cancel_futures=True)
     for process in processes:
@@ -131,13 +131,15 @@ def _end(pool: ProcessPoolExecutor) -> None:
 
 
 def _begin_worker(parent: int, between: Path) -> None:
-    """Ctrl-C is for the process that started the workers, and they end with it, however it does."""
+    """Initialize a worker: ignore Ctrl-C, which is for the parent, and end when the parent ends, however it
+    does.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(_WATCH_SECONDS)
-        shutil.rmtree(between, ignore_errors=True)  # it was killed, and can't do so itself
+        shutil.rmtree(between, ignore_errors=True)  # a parent that was killed can't do this itself
         os._exit(1)
 
     threading.Thread(target=watch, name="rigidsim watch", daemon=True).start()
