@@ -1,4 +1,4 @@
-"""From states at sample times to the recorded variables, compiled and in the run's own precision."""
+"""Evaluation of recorded variables from states at sample times, compiled and in the run's own precision."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from rigidsim.solve.turns.joined import JoinedAngles
 _GROUP = 64  # rows; a multiple of every SIMD width
 
 RecordedParts = dict[str, list[np.ndarray]]
-"""By variable: float64 parts (n, components), whose sum is the value in SI (``Precision.parts``)."""
+"""Float64 parts (n, components) by variable, whose sum is the value in SI (``Precision.parts``)."""
 
 
 def evaluate_rows(
@@ -53,7 +53,7 @@ def evaluate_rows(
     padded = -(-count // group) * group
     if padded > count:
         states = np.concatenate([states, np.repeat(states[-1:], padded - count, axis=0)])
-    # compiled code for expressions without parameters refuses an array of them
+    # compiled expressions without parameters don't accept an array of them
     arguments = {}
     if times is not None and getattr(function, "is_time_dependent", False):
         moments = np.asarray(times, dtype=states.dtype)
@@ -67,7 +67,7 @@ def evaluate_rows(
 
 
 class _PartnerChart:
-    """Recorded variables of samples whose states are of the partner sequence."""
+    """Recorded variables of samples whose states are those of the partner sequence."""
 
     def __init__(
         self,
@@ -88,11 +88,11 @@ class _PartnerChart:
         self._sizes = compiled(sizes) if sizes else None
 
     def singular_factors(self, states: np.ndarray) -> np.ndarray:
-        """Of the partner chart, (n,)."""
+        """Singular factors of the partner chart, (n,)."""
         return np.asarray(evaluate_rows(self._singular, states)[0])
 
     def sizes(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Squared, of the angles' sines and cosines, (angles that have one, n)."""
+        """Squared sizes of the angles' sines and cosines, (angles that have one, n)."""
         assert self._sizes is not None
         return evaluate_rows(self._sizes, states, times=times)
 
@@ -104,11 +104,11 @@ class _PartnerChart:
         initial: np.ndarray,
         wrapping: AngleWrapping,
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """All outputs (outputs, n), and the recorded Euler angles of the asked sequence (n, 3), if any.
+        """All outputs (outputs, n), and the recorded Euler angles of the requested sequence (n, 3), if any.
 
         Args:
-            states, times, reference: as of ``SampleBlock``.
-            initial: invariants' components.
+            states, times, reference: as in ``SampleBlock``.
+            initial: initial values of the invariants' components.
         """
         if self._angles is None:
             return evaluate_rows(self._outputs, states, initial if len(initial) else None, times), None
@@ -140,12 +140,12 @@ class Evaluator:
 
     Attributes:
         initial: initial values of the invariants' components, in internal units.
-        continuity: to the next block.
-        sparse: whether there are angles that are followed, since the samples are too sparse to tell turns.
+        continuity: what joins the next block to the last.
+        sparse: whether angles are followed along the motion, since the samples are too sparse to tell turns.
         dense: whether the samples tell the turns of all angles.
 
     Args:
-        countable: whether the motion between such samples can be followed.
+        countable: whether the motion between sparse samples can be followed.
     """
 
     def __init__(
@@ -171,10 +171,10 @@ class Evaluator:
         self._singular = None if factor is None else self._compile([factor])
 
     def singular_factors(self, states: np.ndarray, chart: np.ndarray) -> np.ndarray | None:
-        """What vanishes in the singularity of the chart in use, (n,); None in formulations without one.
+        """Factors that vanish in the singularity of the chart in use, (n,); None in formulations without one.
 
         Args:
-            states, chart: as of ``SampleBlock``.
+            states, chart: as in ``SampleBlock``.
         """
         if self._singular is None:
             return None
@@ -186,7 +186,7 @@ class Evaluator:
 
     @cached_property
     def _partner(self) -> _PartnerChart:
-        """Compiled when there are samples in the partner chart."""
+        """The partner chart's evaluation, compiled once samples in that chart occur."""
         return interruptible(lambda: _PartnerChart(self._system, self._compile, self._precision))
 
     def _compile(self, expressions: list[hy.expression]) -> CompiledFunction:
@@ -198,10 +198,10 @@ class Evaluator:
         )
 
     def evaluate(self, block: SampleBlock) -> RecordedParts:
-        """All variables of a block, which follows the one evaluated before.
+        """All variables of a block, which must follow the block evaluated before.
 
         Returns:
-            The recorded variables, and of each invariant its drift, (n, 1), one part.
+            The recorded variables, and for each invariant its drift, (n, 1), in one part.
         """
         assert self._outputs is not None
         initial = self.initial if self._parameters else None
@@ -237,8 +237,11 @@ class Evaluator:
         return result
 
     def evaluate_apart(self, block: SampleBlock) -> RecordedParts:
-        """As ``evaluate``, for states that aren't among the samples: nothing is joined to them later, and
-        angles that aren't states are within one turn, since what lies between two of them isn't known.
+        """All variables at states that aren't among the samples.
+
+        Nothing is joined to them later, and angles that aren't states are within one turn, since the motion
+        between
+        two of them isn't known.
         """
         before = copy.deepcopy(self.continuity)
         self.continuity.wrapped_from = -math.inf
@@ -261,7 +264,7 @@ class Evaluator:
         return block
 
     def _turned(self, values: np.ndarray, block: SampleBlock) -> np.ndarray:
-        """The angles that are joined, with their turns, (n, angles)."""
+        """The joined angles with their turns, (n, angles)."""
         sizes = None
         if self._angles.sizes is not None:
             sizes = self._sizes(block)
@@ -292,10 +295,10 @@ class Evaluator:
         return block
 
     def follow(self, time: float) -> None:
-        """Count turns from the latest sample on as far as the run has come, for a fifth of a second at most.
+        """Count turns from the latest sample up to where the run is, for at most a fifth of a second.
 
         Args:
-            time: internal units.
+            time: time that the run has reached, internal units.
         """
         self._angles.follow(self.continuity, time)
 

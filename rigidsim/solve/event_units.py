@@ -18,17 +18,17 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function
 
 STATES = 64
-TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the run
-_WORTH_A_UNIT = 1  # bits above one; what is smaller loosens nothing
+TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)  # as fractions of the run
+_WORTH_A_UNIT = 1  # bits above one; a smaller excess loosens nothing
 
 
 def of_order_one(
     system: System, expressions: Sequence[hy.expression], meant: Sequence[hy.expression]
 ) -> list[hy.expression]:
-    """Expressions as the engine is to see them: their zeros are the same.
+    """Expressions scaled for the engine by powers of two; their zeros are unchanged.
 
     Args:
-        expressions: of the states, the time and parameters.
+        expressions: expressions of the states, the time and parameters.
         meant: the same without the small offsets that keep them off a zero.
     """
     if not expressions:
@@ -40,7 +40,7 @@ def of_order_one(
 
 
 def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
-    """Binary exponents of the largest values, over the run's time and states of order one; from 0."""
+    """Binary exponents, at least 0, of the largest values over the run's time and states of order one."""
     scene, scaling = system.scene, system.scaling
     start, end = (math.ldexp(float(t), -scaling.time) for t in (scene.start, scene.samples.last))
     random = np.random.default_rng(0)
@@ -49,7 +49,7 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     compiled: Any = compiled_function(expressions, system.variables, compact_mode=True)
     parameters = random.uniform(-1.0, 1.0, (STATES, compiled.nparams))
     sides = len(system.surfaces)
-    parameters[:, sides : sides + len(system.turning)] *= end - start  # full turns, of rates of order one
+    parameters[:, sides : sides + len(system.turning)] *= end - start  # full turns, for rates of order one
     largest = np.zeros(len(expressions))
     for part in TIMES:
         values = _evaluated(compiled, states, parameters, start + part * (end - start))
@@ -58,7 +58,7 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
 
 
 def exponents_of(largest: np.ndarray) -> np.ndarray:
-    """Binary exponents of the units, of largest values."""
+    """Binary exponents of the units for given largest values."""
     exponents = np.frexp(largest)[1]
     return np.where(exponents > _WORTH_A_UNIT, exponents, 0)
 

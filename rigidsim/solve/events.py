@@ -1,8 +1,8 @@
-"""Crossings found along the way: their times and states in the run's own precision.
+"""Event crossings along the motion: their times and states in the run's own precision.
 
-heyoka finds them on the dense output of each step. Their expressions take part in its choice of steps, so
-that a run with events differs from one without by rounding. A step that is taken back takes its crossings
-with it.
+heyoka finds them on the dense output of each step. Their expressions affect its choice of steps, so
+that a run with events differs from one without by rounding. A step that is taken back removes its crossings
+too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from rigidsim.solve.sample_block import SampleBlock
 
 MOST_EVENTS = 1_000_000
 BESIDE = 60
-"""Bits below a rounding of one, of what takes an expression off a zero that a step begins at."""
+"""Size of the offset that moves an expression off a zero at a step's beginning, in bits below a rounding of
+one.
+"""
 DIRECTIONS = {
     0: hy.event_direction.any,
     1: hy.event_direction.positive,
@@ -35,12 +37,12 @@ DIRECTIONS = {
 
 @dataclass(frozen=True)
 class FoundEvent:
-    """One crossing.
+    """One crossing of an event.
 
     Attributes:
-        index: of the event among the system's.
+        index: index of the event among the system's.
         time, state: internal units, in the run's precision; the state is of shape (states,).
-        angles: what the angle states stood for at the beginning of the step that it lies in.
+        angles: what the angle states stood for at the beginning of the step that contains it.
     """
 
     index: int
@@ -51,14 +53,14 @@ class FoundEvent:
 
 @dataclass
 class EventLog:
-    """All crossings so far, in the order of time.
+    """All crossings so far, in order of time.
 
     Attributes:
-        stops: for each of the system's events whether it ends the run.
-        wrapping: knows what the angle states stand for; None where there are none.
+        stops: for each of the system's events, whether it ends the run.
+        wrapping: knows what the angle states stand for; None if there are none.
         stop: time of the first crossing that ends the run, or None.
-        quiet_until: crossings up to this time are known already; None where there are none.
-        muted: whether a step is taken again whose crossings are known already.
+        quiet_until: time up to which crossings are already known; None if there are none.
+        muted: whether a step is being repeated whose crossings are already known.
     """
 
     stops: list[bool] = field(default_factory=list)
@@ -69,7 +71,7 @@ class EventLog:
     muted: bool = False
 
     def note(self, index: int, time: Scalar, state: np.ndarray) -> None:
-        """Take a crossing from the engine.
+        """Record a crossing found by the engine.
 
         Raises:
             StoppedError: there are too many.
@@ -96,7 +98,7 @@ class EventLog:
         """Forget all but the first ``count``.
 
         Raises:
-            ValueError: they are fewer.
+            ValueError: there are fewer.
         """
         if count > len(self.found):
             raise ValueError(f"{len(self.found)} events are known, not {count}")
@@ -104,7 +106,7 @@ class EventLog:
         self._find_stop()
 
     def drop_after(self, count: int, limit: Scalar) -> None:
-        """Forget those past a time, but none of the first ``count``."""
+        """Forget crossings after a time, but none of the first ``count``."""
         self.found[count:] = [f for f in self.found[count:] if f.time <= limit]
         self._find_stop()
 
@@ -113,7 +115,7 @@ class EventLog:
 
 
 def samples_at(found: Sequence[FoundEvent], precision: Precision) -> SampleBlock:
-    """Crossings, at least one, as samples that can be evaluated."""
+    """At least one crossing, as samples that can be evaluated."""
     n = len(found)
     return SampleBlock(
         first=0,
@@ -140,8 +142,8 @@ def engine_events(
     So an expression that is zero at the start has far less than a rounding added.
 
     Args:
-        start: of the motion; None where it may begin at a zero anywhere.
-        offsets: number of the first of the parameters to be added to their expressions, one to each.
+        start: start of the motion; None if it may begin at a zero anywhere.
+        offsets: index of the first of the parameters that are added to the expressions, one each.
     """
 
     def callback(index: int) -> Callable[[TaylorEngine, Scalar, int], None]:
@@ -165,7 +167,7 @@ def engine_events(
 
 
 def _zero_at(system: System, start: Scalar) -> list[bool]:
-    """Which events' expressions are zero at the start, as double precision tells."""
+    """Which events' expressions vanish at the start, in double precision."""
     expressions = [c.expression for c in system.crossings]
     compiled = compiled_function(expressions, system.variables, compact_mode=True)
     values = compiled(np.array([float(x) for x in system.initial]), time=float(start))

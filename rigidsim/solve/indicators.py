@@ -1,4 +1,4 @@
-"""Indicators of chaos, from how much a small displacement has grown at a run's samples.
+"""Indicators of chaos, from the growth of a small displacement at a run's samples.
 
 With d(t) the length of a tangent vector over its initial one and g = ln d (observable ``tangent_growth``),
 
@@ -24,7 +24,8 @@ import numpy as np
 
 
 class Indicators(NamedTuple):
-    """Of some motions, each (members,); those of a motion whose growth was lost are of the time before.
+    """Indicators of some motions, each (members,); those of a motion whose growth was lost refer to the time
+    before.
 
     Attributes:
         megno: mean of Y over time.
@@ -40,14 +41,14 @@ class Indicators(NamedTuple):
 
 
 def indicators(times: np.ndarray, growth: np.ndarray) -> Indicators:
-    """Indicators of motions.
+    """Chaos indicators of motions.
 
     Args:
         times: seconds, ascending from the start, (samples,), or (samples, members).
         growth: ``tangent_growth`` at these times, (samples, members); NaN once it was lost.
 
     Returns:
-        Values of zeros at the start, where nothing has grown yet, and NaN for motions without a finite one.
+        Zeros for motions at their start, where nothing has grown yet; NaN for motions without a finite value.
     """
     since = np.broadcast_to(
         (times - times[:1]) if times.ndim == 2 else (times - times[0])[:, None], growth.shape

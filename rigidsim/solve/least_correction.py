@@ -1,4 +1,4 @@
-"""The least change of a state that takes some residuals off, as expressions."""
+"""The least change of a state that removes given residuals, as expressions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigidsim.solve.precision import Scalar
 def least_correction(
     gradients: list[list[Symbolic]], wanted: list[Symbolic], damping: Scalar
 ) -> list[Symbolic]:
-    """J^T (J J^T + damping)^-1 r: the least change of the state that takes r off the residuals.
+    """Least change of the state that removes r from the residuals, J^T (J J^T + damping)^-1 r.
 
     Args:
         gradients: J, one row for each residual, of order one.

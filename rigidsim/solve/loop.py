@@ -1,4 +1,4 @@
-"""The loop that takes a system from where it stands to its last sample."""
+"""The integration loop, which takes a system from its present state to its last sample."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _CAREFUL = 2**20  # steps at once
 class IntegrationLoop:
     """Drives an integration through the samples (a ``Sampler``).
 
-    Each round takes either a chunk of steps or a block of samples within the steps taken last, so that guards
-    and Ctrl-C are heeded however many samples lie in a step. Where a run ends, its steps are told from the
+    Each round takes either a chunk of steps or a block of samples within the last steps, so that guards
+    and Ctrl-C are heeded however many samples lie in a step. Where a run ends, its steps follow from the
     samples and the motion alone, never from the chunk that happened to hold them.
 
     Args:
-        receiver: receives finished samples in order, and may name the last that it wants.
-        check: asked in each round, at least every tenth of a second or after each single step.
-        start: where to go on; None begins.
-        most_steps: natural steps, counted from the run's beginning, that are never exceeded.
+        receiver: receives finished samples in order, and may name the last one that it wants.
+        check: called in each round, at least every tenth of a second or after each single step.
+        start: where to continue; None starts at the beginning.
+        most_steps: limit of natural steps, counted from the run's beginning, that is never exceeded.
     """
 
     def __init__(
@@ -67,21 +67,21 @@ class IntegrationLoop:
         self._account()
 
     def position(self) -> Position:
-        """Where to go on after the samples that were handed over.
+        """Where to continue after the samples that were handed over.
 
         After the last sample this is the start of the step that holds it: a later end has samples in there.
         """
         return Position(self.buffer.boundary or self._here(), self.buffer.handed)
 
     def _here(self) -> StepBoundary:
-        """Where to go on after the samples that were found."""
+        """Where to continue after the samples that were found."""
         return self._before or (self._reach.boundary if self._reach else self.corrected.boundary())
 
     def run(self) -> Progress:
-        """Go on until the last sample is recorded or something ends the run."""
+        """Continue until the last sample is recorded or something ends the run."""
         self.progress.last_good = self.corrected.boundary()
         if self.buffer.complete:
-            if self.check(self.progress) is Status.MAX_DRIFT:  # which a sample of an earlier session passed
+            if self.check(self.progress) is Status.MAX_DRIFT:  # passed by a sample of an earlier session
                 return self._ended(Status.MAX_DRIFT)
             self._settle(self.progress.last_good, self.last)
             return self._ended(Status.FINISHED)
@@ -100,7 +100,7 @@ class IntegrationLoop:
                 return self.progress
 
     def _interruptible_round(self) -> Status | None:
-        """A round is taken back where Ctrl-C ends it, as it may while another chart is compiled."""
+        """One round, taken back if Ctrl-C ends it, as it may while another chart is being compiled."""
         boundary, found = self._here(), self.buffer.count
         try:
             return self._round(boundary)
@@ -115,7 +115,9 @@ class IntegrationLoop:
             return stop
 
     def _round(self, boundary: StepBoundary) -> Status | None:
-        """A chunk of steps, or a block of samples within those taken; the status that ends the run here."""
+        """Take a chunk of steps, or a block of samples within those taken; returns the status if the run ends
+        here.
+        """
         log, finite = self.stepper.log, True
         if self._reach is not None:
             started = time.perf_counter()
@@ -136,15 +138,15 @@ class IntegrationLoop:
         return None
 
     def _out_of_steps(self) -> Status | None:
-        """Samples within the last step that is allowed are still taken."""
+        """MAX_STEPS once no further step is allowed; samples within the last one are still taken."""
         return Status.MAX_STEPS if self._reach is None and self._allowed(1) == 0 else None
 
     def _allowed(self, count: int) -> int:
-        """So many steps, or as many as the guard leaves of them."""
+        """The given number of steps, or as many as the step limit still allows."""
         return count if self._most_steps is None else min(count, self._most_steps - self.stepper.steps)
 
     def _look_ahead(self) -> None:
-        """Learn how long a step is and how long it takes, by one that is taken back."""
+        """Measure the length and the duration of a step by one that is taken back."""
         boundary = self.corrected.boundary()
         started = time.perf_counter()
         self.stepper.step()
@@ -161,9 +163,11 @@ class IntegrationLoop:
         return self.progress
 
     def _hand_over(self, *, patiently: bool = False) -> bool:
-        """Hand over what is collected; False where the receiver ended the run with one of the samples, or
-        Ctrl-C did while something that samples need was compiled: those not taken are left to the next
-        session.
+        """Hand over what is collected; False if the receiver ended the run at one of the samples.
+
+        Also False if Ctrl-C came while something that samples need was being compiled; samples not taken are
+        left to the
+        next session.
         """
         try:
             refused = self.buffer.hand_over(patiently=patiently)
@@ -187,7 +191,7 @@ class IntegrationLoop:
         self.progress.time = float(np.ldexp(float(self.stepper.time), self.clock.exponent))
 
     def _advance(self) -> bool:
-        """One chunk of steps; False where the state stopped being finite."""
+        """Take one chunk of steps; False if the state stopped being finite."""
         started, before = time.perf_counter(), self.stepper.steps
         way, count = self.ways.choose(self.buffer.count, self.buffer.upcoming)
         count = self._allowed(count)
@@ -204,7 +208,7 @@ class IntegrationLoop:
     # --- the four ways ----------------------------------------------------------------------------------
 
     def _skip(self, count: int) -> bool:
-        """Many steps towards a sample; if they went past it, back and again, nearer."""
+        """Take many steps towards a sample; if they pass it, go back and repeat with fewer."""
         boundary = self.corrected.boundary()
         if not self.corrected.skip(count) or self.stepper.unresolved:
             return self._lost(boundary, count)
@@ -217,7 +221,7 @@ class IntegrationLoop:
         return True
 
     def _grid(self, count: int) -> bool:
-        """Whole strides from a whole time on, and the samples within them."""
+        """Take whole strides from a whole time on, and the samples within them."""
         most = 2 * self._pacing.grid_rows
         while count > 0:
             boundary = self.corrected.boundary()
@@ -247,7 +251,7 @@ class IntegrationLoop:
         return True
 
     def _block(self, count: int) -> bool:
-        """Steps with continuous output, not past the next corrections."""
+        """Take steps with continuous output, not past the next correction."""
         boundary = self.corrected.boundary()
         finite, output = self.stepper.block(count)
         if not finite or self.stepper.unresolved:
@@ -257,7 +261,7 @@ class IntegrationLoop:
         return True
 
     def _step_by_step(self, count: int) -> bool:
-        """Single steps up to the first that reaches a sample, and on while each reaches one."""
+        """Take single steps up to the first that reaches a sample, and on as long as each reaches one."""
         upcoming, boundary, tried = self.buffer.upcoming, self.corrected.boundary(), 0
         for _ in range(count):
             tried += 1
@@ -300,12 +304,12 @@ class IntegrationLoop:
         self.buffer.take(self.corrected.samples(self.buffer.count, times, states), boundary)
 
     def _reached(self, reach: Reach) -> None:
-        """Take samples within steps just taken, as many as may wait; those beyond are for later rounds."""
+        """Take samples within steps just taken, as many as may wait; the rest is left to later rounds."""
         self._reach = reach
         self._take_reached()
 
     def _take_reached(self) -> None:
-        """The next of them."""
+        """Take the next of the samples within steps already taken."""
         assert self._reach is not None
         stop, room = self.stepper.log.stop, self.buffer.room
         limit = self.stepper.time if stop is None else min(self.stepper.time, stop)
@@ -318,7 +322,7 @@ class IntegrationLoop:
             self._none_left(self._reach.boundary)
 
     def _none_left(self, boundary: StepBoundary) -> None:
-        """All samples within steps just taken, from a boundary on, are taken: corrections, or the end."""
+        """Continue after all samples within the last steps are taken: with corrections, or with the end."""
         self._reach = None
         if self.buffer.complete:
             self._settle(boundary, self.last)
@@ -326,15 +330,15 @@ class IntegrationLoop:
             self.corrected.correct()
 
     def _settle(self, boundary: StepBoundary, moment: Scalar) -> None:
-        """Back to a boundary before a moment and on to the first one at or past it, which is where every way
+        """Go back to a boundary before a moment, then on to the first boundary at or past it, where every way
         ends.
         """
         self._before = self.corrected.arrive(boundary, moment)
         self._account()
 
     def _lost(self, boundary: StepBoundary, tried: int) -> bool:
-        """After a failure somewhere in many steps, or steps too small to be taken at once: back, and on in
-        fewer at a time up to the last state that is finite; False where a single step fails.
+        """After a failure among many steps, or steps too small to be taken at once, go back and continue with
+        fewer at a time up to the last finite state; False if a single step fails.
         """
         self.progress.detail = self.stepper.failure if tried == 1 else ""
         self.corrected.back_to(boundary)

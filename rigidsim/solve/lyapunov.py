@@ -4,9 +4,9 @@ The tangent vectors of all states are integrated along with the motion and ortho
 the logarithms of their lengths add up to the exponents. In double precision, whatever the run's: exponents
 are known to their statistical error at best.
 
-The spectrum is that of the body's motion. States that a scene carries beside it have no tangent vectors:
+The spectrum is that of the body's motion. Other states that a scene carries have no tangent vectors:
 neither those that only feed on the motion (the work of the loads, the pace of narrow functions), nor those
-that drive it without feeling it (the place on an orbit), which stand for an explicit dependence on time.
+that drive it without feeling it (the position on an orbit), which stand for an explicit dependence on time.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from rigidsim.solve.building import interruptible
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth
 _CHUNK, _MOST_CHUNKS = 4096, 256  # steps between two looks at Ctrl-C, and such chunks in an interval
-_MOST_ROWS = 1000  # of the convergence that is kept
+_MOST_ROWS = 1000  # rows of the convergence that are kept
 
 
 @dataclass(frozen=True)
 class LyapunovSpectrum:
-    """Estimates as they converge.
+    """Lyapunov exponents as they converge.
 
     Attributes:
-        times: since the run's start, seconds, shape (rows,).
+        times: times since the run's start, s, shape (rows,).
         exponents: 1/s, largest first, shape (rows, states of the motion).
-        states: names of those.
+        states: names of the motion's states.
     """
 
     times: np.ndarray
@@ -50,15 +50,17 @@ class LyapunovSpectrum:
 
     @property
     def spread(self) -> float:
-        """How far the largest one moved over the second half of the run: a sign of its convergence, 1/s."""
+        """Change of the largest exponent over the second half of the run, 1/s: a measure of its
+        convergence.
+        """
         later = self.exponents[len(self.times) // 2 :, 0]
         return float(later.max() - later.min())
 
     def chaotic(self, rate: float) -> bool:
-        """Whether offsets grew far more than a stable motion's linear growth lets them.
+        """Whether offsets grew far more than linearly, which is all that a stable motion allows.
 
         Args:
-            rate: of the motion, rad/s.
+            rate: angular rate of the motion, rad/s.
         """
         duration = float(self.times[-1])
         regular = math.log1p(rate * duration)
@@ -67,13 +69,13 @@ class LyapunovSpectrum:
 
 @dataclass
 class Convergence:
-    """How far a spectrum is: plain float64 arrays, all that is needed to resume with the same bits.
+    """Progress of a spectrum: plain float64 arrays with everything needed to resume with the same bits.
 
     Attributes:
-        number: intervals done.
-        state: of the system and the motion's tangent vectors, orthogonalised; empty at the start.
-        sums: logarithms of lengths so far, in the order of the vectors.
-        times, exponents: estimates kept so far.
+        number: number of intervals done.
+        state: state of the system and the orthogonalised tangent vectors; empty at the start.
+        sums: sums of the logarithms of lengths, in the order of the vectors.
+        times, exponents: estimates so far.
     """
 
     number: int = 0
@@ -83,7 +85,7 @@ class Convergence:
     exponents: list[np.ndarray] = field(default_factory=list)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """For a file."""
+        """The arrays to be saved."""
         return {
             "number": np.array([self.number], dtype=np.int64),
             "state": self.state,
@@ -94,7 +96,7 @@ class Convergence:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Convergence:
-        """What was put into a file; an empty array isn't there."""
+        """The progress saved as arrays; empty arrays may be missing."""
         return cls(
             int(arrays["number"][0]),
             arrays["state"],
@@ -114,13 +116,13 @@ def lyapunov_spectrum(
     """Integrate the variational equations over a run.
 
     Args:
-        system: built for double precision.
+        system: a system built for double precision.
         start, end: internal units.
-        go_on: is told how far it is at each orthogonalisation; False ends it.
-        done: to go on from; the same bits as in one go.
+        go_on: called with the progress at each orthogonalisation; False ends the integration.
+        done: earlier progress to continue from, with the same bits as in one go.
 
     Returns:
-        The spectrum; None where it was ended early, the tangent vectors stopped being finite, or steps became
+        The spectrum; None if it was ended early, the tangent vectors stopped being finite, or steps became
         so small that an interval takes millions.
     """
     moving = motion_states(system)
@@ -130,7 +132,7 @@ def lyapunov_spectrum(
     integrator = interruptible(lambda: hy.taylor_adaptive(equations, initial, time=start, compact_mode=True))
     intervals = max(1, math.ceil((end - start) / _INTERVAL))
     stride = max(1, math.ceil(intervals / _MOST_ROWS))
-    if done is None or done.state.shape != (len(initial),):  # none, or one of another version
+    if done is None or done.state.shape != (len(initial),):  # none, or from another version
         done = Convergence(sums=np.zeros(count))
     if done.number:
         integrator.time = start + (end - start) * done.number / intervals
@@ -159,7 +161,7 @@ def lyapunov_spectrum(
 
 
 def motion_states(system: System) -> list[int]:
-    """Positions of the states whose offsets are offsets of the motion (``rigidsim.model.tangents``)."""
+    """Indices of the states whose offsets are offsets of the motion (``rigidsim.model.tangents``)."""
     reads = {
         name: set(hy.get_variables(right))
         for name, (_, right) in zip(system.states, system.equations, strict=True)
@@ -170,7 +172,9 @@ def motion_states(system: System) -> list[int]:
 
 def tangent_equations(system: System, moving: Sequence[int]) -> list[tuple[Symbolic, Symbolic]]:
     """The system's equations, then those of the derivatives of moving states by their initial values, row by
-    row. All other states are integrated without: the step control must see what they see.
+    row.
+
+    All other states are integrated without tangent vectors, so that step control sees the same states.
     """
     chosen = [system.variables[i] for i in moving]
     varied = hy.var_ode_sys(system.equations, chosen).sys

@@ -1,6 +1,6 @@
-"""The four ways through the samples, and which of them costs least for the next chunk of steps.
+"""The four ways through the samples, and the choice of the cheapest for the next chunk of steps.
 
-All ways give the same bits (``rigidsim.solve.stepper``), so that whatever is chosen here changes cost alone.
+All give the same bits (``rigidsim.solve.stepper``), so that whatever is chosen here changes cost alone.
 Each earns its place. CPU seconds of the loop without one way, over those with all four, by steps per sample
 (free asymmetric body, two shared cores, best of three):
 
@@ -39,18 +39,18 @@ class SampleWay(Enum):
 
 @dataclass(frozen=True)
 class Pacing:
-    """What the choice goes by; a user waits for Ctrl-C no longer than for a chunk and what is handed over.
+    """Parameters of the choice; a user waits for Ctrl-C no longer than for a chunk and its hand-over.
 
     Attributes:
-        chunk_seconds: between two looks at guards and Ctrl-C; well below the half second that a user waits.
+        chunk_seconds: time between checks of guards and Ctrl-C; well below the half second that a user waits.
         patience: seconds until samples of a slow run are handed over.
         rows_at_once: samples in a block that is evaluated; more are no faster, and take memory.
-        wide_rows_at_once: likewise of a closed form beyond double, where a row takes about a millisecond.
+        wide_rows_at_once: the same for a closed form beyond double, where a row takes about a millisecond.
         rows_waiting: samples in memory before they are evaluated, however fast they come; no more than are
             evaluated in the time of a chunk.
         grid_rows: most samples in a stride, which can't be shortened, for it to be taken as a grid; bounds
             the memory, about 8 MB in double precision.
-        grid_strides: per sample, up to which grids (20 us each) cost less than skipping to each (85 us).
+        grid_strides: strides per sample up to which grids (20 us each) cost less than skips (85 us).
         least_grid_steps: fewer are cheaper one by one.
         block_steps: most steps in a block.
         block_spacing: steps per sample up to which blocks (1 ms each, and 0.8 us a step) cost less than
@@ -58,8 +58,8 @@ class Pacing:
         least_block_steps: fewer are cheaper one by one.
         look_ahead: samples over which their spacing is measured.
         skip_from: steps to a sample from which skipping costs less than single steps.
-        skip_margin: of the predicted steps to the next sample that are skipped at once.
-        fading: of the longest step of late, per chunk.
+        skip_margin: share of the predicted steps to the next sample that are skipped at once.
+        fading: factor per chunk by which the longest recent step fades.
     """
 
     chunk_seconds: float = 0.05
@@ -80,14 +80,14 @@ class Pacing:
 
 
 MEASURED = Pacing()
-"""The defaults, which are those that cost least where they were measured."""
+"""The defaults, which cost least where they were measured."""
 
 
 class WayFinder:
-    """Chooses the way of each chunk from the steps of late.
+    """Chooses the way for each chunk from the recent steps.
 
     Attributes:
-        longest: step of late, internal units; 0 before the first.
+        longest: longest recent step, internal units; 0 before the first.
     """
 
     def __init__(
@@ -102,27 +102,28 @@ class WayFinder:
         self.longest = 0.0
 
     def measured(self, way: SampleWay, steps: int, seconds: float) -> None:
-        """So many steps took so long; single ones are to be measured before anything is chosen."""
+        """Learn the duration of so many steps; single steps are measured before anything is chosen."""
         self._paces[way] = max(steps, 1) / max(seconds, 1e-9)
 
     def _most(self, way: SampleWay) -> int:
-        """Steps in a chunk."""
+        """Number of steps in a chunk."""
         pace = self._paces.get(way, self._paces[SampleWay.STEP])
         return max(1, int(pace * self._pacing.chunk_seconds))
 
     def went_past(self) -> None:
-        """A skip went past the sample: steps are longer than they seemed."""
+        """Note that a skip passed its sample: steps are longer than they seemed."""
         self.longest = 1.5 * max(self.longest, self._corrected.stepper.largest)
 
     def choose(self, following: int, upcoming: Scalar) -> tuple[SampleWay, int]:
-        """How to go on, and for how many steps at most. The last sample alone is skipped to: what a grid goes
-        past it is taken once more.
+        """How to continue, and for how many steps at most.
+
+        The last sample is only ever skipped to, since what a grid goes past it would be taken once more.
 
         Args:
             following, upcoming: index and time of the next sample.
         """
         corrected, pacing, stepper = self._corrected, self._pacing, self._corrected.stepper
-        # steps of a tumbling body vary a lot: predict with the longest of late, which fades slowly
+        # steps of a tumbling body vary a lot: predict with the longest recent one, which fades slowly
         self.longest = size = max(stepper.largest, pacing.fading * self.longest)
         if size <= 0 or stepper.single_steps:
             return SampleWay.STEP, self._most(SampleWay.STEP)
@@ -133,12 +134,12 @@ class WayFinder:
             if self._suits_grids(spacing) and following < self._clock.count - 1:
                 if stepper.at_whole_time and left >= pacing.least_grid_steps:
                     return SampleWay.GRID, self._grid_steps(left)
-                limit = corrected.left  # to where a grid can start
+                limit = corrected.left  # steps to where a grid can start
             if spacing <= pacing.block_spacing:
                 if min(left, corrected.left) >= pacing.least_block_steps:
                     wanted = max(1, int(pacing.rows_at_once * spacing), pacing.least_block_steps)
                     return SampleWay.BLOCK, min(pacing.block_steps, wanted, corrected.left, left)
-                limit = corrected.left  # to where a block is worth it again
+                limit = corrected.left  # steps to where a block is worth it again
         expected = (float(upcoming) - float(stepper.time)) / size
         if expected > pacing.skip_from:
             steps = min(pacing.skip_margin * expected - 2, self._most(SampleWay.SKIP), limit)
@@ -158,10 +159,12 @@ class WayFinder:
         return self._corrected.whole_times and fits and spacing <= pacing.grid_strides * stride
 
     def _grid_steps(self, left: int) -> int:
-        """Whole strides, or all that is left and more: what a grid leaves over would go step by step."""
+        """Whole strides, or all remaining steps and more, since the remainder of a grid would go step by
+        step.
+        """
         stride = self._corrected.stride
         most = self._most(SampleWay.GRID)
-        if 2 * most >= stride:  # what a part of a stride leaves over goes step by step
+        if 2 * most >= stride:  # the rest of a stride goes step by step
             most = max(most, stride)
         count = min(most, left + left // 2 + self._pacing.least_grid_steps)
         return count - count % stride if count > stride else count

@@ -1,4 +1,4 @@
-"""The precisions: heyoka's scalar types, exact conversion into and out of them, and what they cost.
+"""Working precisions: heyoka's scalar types, exact conversion into and out of them, and what they cost.
 
 | name | type | bits | epsilon |
 | --- | --- | --- | --- |
@@ -41,7 +41,7 @@ class Precision:
 
     Attributes:
         name: as in the config ("double", or "50 digits").
-        bits: of the significand.
+        bits: bits of the significand.
         scalar: heyoka's ``fp_type`` and the arrays' dtype.
         cheap: whether a step costs about as much as a Python call (then blocks of steps are taken at once).
         compact: whether the integrator is compiled in compact mode (unrolled code of the widest types takes
@@ -95,7 +95,7 @@ class Precision:
         return -total if sign else total
 
     def of_double(self, value: float) -> Scalar:
-        """The scalar of a double's value, or nearest to it where that is narrower; zero without a sign."""
+        """The scalar of a double's value, or the nearest one in a narrower type; zero without a sign."""
         return self._scalar(value + 0.0)
 
     def _scalar(self, value: float) -> Scalar:
@@ -115,7 +115,7 @@ class Precision:
 
     @property
     def part_count(self) -> int:
-        """How many float64 numbers hold one of this precision exactly."""
+        """Number of float64 that hold one number of this precision exactly."""
         return max(1, -(-self.bits // 53))
 
     def parts(self, values: np.ndarray, lead: np.ndarray | None = None) -> list[np.ndarray]:
@@ -125,7 +125,7 @@ class Precision:
         stand in the first part alone.
 
         Args:
-            lead: the first part, where values halfway between two doubles are known to lie nearer to one.
+            lead: the first part, if values halfway between two doubles are known to lie nearer to one.
         """
         if self.bits <= 53:
             return [values.astype(np.float64) if lead is None else lead]

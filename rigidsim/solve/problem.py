@@ -1,4 +1,4 @@
-"""From an experiment to everything that its integration needs, with all that can be refused refused."""
+"""From an experiment to everything its integration needs; whatever can't be run is refused here."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
 DRIFT_FACTOR = 50.0
 """A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
-steps add up like a random walk (Brouwer 1937), with a few roundings per step."""
+steps add up like a random walk (Brouwer 1937), with a few roundings per step.
+"""
 
 _SPARE_ORDER = 0.9
 _AUTO_BITS = 3
@@ -40,21 +41,22 @@ t, and that of rounding like t^0.5. The order is rounded up from 1 - ln(toleranc
 eq. 11): from 19.02 to 20 in double precision, which cuts off a seventh of epsilon and shows no bias to 1e7
 rad; from 8.97 to 9 in single and from 22.83 to 23 in 80 bits, which cut off nearly all of it: mean energy
 errors of 9 standard errors over 1e5 rad, and growth like t^0.6. Where less than this part of an order is
-gained by rounding up, "auto" is this many bits below epsilon: another order, at least."""
+gained by rounding up, "auto" is this many bits below epsilon: another order, at least.
+"""
 
 _BITS_OF_AVERAGES = 53, 10
-"""Precisions from so many bits on have a looser tolerance for averaged motions, by so many bits."""
+"""Precisions of at least so many bits use a tolerance looser by so many bits for averaged motions."""
 
 
 @dataclass(frozen=True)
 class InitialValueProblem:
-    """A scene with its equations, before the first step.
+    """A scene with its equations, ready to be integrated.
 
     Attributes:
-        tolerance: scalar of the precision, or None for its epsilon; "auto" is either of these.
-        python_loads: loads given from Python, of which the config knows nothing.
-        holds_late: whether invariants are projected from a count of steps on.
-        closed: the solution in closed form, where the samples are to come from it.
+        tolerance: scalar of the precision, or None for its epsilon; "auto" becomes one of these.
+        python_loads: loads given from Python, unknown to the config.
+        holds_late: whether invariants are projected only after a number of steps.
+        closed: the closed-form solution, if the samples are to come from it.
     """
 
     experiment: Experiment
@@ -74,25 +76,23 @@ class InitialValueProblem:
 
     @cached_property
     def projected_scalars(self) -> tuple[str, ...]:
-        """The invariant that each projected scalar belongs to; none where invariants aren't projected."""
+        """The invariant that each projected scalar belongs to; empty if invariants aren't projected."""
         projected = projected_invariants(self.system)[0] if self.holds_invariants else []
         return tuple(h.name for h in projected)
 
     @property
     def effective_tolerance(self) -> float:
-        """What the step control works with."""
+        """Tolerance that the step control works with."""
         epsilon = float(self.precision.epsilon)
         return epsilon if self.tolerance is None else float(self.tolerance)
 
     @property
     def law_tolerance(self) -> float:
-        """What the laws of errors start from: a tolerance below the precision's epsilon makes no error
-        smaller.
-        """
+        """Tolerance that error laws start from: one below the precision's epsilon makes no error smaller."""
         return max(self.effective_tolerance, float(self.precision.epsilon))
 
     def drift_bound(self, steps: int | np.ndarray) -> np.ndarray:
-        """Relative drift of an invariant that rounding alone explains, after so many steps; any shape."""
+        """Relative drift of an invariant that rounding alone explains after so many steps; any shape."""
         return DRIFT_FACTOR * self.law_tolerance * np.sqrt(np.maximum(steps, 1))
 
 
@@ -100,7 +100,7 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
     """Work out an experiment up to its equations.
 
     Args:
-        loads: loads of one's own, beside those of the config.
+        loads: your own loads, besides those of the config.
 
     Raises:
         ConfigError: with what was given, what is allowed and where.
@@ -118,10 +118,10 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
 def prepare_scene(
     experiment: Experiment, scene: Scene, *, loads: Sequence[Load] = (), tolerance: float | None = None
 ) -> InitialValueProblem:
-    """As ``prepare``, for a scene that differs from the experiment's own.
+    """Like ``prepare``, for a scene that differs from the experiment's own.
 
     Args:
-        tolerance: in place of the config's.
+        tolerance: tolerance in place of the config's.
 
     Raises:
         ConfigError: with what was given, what is allowed and where.
@@ -174,8 +174,8 @@ def prepare_scene(
 
 
 def _is_worth_holding(system: System) -> bool:
-    """Whether ``hold_invariants = "auto"`` means anything: not where nothing physical is conserved, nor where
-    steps end on switching surfaces, nor with equations that are made for loose tolerances.
+    """Whether ``hold_invariants = "auto"`` has any effect: not if nothing physical is conserved, nor if steps
+    end on switching surfaces, nor with equations made for loose tolerances.
     """
     if system.plan.average is not None:  # whose norm is no invariant that its rate would depend on
         return False
@@ -185,25 +185,28 @@ def _is_worth_holding(system: System) -> bool:
 
 
 def auto_tolerance(epsilon: float) -> float:
-    """What ``tolerance = "auto"`` stands for in a precision of this epsilon."""
+    """The tolerance that ``tolerance = "auto"`` means in a precision of this epsilon."""
     return math.ldexp(epsilon, -_auto_bits(epsilon))
 
 
 def _auto_bits(epsilon: float) -> int:
-    """By which "auto" is below epsilon."""
+    """Bits by which "auto" is below epsilon."""
     needed = 1 - math.log(epsilon) / 2
     return 0 if math.ceil(needed) - needed >= _SPARE_ORDER else _AUTO_BITS
 
 
 def _auto(precision: Precision) -> Scalar | None:
-    """None for the epsilon itself."""
+    """The tolerance for "auto"; None for the epsilon itself."""
     bits = _auto_bits(float(precision.epsilon))
     return precision.number(mpmath.ldexp(precision.epsilon, -bits)) if bits else None
 
 
 def _auto_of_averages(precision: Precision) -> Scalar | None:
-    """What is averaged away is far above the epsilon of double precision, and a step moves the direction by
-    1e-6 rad at most: some bits less make steps cheaper by half.
+    """The tolerance for "auto" of an averaged motion.
+
+    The terms averaged away are far above double precision's epsilon, and a step moves the direction by at
+    most 1e-6
+    rad: some bits less make steps cheaper by half.
     """
     if precision.bits < _BITS_OF_AVERAGES[0]:
         return _auto(precision)
@@ -211,7 +214,7 @@ def _auto_of_averages(precision: Precision) -> Scalar | None:
 
 
 def _check_tolerance(tolerance: Scalar | None, precision: Precision) -> None:
-    """Refuse what would cost ever higher orders and gain nothing.
+    """Refuse a tolerance that would cost ever higher orders and gain nothing.
 
     Raises:
         ConfigError: a tolerance further below the precision's epsilon than that is below 1.
@@ -232,10 +235,10 @@ def _check_tolerance(tolerance: Scalar | None, precision: Precision) -> None:
 
 
 def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | None:
-    """The solution in closed form where ``method`` asks for it.
+    """The closed-form solution if ``method`` asks for it.
 
     Raises:
-        ConfigError: the scene has none, or something is asked for that only steps can give.
+        ConfigError: the scene has none, or something requested needs steps.
     """
     integrator = scene.config.integrator
     if integrator.method != "closed_form":
@@ -259,7 +262,8 @@ def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | 
 
 
 def _refuse_spectrum(system: System) -> None:
-    """Tangent vectors jump where a motion switches sides, which variational equations don't know.
+    """Refuse a Lyapunov spectrum if the motion switches sides, where tangent vectors jump unknown to the
+    variational equations.
 
     Raises:
         ConfigError: Lyapunov exponents are asked for of such a motion.
@@ -274,7 +278,8 @@ def _refuse_spectrum(system: System) -> None:
 
 
 def _refuse_spectrum_by_table(system: System) -> None:
-    """States of an orbit by a table are set at its rows, which variational equations don't know.
+    """Refuse a Lyapunov spectrum with a tabulated orbit, whose states are reset at its rows unknown to the
+    variational equations.
 
     Raises:
         ConfigError: Lyapunov exponents are asked for of such a motion.
@@ -295,7 +300,7 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     """
     outputs = [right for _, right in system.equations]
     sides = {}
-    if system.switches:  # whichever side it is on
+    if system.switches:  # on whichever side
         outputs.append(hy.par[system.parameters - 1])
         sides["pars"] = precision.array([mpmath.mpf(1)] * system.parameters)
     elif system.pieces is not None:

@@ -1,8 +1,8 @@
-"""Invariants projected onto their initial values every few natural steps: beyond the round-off law.
+"""Projection of invariants onto their initial values every few natural steps, which beats the round-off law.
 
 Attitude errors grow like t^1.5 because round-off lets energy and momentum wander, and the motion's
 frequencies with them (Brouwer 1937). Where these are projected back, only round-off along the motion itself
-remains. Three things make that work to the last bit:
+remains. Three measures make this work to the last bit:
 
 - Residuals are evaluated one precision higher, against initial values known to as many digits.
 - The least correction of the state (Gauss-Newton, in the scaled states, where every component is of order
@@ -16,7 +16,7 @@ remains. Three things make that work to the last bit:
   the time since the last. It is taken at places all over the motion, so that its mean is right.
 
 Where gradients are nearly parallel (spin about a principal axis) the ill-determined direction is left to
-itself, by a damping of the size of what the residuals' own rounding would do there.
+itself, by a damping as large as the effect of the residuals' own rounding there.
 """
 
 from __future__ import annotations
@@ -38,21 +38,25 @@ from rigidsim.solve.precision import Precision, Scalar, precision_of
 LATE = 8192
 """Natural steps after which ``hold_invariants = "auto"`` begins to project: some milliseconds of double
 precision, in which errors of rounding are still small; what they did to the phase is known, and taken back. A
-fixed count: a run that is prolonged past it is the run in one go."""
+fixed count: a run that is prolonged past it is the run in one go.
+"""
 
 NOTED = 1024
 """Natural steps from one state that is noted before ``LATE`` to the next. What they say of the invariants is
-worked out when projection begins, so that a shorter run compiles nothing for it."""
+worked out when projection begins, so that a shorter run compiles nothing for it.
+"""
 
 STEPS_BETWEEN = 128
 """Natural steps from one correction to the next, fixed so that bits depend on no clock. Errors grow in
 proportion to it and cost falls: at 128 steps of double precision a correction (7 us) costs a twentieth of
-them, and errors at 1e6 radians are some 5e-13 rad (with 64: 3e-13, a tenth; with 16: 1e-13, a half)."""
+them, and errors at 1e6 radians are some 5e-13 rad (with 64: 3e-13, a tenth; with 16: 1e-13, a half).
+"""
 
 LATE_BETWEEN = 512
 """The same for ``hold_invariants = "auto"``, whose errors have their share from before it began: for bodies
 (3, 1, 2) and (1, 2, 3) at 1e6 units of time 1.4e-12 and 4.5e-12 rad (with 256: 3.2e-12 and 2.0e-12, with
-1024: 6.2e-12 and 1.1e-11; 3.8e-8 and 2.5e-8 without), for a quarter of the corrections."""
+1024: 6.2e-12 and 1.1e-11; 3.8e-8 and 2.5e-8 without), for a quarter of the corrections.
+"""
 
 _STEPS_BETWEEN_IN_SINGLE = 256  # whose steps cost a quarter as much
 
@@ -68,7 +72,7 @@ def steps_between(precision: Precision, *, late: bool = False) -> int:
     return _STEPS_BETWEEN_IN_SINGLE if precision.scalar is np.float32 else STEPS_BETWEEN
 
 
-_LARGEST = 2.0**-6  # of a correction; past it the state is no longer near the motion
+_LARGEST = 2.0**-6  # largest correction; past it the state is no longer near the motion
 
 
 def one_higher(precision: Precision) -> Precision:
@@ -81,11 +85,11 @@ def one_higher(precision: Precision) -> Precision:
 
 
 def put_back_by_invariant(names: Sequence[str], rows: np.ndarray) -> dict[str, np.ndarray]:
-    """What was put back, by invariant: of a scalar with its sign, of several components the norm, as the
+    """Corrections put back by invariant: with their sign for a scalar, the norm for several components, as
     drifts are recorded.
 
     Args:
-        names: of the invariant that each projected scalar belongs to.
+        names: name of the invariant that each projected scalar belongs to.
         rows: (n, projected scalars), as ``Projection.corrections``.
 
     Returns:
@@ -105,13 +109,13 @@ def _norm(columns: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def projected_system(system: System, precision: Precision) -> System:
-    """The system to integrate where invariants are projected: its coefficients are in two parts."""
+    """The system to integrate if invariants are projected, with coefficients in two parts."""
     number = in_two_parts(precision.number, precision.exact, precision.bits, system.scene.context)
     return system.with_coefficients(number)
 
 
 class Projection:
-    """Puts the invariants of one system back.
+    """Puts the invariants of one system back to their initial values.
 
     Attributes:
         names: the invariant that each projected scalar belongs to.
@@ -148,8 +152,8 @@ class Projection:
             self._then[:] = self.residuals(precision.array(system.initial))
 
     def _prepare(self) -> None:
-        """Compile what evaluates the invariants at the start, and set the rest up once: a correction is a
-        call of 7 us.
+        """Compile the evaluation of the initial invariants and set up the rest once; a correction is a call
+        of 7 us.
         """
         self._wide = wide = self._system.rounded(self._high.number)
         projected, _ = projected_invariants(wide)
@@ -165,11 +169,11 @@ class Projection:
 
     @property
     def holding(self) -> bool:
-        """Whether it corrects, or looks on."""
+        """Whether it corrects, or only notes states."""
         return not self.late or self._times[3] == 1.0
 
     def note(self, state: np.ndarray, time: Scalar, number: int) -> None:
-        """Note a state before anything is corrected.
+        """Note a state before projection begins.
 
         Args:
             number: from 0 on, below ``LATE // NOTED``.
@@ -179,9 +183,9 @@ class Projection:
         row[2:] = np.concatenate(self._low.parts(state))
 
     def begin(self, state: np.ndarray, time: Scalar) -> None:
-        """Correct a state for the first time, in place, and from now on.
+        """Correct a state in place for the first time, and from now on.
 
-        The integral of the residuals until now is that over the states noted: it moved the phase.
+        The integral of the residuals so far, which moved the phase, is taken over the noted states.
         """
         chart, integrals = self._chart, self._sums[: len(self.names)]
         self.use(0)
@@ -202,11 +206,11 @@ class Projection:
         self._times[3] = 1.0
 
     def use(self, chart: int) -> None:
-        """Correct in the states of the system (0) or of its partner (1) from now on."""
+        """Correct from now on in the states of the system (0) or of its partner (1)."""
         self._chart = chart
 
     def load(self) -> None:
-        """Compile what corrects in the states in use, unless that is done."""
+        """Compile the correction for the states in use, unless that is done."""
         if self._loaded == self._chart:
             return
         if not self._functions:
@@ -256,19 +260,19 @@ class Projection:
         return self._residuals_of(self._widened(state))
 
     def _residuals_of(self, state: np.ndarray) -> np.ndarray:
-        """The same of a state in the higher precision."""
+        """Residuals of a state given in the higher precision."""
         return np.asarray(self._residuals(state)).astype(np.float64)
 
     @property
     def corrections(self) -> np.ndarray:
-        """What was put back so far, (scalars,), relative to the drifts' scales: what each drift would
-        have been, to first order.
+        """Corrections put back so far, (scalars,), relative to the drifts' scales: the drifts that would have
+        been, to first order.
         """
         return self._sums[len(self.names) :].copy()
 
     @property
     def skipped(self) -> int:
-        """How many corrections were left out since they were not small."""
+        """Number of corrections left out because they were not small."""
         return int(self._times[2])
 
     # --- arithmetic -------------------------------------------------------------------------------------
@@ -293,7 +297,7 @@ class Projection:
         return total
 
     def _narrowed(self, change: np.ndarray) -> np.ndarray:
-        """Corrections, float64 until here (250 digits are the most, 1e-250 is well in range), in the working
+        """Corrections, float64 so far (at most 250 digits, for which 1e-250 is well in range), in the working
         precision.
         """
         low = self._low

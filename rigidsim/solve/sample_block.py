@@ -1,4 +1,4 @@
-"""A block of samples on its way from the integration to whoever keeps it: one value with named columns."""
+"""A block of samples on its way from the integration to its receiver: one value with named columns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class SampleBlock:
     """Consecutive samples; all columns have one row for each.
 
     Attributes:
-        first: index of the first.
+        first: index of the first sample.
         times: (n,), internal units, in the run's precision.
         states: (n, states), internal units, in the run's precision, angles wrapped.
         turns: (n, 3) int64, full turns of the angle states; (n, 0) without angle states.
@@ -45,12 +45,12 @@ class SampleBlock:
         put_back: np.ndarray = _NOTHING,
         reference: np.ndarray | None = None,
     ) -> SampleBlock:
-        """Samples between which the turns, the chart and what was put back don't change.
+        """Samples between which turns, chart and corrections don't change.
 
         Args:
-            angles: of all of them.
-            put_back: (projected scalars,), likewise; not copied.
-            reference: one row for each sample; None where it doesn't change either.
+            angles: angle state of all samples.
+            put_back: (projected scalars,), corrections for all samples; not copied.
+            reference: one row for each sample; None if it doesn't change either.
         """
         n = len(times)
         turns = np.array([angles.turns], dtype=np.int64)
@@ -79,7 +79,7 @@ class SampleBlock:
 
     @staticmethod
     def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
-        """One block of several that follow one another, at least one."""
+        """Join at least one block with those that follow it."""
         if len(blocks) == 1:
             return blocks[0]
         columns = zip(*(block._columns for block in blocks), strict=True)

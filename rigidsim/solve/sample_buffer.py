@@ -1,4 +1,4 @@
-"""Samples found by the integration, on their way to whoever keeps them."""
+"""Buffer of samples between the integration and their receiver."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 
 _FEWEST_ROWS = 8  # that may wait: some tens of milliseconds at 250 digits
-_GROWTH = 4  # of the rows that may wait, from one hand-over to the next
+_GROWTH = 4  # largest growth of the waiting rows from one hand-over to the next
 _FIRST_ROWS = 16  # looked at for those before a limit, at least
 
 
 class SampleBuffer:
-    """Collects samples and hands them over in blocks of bounded size and, as far as was seen, duration.
+    """Collects samples and hands them over in blocks of bounded size and, as far as is known, duration.
 
     Attributes:
         handed: samples handed over so far.
@@ -38,21 +38,21 @@ class SampleBuffer:
         self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
         self._upcoming: tuple[int, Scalar] | None = None
-        self._found = 0  # before the limit last asked for: the next asks for about as many
+        self._found = 0  # found before the last limit: the next call expects about as many
 
     @property
     def complete(self) -> bool:
-        """Whether all samples are found."""
+        """Whether all samples have been found."""
         return self.count >= self._clock.count
 
     @property
     def room(self) -> int:
-        """How many more may be found before those that wait are handed over."""
+        """Number of samples that may still be found before the waiting ones are handed over."""
         return self._most - (self.count - self.handed)
 
     @property
     def full(self) -> bool:
-        """Whether so many wait that they are to be handed over before more are found."""
+        """Whether the waiting samples must be handed over before more are found."""
         return self.room <= 0
 
     @property
@@ -63,7 +63,7 @@ class SampleBuffer:
         return self._upcoming[1]
 
     def until(self, limit: Scalar, most: int) -> np.ndarray:
-        """Times of the next samples that lie at or before ``limit``, at most so many."""
+        """Times of the next samples at or before ``limit``, at most ``most``."""
         pieces = []
         position = first = self.count
         rows = min(max(_FIRST_ROWS, self._found + self._found // 8), self._pacing.rows_at_once)
@@ -80,14 +80,14 @@ class SampleBuffer:
         return np.concatenate(pieces) if pieces else self._clock.internal(0, 0)
 
     def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
-        """The next samples, and a step boundary before them."""
+        """Take the next samples, with a step boundary before them."""
         if len(block):
             self._blocks.append(block)
             self._boundaries.append(boundary)
             self.count += len(block)
 
     def back_to(self, count: int) -> None:
-        """Forget what was found since so many samples were known."""
+        """Forget all samples found since there were ``count``."""
         while self._blocks and self._blocks[-1].first >= count:
             self._blocks.pop()
             self._boundaries.pop()
@@ -95,26 +95,26 @@ class SampleBuffer:
 
     @property
     def boundary(self) -> StepBoundary | None:
-        """A step boundary before the first sample that waits; None where none does."""
+        """A step boundary before the first waiting sample; None if none waits."""
         return self._boundaries[0] if self._boundaries else None
 
     @property
     def whole(self) -> bool:
-        """Whether so many are handed over that the receiver saves them at the least cost."""
+        """Whether as many have been handed over as the receiver saves at the least cost."""
         return self.handed % self._receiver.rows_together == 0
 
     def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
-        """Give what is collected to the receiver.
+        """Hand what is collected to the receiver.
 
         Args:
-            patiently: only where it is much, or old; of much as many samples as make it ``whole``.
+            patiently: only if it is much or old; if much, just the samples that make it ``whole``.
 
         Returns:
-            Where the receiver wants no sample past one of them: its index and a boundary before it; the
+            If the receiver wants no sample past one of them: its index and a boundary before it; the
             others are dropped.
 
         Raises:
-            KeyboardInterrupt: from the receiver; what it didn't take goes on waiting.
+            KeyboardInterrupt: from the receiver; samples that it didn't take keep waiting.
         """
         waiting, rows = self.count - self.handed, self._pacing.rows_at_once
         waited = time.perf_counter() - self._handed_at
@@ -145,8 +145,8 @@ class SampleBuffer:
         return None
 
     def _waiting_until(self, stop: int) -> tuple[SampleBlock, dict[int, StepBoundary]]:
-        """Take out the samples before one of those that wait; with them, by its first sample, a boundary
-        before each piece that they were found in.
+        """Take out the waiting samples before ``stop``, and for each piece in which they were found a
+        boundary before it, by the piece's first sample.
         """
         firsts = [block.first for block in self._blocks]
         pieces = bisect_left(firsts, stop)
@@ -160,8 +160,10 @@ class SampleBuffer:
         return SampleBlock.joined(blocks), dict(zip(firsts, boundaries, strict=False))
 
     def took(self, work: str, rows: int, seconds: float) -> None:
-        """Learn how many samples may wait: as many as each work on them gets done in the time of a chunk."""
-        if rows < _FEWEST_ROWS:  # they tell little of the cost of a row
+        """Adapt how many samples may wait to what each kind of work on them gets done in the time of a
+        chunk.
+        """
+        if rows < _FEWEST_ROWS:  # they tell little about the cost of a row
             return
         pacing = self._pacing
         self._affordable[work] = int(rows * pacing.chunk_seconds / max(seconds, 1e-9))
@@ -170,5 +172,5 @@ class SampleBuffer:
 
 
 def _before(sample: int, boundaries: dict[int, StepBoundary]) -> StepBoundary:
-    """The boundary before the piece that a sample was found in."""
+    """The boundary before the piece in which a sample was found."""
     return boundaries[max(first for first in boundaries if first <= sample)]

@@ -1,4 +1,4 @@
-"""What takes a run through its samples, seen from outside: its progress, its checks and its receiver."""
+"""Interfaces of whatever takes a run through its samples: progress, checks and receiver."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from rigidsim.solve.status import Status
 
 @dataclass
 class Progress:
-    """How far a run is; the one mutable record of it.
+    """Progress of a run; its one mutable record.
 
     Attributes:
-        samples: their number.
+        samples: total number of samples.
         next_sample: index of the first sample that isn't handed over yet.
         steps: natural steps taken.
-        time: where the integration stands, seconds.
-        smallest_step, largest_step: of the natural steps so far, internal units.
-        redone_steps: taken back since they went past a sample.
+        time: time that the integration has reached, s.
+        smallest_step, largest_step: extremes of the natural steps so far, internal units.
+        redone_steps: steps taken back because they went past a sample.
         integration_seconds: wall time in the engine, without recording.
-        last_good: a step boundary whose state is finite, for a run that broke down.
-        detail: why it did, where more is known.
+        last_good: last step boundary with a finite state, for a run that broke down.
+        detail: why it broke down, if more is known.
     """
 
     samples: int
@@ -44,24 +44,24 @@ class Progress:
 
     @property
     def fraction(self) -> float:
-        """Of the samples that are recorded."""
+        """Fraction of the samples that are recorded."""
         return self.next_sample / self.samples
 
 
 Check = Callable[[Progress], Status | None]
-"""Looks at guards and interruptions between chunks; a status ends the run."""
+"""Checks guards and interruptions between chunks; a status ends the run."""
 
 
 States = Callable[[np.ndarray], np.ndarray]
-"""From sample times (n,) to states (n, states), both in internal units."""
+"""Function from sample times (n,) to states (n, states), both in internal units."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Steps just taken, whose samples are still to be taken: in one step there can be any number of them.
+    """Steps just taken whose samples are still to be taken: one step can hold any number of them.
 
     Attributes:
-        boundary: before the steps.
+        boundary: boundary before the steps.
         states: their dense output.
     """
 
@@ -70,35 +70,35 @@ class Reach:
 
 
 class SampleReceiver(Protocol):
-    """Takes samples in order, and is told when what it took can be saved; by itself it is never due.
+    """Receives samples in order, and is told when they can be saved; the base class never asks for that.
 
     Attributes:
-        last_wanted: index of a sample that ends the run by the guard ``max_drift``; those after it were left.
-        rows_together: samples are saved at the least cost after a multiple of so many.
+        last_wanted: index of a sample that ends the run by the guard ``max_drift``; later ones weren't taken.
+        rows_together: samples are saved at the least cost in multiples of so many.
     """
 
     last_wanted: int | None = None
     rows_together: int = 1
 
     def take(self, block: SampleBlock) -> None:
-        """The samples that follow those taken before."""
+        """Take the samples that follow those taken before."""
 
     def due(self) -> bool:
         """Whether it is time to save."""
         return False
 
     def save(self, position: Position) -> None:
-        """Save everything taken so far, and where to resume."""
+        """Save everything taken so far, and the position to resume from."""
         return None
 
 
 class Sampler(Protocol):
-    """Takes a run from where it stands to its last sample (``rigidsim.solve.assembly.sampler``)."""
+    """Takes a run from its present state to its last sample (``rigidsim.solve.assembly.sampler``)."""
 
     progress: Progress
 
     def run(self) -> Progress:
-        """Go on until the last sample is handed over, or a check or the motion itself ends the run."""
+        """Continue until the last sample is handed over, or a check or the motion itself ends the run."""
 
     def position(self) -> Position:
-        """Where to go on, at a moment when every sample found was handed over."""
+        """Position to continue from, at a moment when every sample found was handed over."""

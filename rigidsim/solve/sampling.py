@@ -1,4 +1,4 @@
-"""Sample times: each the number that the config means, rounded once, never by adding up.
+"""Sample times: each is the number that the config means, rounded once, never a running sum.
 
 Sample i of a grid lies at the rational number (a + i b) / d, with whole a, b and d. Where these fit the
 significand, one division of two exact numbers is the nearest number to it, and a block of samples costs three
@@ -30,12 +30,12 @@ class SampleClock:
     """Times of the samples, block by block.
 
     Attributes:
-        start: of the motion, a scalar of the precision: a list of times may begin later.
-        part_count: how many float64 numbers hold a label with what it is off the time of the integration.
+        start: start of the motion, a scalar of the precision; a list of times may begin later.
+        part_count: number of float64 that hold a label together with its residual to the integration's time.
 
     Args:
-        samples: where they lie.
-        precision: of the run.
+        samples: the sample times.
+        precision: the run's precision.
         exponent: binary exponent of the internal unit of time.
 
     Raises:
@@ -67,11 +67,11 @@ class SampleClock:
         return self.internal(index, index + 1)[0]
 
     def label(self, index: int) -> float:
-        """One sample's time in seconds, as the dataset's coordinate has it."""
+        """One sample's time in seconds, as in the dataset's coordinate."""
         return float(self.labels(index, index + 1)[0])
 
     def seconds(self, time: Scalar) -> float:
-        """A time in internal units as the nearest double, seconds."""
+        """The double nearest to a time in internal units, s."""
         alone = np.array([time], dtype=self._precision.scalar)
         return float(np.ldexp(self._precision.parts(alone)[0][0], self.exponent))
 
@@ -80,11 +80,11 @@ class SampleClock:
         return self._seconds(first, stop, self._double)
 
     def parts(self, first: int, times: np.ndarray) -> list[np.ndarray]:
-        """Labels of samples from ``first`` on, s, and their residuals: the sum, smallest first, is exactly
+        """Labels of samples from ``first`` on (s) and their residuals, whose sum, smallest first, is exactly
         the time of the integration.
 
         Args:
-            times: of these samples, as of ``internal``.
+            times: times of these samples, as from ``internal``.
         """
         exact = times / self._per_second
         if self._precision.bits == 53:
@@ -95,7 +95,7 @@ class SampleClock:
         return parts
 
     def _seconds(self, first: int, stop: int, precision: Precision) -> np.ndarray:
-        """The number of a precision that is nearest to each time, s."""
+        """The number of a precision nearest to each time, s."""
         if precision.bits < 53:
             return self._narrowed(self._seconds(first, stop, self._double), first, precision)
         if self._samples.times is None:
@@ -111,15 +111,17 @@ class SampleClock:
         )
 
     def _exact_numbers(self, precision: Precision) -> tuple[Scalar, Scalar, Scalar] | None:
-        """a, b and d; None where one of them doesn't fit the significand."""
+        """The numbers a, b and d; None if one of them doesn't fit the significand."""
         a, b, d = self._first, self._step, self._divisor
         if max(abs(a), b, d) > 2**precision.bits:
             return None
         return _nearest(a, 1, precision), _nearest(b, 1, precision), _nearest(d, 1, precision)
 
     def _summed(self, first: int, stop: int, precision: Precision) -> np.ndarray:
-        """As ``_seconds``, of at most ``_BLOCK`` samples of a grid: the first, and multiples of the step."""
-        spare = _BLOCK.bit_length()  # bits of a number that its products with an index take
+        """Like ``_seconds``, for at most ``_BLOCK`` samples of a grid: the first one plus multiples of the
+        step.
+        """
+        spare = _BLOCK.bit_length()  # bits that products with an index take
         base, base_rest = _in_two(Fraction(self._numerator(first), self._divisor), precision)
         step, step_rest = _in_two(Fraction(self._step, self._divisor), precision, spare)
         index = precision.indices(0, stop - first)
@@ -133,9 +135,9 @@ class SampleClock:
         return times
 
     def _narrowed(self, doubles: np.ndarray, first: int, precision: Precision) -> np.ndarray:
-        """From doubles that are nearest to numbers to the narrower ones that are."""
+        """The narrower numbers nearest to exact values, from the doubles nearest to them."""
         times = doubles.astype(precision.scalar)
-        # rounded twice is rounded once but where the first ends halfway between two narrow numbers
+        # rounding twice equals rounding once unless the first result lies halfway between two narrow numbers
         halfway = np.uint64(1) << np.uint64(52 - precision.bits)
         beyond = doubles.view(np.uint64) & (2 * halfway - np.uint64(1))
         for i in np.flatnonzero(beyond == halfway):
@@ -153,7 +155,9 @@ class SampleClock:
             yield from ((self._numerator(i), self._divisor) for i in range(first, stop))
 
     def _refuse_coinciding(self, samples: SampleTimes) -> None:
-        """The spacing is resolved worst at the time of largest size."""
+        """Refuse samples that coincide in this precision; the spacing is resolved worst at the time of
+        largest size.
+        """
         candidates = {0, max(0, self.count - 2)}
         if samples.times is not None:
             candidates = set(range(self.count - 1))
@@ -173,7 +177,7 @@ class SampleClock:
 
 
 def _in_two(value: Fraction, precision: Precision, spare: int = 0) -> tuple[Scalar, Scalar]:
-    """Two numbers, the first with ``spare`` bits less than the precision, whose sum is close to a value."""
+    """Two numbers whose sum is close to a value, the first with ``spare`` bits less than the precision."""
     parts = []
     for bits in (precision.bits - spare, precision.bits):
         part = from_rational(*value.as_integer_ratio(), bits, round_nearest)
@@ -183,7 +187,7 @@ def _in_two(value: Fraction, precision: Precision, spare: int = 0) -> tuple[Scal
 
 
 def _with_error(a: Any, b: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Sum as rounded, and what rounding took off it (Knuth 1969, section 4.2.2, theorem B)."""
+    """Rounded sum and its rounding error (Knuth 1969, section 4.2.2, theorem B)."""
     total = a + b
     of_b = total - a
     return total, (a - (total - of_b)) + (b - of_b)

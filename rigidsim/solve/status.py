@@ -1,4 +1,4 @@
-"""How a run can end; each status carries the words that the user reads."""
+"""The statuses with which a run can end, each with its message for the user."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Status(Enum):
-    """``value`` stands in datasets and summaries."""
+    """How a run ended; ``value`` stands in datasets and summaries."""
 
     RUNNING = "running"
     FINISHED = "finished"
@@ -26,14 +26,14 @@ class Status(Enum):
 
     @property
     def exit_code(self) -> int:
-        """Of the command line."""
+        """Exit code of the command line."""
         if self in (Status.FINISHED, Status.EVENT):
             return 0
         return 130 if self is Status.INTERRUPTED else 3
 
     @property
     def final(self) -> bool:
-        """True where going on could not help, so that the dataset is completed as it is."""
+        """True if resuming couldn't help, so that the dataset is completed as it is."""
         return self in (Status.FINISHED, Status.EVENT, *_BROKEN)
 
 

@@ -1,4 +1,5 @@
-"""How long a natural step may be where the engine, going by the last two terms of a series, cannot tell.
+"""Bounds of natural steps for cases in which the engine, which uses the last two terms of a series, can't
+tell.
 
 A series may end (free fall without rotation), or have gaps just where the engine looks.
 """
@@ -10,50 +11,51 @@ import math
 import numpy as np
 
 _SPARSE = 1.5
-"""How much longer a step may be by the last two terms than by those before, in proportion to an exponential's
-terms: 1.5^20 is three digits."""
+"""Largest ratio of the step suggested by the last two terms to that of the terms before, in proportion to an
+exponential's terms: 1.5^20 is three digits.
+"""
 _SURELY = 1e-9  # far above rounding, of logarithms
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
 _LONGEST_BITS = 30
-_SPARE_BITS = 24  # of a type's exponents, for the states of order one themselves and what sums make of them
+_SPARE_BITS = 24  # bits of a type's exponents left for the states of order one and their sums
 
 
 def longest_step(order: int, number: type) -> float:
     """Bound of all steps, internal units.
 
     Events are found on a step's polynomials, scaled by the powers of its size up to the order: where those
-    overflow, as 2^30 to the 10th does in single precision, heyoka finds none and says nothing of it.
+    overflow, as 2^30 to the 10th does in single precision, heyoka silently finds none.
 
     Args:
         number: type of the states.
     """
-    if not issubclass(number, np.floating):  # quadruple and beyond: of far more than a thousand exponents
+    if not issubclass(number, np.floating):  # quadruple and beyond have far more than a thousand exponents
         return 2.0**_LONGEST_BITS
     return 2.0 ** min(_LONGEST_BITS, (np.finfo(number).maxexp - _SPARE_BITS) // order)
 
 
 def bound_of_sparse_series(coefficients: np.ndarray) -> float:
-    """How long a step may be by all Taylor coefficients of a state, where that is far less than by the last
-    two, from which the engine tells its length; infinity elsewhere.
+    """Bound of a step from all Taylor coefficients, if it is far below that from the last two, which the
+    engine uses; infinity elsewhere.
 
     From rest under a torque that grows with time, a quaternion's series have every third term only: the last
     two are zero, and the engine would take any step at all.
 
     Args:
-        coefficients: (states, order + 1), of any step from there.
+        coefficients: (states, order + 1), Taylor coefficients of any step from there.
     """
     return _bound([max(abs(float(x)) for x in column) for column in coefficients.T])
 
 
 def bounds_of_sparse_series(sizes: np.ndarray) -> np.ndarray:
-    """The same of many motions side by side, (members,).
+    """The same bounds for many motions side by side, (members,).
 
     Those that it may act on are sorted out together, and their bounds worked out one by one: numpy's last
     bits may depend on the place in an array.
 
     Args:
-        sizes: of the largest coefficient of each term, (order + 1, members).
+        sizes: size of the largest coefficient of each term, (order + 1, members).
     """
     order, bounds = len(sizes) - 1, np.full(sizes.shape[1], np.inf)
     if order < 3:
@@ -75,7 +77,7 @@ def _bound(sizes: list[float]) -> float:
     def radius(term: int) -> float:
         return (base / sizes[term]) ** (1 / term) if sizes[term] > 0 else math.inf
 
-    def of_entire(term: int) -> float:  # terms of an exponential, which is what a rotation's are like
+    def of_entire(term: int) -> float:  # terms of an exponential, like those of a rotation
         return math.exp(math.lgamma(term + 1) / term)
 
     terms = range(order // 2 + 1, order - 1)

@@ -1,4 +1,4 @@
-"""heyoka's integrator, stepping freely: natural steps only, dense output, nothing ever clamped.
+"""heyoka's integrator stepping freely: natural steps only, dense output, no step ever shortened.
 
 Four ways to go on, which give the same bits and differ in cost alone (engine measurements in
 experiments/README.md): ``skip`` takes many steps at once and keeps no dense output; ``grid`` takes many and
@@ -26,8 +26,8 @@ from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 _MOST_TO_WHOLE_TIME = 1000  # steps
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
-_HOPELESS_STEPS = 1e15  # to the last sample; at the fastest pace they would take years
-_TINY_STEPS = 32  # one after the other, before a run is given up: a close passage has some
+_HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they would take years
+_TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
 
 
@@ -38,9 +38,9 @@ class Mark:
     Attributes:
         time: two numbers whose sum it is, internal units.
         state: (states,), internal units.
-        events, steps: how many were found and taken so far.
-        switching: what a motion with switching surfaces remembers (``rigidsim.solve.switching.sides``).
-        tiny: steps, the latest ones, that were too small (``Stepper.collapsed``).
+        events, steps: numbers of events found and steps taken so far.
+        switching: memory of a motion with switching surfaces (``rigidsim.solve.switching.sides``).
+        tiny: number of latest steps in a row that were too small (``Stepper.collapsed``).
     """
 
     time: tuple[Scalar, Scalar]
@@ -52,33 +52,33 @@ class Mark:
 
 
 class Watcher(Protocol):
-    """Looks at each natural step, whose dense output it may use."""
+    """Called for each natural step, whose dense output it may use."""
 
     def begin(self, time: Scalar) -> None:
-        """Steps follow, from this time on."""
+        """Called before steps, with their starting time."""
 
     def __call__(self, integrator: TaylorEngine) -> bool:
-        """After each step; False ends the call that took it."""
+        """Called after each step; False ends the call that took it."""
 
 
 class Stepper:
     """A compiled integrator and its count of steps.
 
     Attributes:
-        system: its equations; those of its partner are compiled when they are needed.
-        precision: of its arithmetic.
+        system: the system integrated; its partner's equations are compiled when needed.
+        precision: precision of the arithmetic.
         watcher: sees each step and may end a call early; None without one.
         steps: natural steps taken and kept.
         log: the events found along the way.
         has_events: whether the engine looks for any.
         smallest, largest: step sizes of the latest call, internal units.
         single_steps: whether all ways go step by step.
-        careful: whether neighbours of the motion are carried by it, too, and not by the bare engine.
-        begun: where it is careful, the boundary at which the motion begins.
+        careful: whether neighbours of the motion need it too, rather than the bare engine.
+        begun: if it is careful, the boundary at which the motion begins.
         cuts_steps: whether some steps are cut short to end at given times, which ``grid`` doesn't know.
-        failure: why the latest step couldn't be taken, where its state is finite; empty otherwise.
-        destination: time of the last sample, internal units; None where steps may become as small as they
-            like.
+        failure: why the latest step couldn't be taken although its state is finite; empty otherwise.
+        destination: time of the last sample, internal units; None if steps may become arbitrarily
+            small.
         unresolved: whether several steps were taken at once of which some are tiny, so that they have to be
             taken back and taken one by one, for ``collapsed`` to be told from the motion alone.
     """
@@ -120,8 +120,8 @@ class Stepper:
         self._epsilon = float(precision.epsilon)
 
     def bound_first_step(self) -> None:
-        """Of a motion whose series at its start have gaps where the engine looks, from rest for instance: no
-        step in the chart in use is longer than these allow. It is to be where it starts.
+        """Bound the first step of a motion whose series at the start have gaps where the engine looks, for
+        instance from rest. It must stand at its start.
         """
         engine, muted = self._integrator, self.log.muted
         # steps taken one by one are seen to there; paired products have no gaps of more than one term
@@ -138,7 +138,7 @@ class Stepper:
             self._bounds[self._chart] = self._longest = self.precision.of_double(bound)
 
     def settle(self) -> None:
-        """Take note that the state was set from outside."""
+        """Must be called after the state was set from outside."""
 
     def _compiled(self, system: System) -> TaylorEngine:
         options = dict(self.precision.options, time=self._start)
@@ -155,7 +155,9 @@ class Stepper:
         return hy.taylor_adaptive(system.equations, initial, nt_events=events, **options)
 
     def use(self, chart: int) -> None:
-        """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
+        """Continue in the system (0) or its partner (1) at the same time; the state must be set
+        afterwards.
+        """
         if chart not in self._charts:
             wanted = self.system if chart == 0 else self.system.partner
             assert wanted is not None
@@ -172,7 +174,7 @@ class Stepper:
 
     @property
     def integrator(self) -> TaylorEngine:
-        """The heyoka object in use (for provenance)."""
+        """The heyoka object in use, for provenance."""
         return self._integrator
 
     @property
@@ -203,8 +205,8 @@ class Stepper:
         return bool(self._integrator.dtime[1] == 0)
 
     def to_whole_time(self) -> bool:
-        """Go to the high part of time: a step of at most half its last bit, in either direction. Where that
-        takes too many natural steps, being so small, it stays where it is, and returns False.
+        """Go to the high part of time, by a step of at most half its last bit in either direction; stays and
+        returns False if that takes too many natural steps.
         """
         mark, integrator = self.mark(), self._integrator
         outcome = integrator.propagate_until(integrator.time, max_steps=_MOST_TO_WHOLE_TIME)[0]
@@ -214,7 +216,7 @@ class Stepper:
         return False
 
     def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
-        """``count`` steps from a whole time: whether all went well, and the states (n, states) at those
+        """Take ``count`` steps from a whole time: whether all went well, and the states (n, states) at those
         ``times`` that they reached. The times ascend, and none lies before the current one.
         """
         ends = np.array([self._integrator.time, self._far], dtype=times.dtype)
@@ -229,7 +231,7 @@ class Stepper:
         return self._account(before, outcome, smallest, largest, taken), states[1 - first :]
 
     def step(self) -> bool:
-        """One step with dense output; False when the state is no longer finite."""
+        """Take one step with dense output; False if the state is no longer finite."""
         self._watched()
         before = self._integrator.time
         outcome, size = self._integrator.step(self._longest, write_tc=True)
@@ -248,7 +250,7 @@ class Stepper:
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
     def skip(self, count: int) -> bool:
-        """At most ``count`` steps without dense output, fewer where the watcher ends the call; False when the
+        """Take at most ``count`` steps without dense output, fewer if the watcher ends the call; False if the
         state is no longer finite.
         """
         before = self._integrator.dtime
@@ -262,8 +264,8 @@ class Stepper:
         return self._account(before, outcome, smallest, largest, taken)
 
     def to(self, time: float) -> bool:
-        """Go exactly to a time, with a shortened last step: for comparisons, never for a run's samples."""
-        for _ in range(_MOST_CHUNKS_TO):  # Ctrl-C is heeded between them
+        """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
+        for _ in range(_MOST_CHUNKS_TO):  # Ctrl-C is heeded between chunks
             engine = self._integrator
             outcome = engine.propagate_until(time, max_steps=_CHUNK_TO, max_delta_t=self._longest)[0]
             if outcome != hy.taylor_outcome.step_limit:
@@ -271,8 +273,8 @@ class Stepper:
         return bool(outcome == hy.taylor_outcome.time_limit)
 
     def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
-        """``count`` steps with dense output: whether all went well, and a function of times (n,) that
-        returns states (n, states).
+        """Take ``count`` steps with dense output: whether all went well, and a function from times (n,) to
+        states (n, states).
         """
         before = self._integrator.dtime
         outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
@@ -295,7 +297,7 @@ class Stepper:
     ) -> bool:
         self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
         if taken and self.largest == 0.0 and self._integrator.dtime != before:
-            # heyoka leaves out steps of the greatest size allowed
+            # heyoka omits steps of the greatest allowed size
             self.smallest = self.largest = float(self._longest)
         self.steps += int(taken)
         self._judge(before[0], int(taken))
@@ -304,12 +306,12 @@ class Stepper:
     @property
     def collapsed(self) -> bool:
         """Whether the latest steps were all so small that time, as a single number, doesn't resolve them, and
-        that more than can ever be taken are left to the last sample.
+        more remain to the last sample than can ever be taken.
         """
         return self._tiny >= _TINY_STEPS
 
     def _judge(self, before: Scalar, taken: int) -> None:
-        """Count tiny steps, as far as they come one by one."""
+        """Count tiny steps, if they were taken one by one."""
         if self.destination is None or not taken:
             return
         begin, end = float(before), float(self._integrator.time)

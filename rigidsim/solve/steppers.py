@@ -1,4 +1,4 @@
-"""Which stepper a system needs."""
+"""Choice of the stepper that a system needs."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ def stepper_of(
     start: Scalar,
     log: EventLog | None = None,
 ) -> Stepper:
-    """The stepper of a system: a plain one, unless the system switches, or changes at given times.
+    """The stepper of a system: a plain one, unless the system switches sides or changes at given times.
 
     Args:
         tolerance: None for the precision's epsilon.
-        start: internal units.
-        log: of events; without one none are looked for.
+        start: start time, internal units.
+        log: log of events; without one, none are looked for.
     """
     if system.pieces is not None:
         from rigidsim.solve.table_stepper import TableStepper

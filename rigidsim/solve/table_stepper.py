@@ -1,4 +1,4 @@
-"""Steps that end at the rows of a table, where parameters and some states of the equations are set.
+"""Steps that end at the rows of a table, where parameters and some states of the equations are reset.
 
 A step towards such a knot is cut short to end there, whichever way it is taken: its target is always the next
 knot, so that many steps at once give the bits of single ones. What changes at a knot is done at the beginning
@@ -21,7 +21,7 @@ _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400_000  # steps to a given time at once, and 
 
 
 class TableStepper(Stepper):
-    """A stepper of a system whose equations change at given times."""
+    """Stepper of a system whose equations change at given times."""
 
     cuts_steps = careful = True
 
@@ -42,12 +42,12 @@ class TableStepper(Stepper):
         self.begun = self.mark()
 
     def bound_first_step(self) -> None:
-        """As of ``Stepper``."""
+        """See ``Stepper``."""
         self._enter()
         super().bound_first_step()
 
     def _enter(self) -> None:
-        """Go on with the equations of the piece that begins here, or in which this boundary lies."""
+        """Continue with the equations of the piece that begins at this boundary, or contains it."""
         engine, pieces = self._integrator, self._pieces
         high, low = engine.dtime
         number = pieces.number_at(high)
@@ -63,7 +63,7 @@ class TableStepper(Stepper):
             self._far = pieces.knots[number] if number < len(pieces.knots) else self._beyond
 
     def step(self) -> bool:
-        """As of ``Stepper``."""
+        """See ``Stepper``."""
         self._enter()
         before = self._integrator.dtime
         outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
@@ -75,21 +75,21 @@ class TableStepper(Stepper):
         return self._account(before, outcome, smallest, largest, taken)
 
     def skip(self, count: int) -> bool:
-        """As of ``Stepper``, and fewer steps where a piece ends."""
+        """See ``Stepper``; fewer steps if a piece ends."""
         self._enter()
         return super().skip(count)
 
     def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
-        """As of ``Stepper``, and fewer steps where a piece ends."""
+        """See ``Stepper``; fewer steps if a piece ends."""
         self._enter()
         return super().block(count)
 
     def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
-        """None: it would end at the grid's last time and not at a knot."""
+        """Not available: it would end at the grid's last time and not at a knot."""
         raise NotImplementedError
 
     def to(self, time: float) -> bool:
-        """As of ``Stepper``."""
+        """See ``Stepper``."""
         for _ in range(_MOST_CHUNKS_TO):
             self._enter()
             last = time <= self._far

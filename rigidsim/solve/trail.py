@@ -1,5 +1,6 @@
-"""A few of a run's samples and of its step boundaries, spread evenly over it and kept in memory: by the ones
-its errors are told later, from the others its neighbours begin.
+"""A few of a run's samples and step boundaries, spread evenly over it and kept in memory.
+
+The run's errors are later estimated at the samples, and its neighbours start from the boundaries.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ _MOST = {True: 64, False: 16}  # of narrow precisions, whose closed forms take a
 
 @dataclass
 class SampleTrail:
-    """Samples of every so many, and the last; which ones doesn't depend on the blocks that they came in.
+    """Evenly spaced samples and the last one; the choice doesn't depend on the blocks in which they came.
 
     Attributes:
         kept: (index, time, state, chart) of each: internal units.
@@ -30,7 +31,7 @@ class SampleTrail:
     _last: tuple[int, Scalar, np.ndarray, int] | None = None
 
     def take(self, block: SampleBlock) -> None:
-        """The samples that follow those taken before."""
+        """Take the samples that follow those taken before."""
         start = -block.first % self._stride
         for row in range(start, len(block), self._stride):
             if (block.first + row) % self._stride == 0:  # the stride may have grown on the way
@@ -43,7 +44,7 @@ class SampleTrail:
 
     @property
     def samples(self) -> list[tuple[int, Scalar, np.ndarray, int]]:
-        """Those kept, and the last."""
+        """The samples kept, and the last one."""
         more = [] if self._last is None or (self.kept and self.kept[-1][0] == self._last[0]) else [self._last]
         return [*self.kept, *more]
 
@@ -64,16 +65,16 @@ class Waypoint:
 
 @dataclass
 class Waypoints:
-    """Boundaries of every so many corrections; which ones depends on the steps alone."""
+    """Evenly spaced boundaries of corrections; the choice depends on the steps alone."""
 
     _kept: dict[int, Waypoint] = field(default_factory=dict)
     _spacing: int = 1
 
     def note(self, number: int, steps: int, time: Scalar, state: np.ndarray, chart: int) -> None:
-        """The boundary of correction ``number``; one that is come to again is the same again."""
+        """Note the boundary of correction ``number``, unless it is there already."""
         if number % self._spacing:
             return
-        # numbers of more than 80 bits are none of numpy's own
+        # numbers of more than 80 bits aren't numpy's own
         plain = state.astype(np.float64) if state.dtype.kind == "f" else [float(x) for x in state]
         self._kept[number] = Waypoint(steps, float(time), np.array(plain), chart)
         if len(self._kept) > _MOST_WAYPOINTS:
@@ -81,7 +82,7 @@ class Waypoints:
             self._kept = {n: kept for n, kept in self._kept.items() if n % self._spacing == 0}
 
     def between(self, first: float, last: float) -> list[Waypoint]:
-        """Those between two counts of steps, in order."""
+        """Boundaries between two counts of steps, in order."""
         return sorted(
             (kept for kept in self._kept.values() if first <= kept.steps < last), key=lambda kept: kept.steps
         )

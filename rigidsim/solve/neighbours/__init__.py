@@ -1,1 +1,1 @@
-"""Neighbours of a motion, carried along to learn how its errors grow."""
+"""Neighbouring motions, carried along to learn how a run's errors grow."""

@@ -1,4 +1,4 @@
-"""How far apart the attitudes of nearby states are, without compiling anything where that is possible."""
+"""Distances between the attitudes of nearby states, without compiling anything if possible."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ class AttitudeChords:
     """Coordinates of an attitude in which small angles are lengths.
 
     Attributes:
-        of: coordinates (n, lanes) of states (states, lanes).
-        angle: rad for a distance of 1.
+        of: function from states (states, lanes) to coordinates (n, lanes).
+        angle: angle (rad) for a distance of 1.
     """
 
     of: Callable[[np.ndarray], np.ndarray]
     angle: float
 
     def between(self, states: np.ndarray) -> float:
-        """Root mean square angle between the attitudes of all lanes but the first and that of the first."""
+        """Root mean square angle between the attitudes of all other lanes and that of the first."""
         found = self.of(states)
         apart = found[:, 1:] - found[:, :1]
         return self.angle * math.sqrt(float((apart**2).sum()) / apart.shape[1])
 
 
 def attitude_chords(system: System) -> AttitudeChords | None:
-    """Those of a system's attitude; None where it carries none.
+    """Attitude coordinates of a system; None if it carries no attitude.
 
     A quaternion's chord is half the angle; nine direction cosines differ by its sqrt(2)-fold. Euler angles
-    are turned into a quaternion, what else there is is compiled (40 ms).
+    are turned into a quaternion; any other attitude is compiled (40 ms).
     """
     attitude, names = system.mechanics.attitude, system.states
     if attitude is None:
@@ -57,14 +57,14 @@ def attitude_chords(system: System) -> AttitudeChords | None:
     compiled = compiled_function(attitude.quaternion, system.variables, compact_mode=True, opt_level=0)
 
     def evaluate(states: np.ndarray) -> np.ndarray:
-        """At one time for all: a frame that turns with time doesn't change how far they are apart."""
+        """Evaluate all lanes at one time: a frame that turns with time doesn't change their distances."""
         return compiled(np.ascontiguousarray(states), time=np.zeros(states.shape[1]))
 
     return AttitudeChords(evaluate, 2.0)
 
 
 def _quaternion(attitude: AttitudeStates, angles: np.ndarray) -> np.ndarray:
-    """The product of three turns (4, lanes), about the axes of the sequence in turn."""
+    """Product of three rotations (4, lanes) about the axes of the sequence in turn."""
     cosines, sines = np.cos(angles / 2), np.sin(angles / 2)
     found = np.zeros((4, angles.shape[1]))
     found[0] = 1.0

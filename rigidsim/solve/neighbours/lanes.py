@@ -1,4 +1,6 @@
-"""What takes a motion and its neighbours forward, side by side, and what a loose tolerance does to a step."""
+"""Integrators that carry a motion and its neighbours side by side, and the error that a loose tolerance
+causes.
+"""
 
 from __future__ import annotations
 
@@ -22,29 +24,37 @@ from rigidsim.solve.steppers import stepper_of
 
 NEIGHBOURS = 3
 TOLERANCE, TIGHT = 1e-8, 1e-14
-"""The tight one where errors grow so much that a loosely followed motion is soon another one."""
+"""Loose and tight tolerance; the tight one is for errors that grow so much that a loosely followed motion
+soon becomes a different one.
+"""
 _TIGHT_UNTIL = 50_000
 OWN_UNTIL, OWN_FIRST = 7_000, 500
 """Steps up to which the run's own integrator, called for each lane, costs less than what is compiled for all;
 and so many that it takes of longer motions, and as many again and again as long as their errors grow
-exponentially, lest code is compiled for one that is soon lost."""
+exponentially, lest code is compiled for one that is soon lost.
+"""
 UNROLLED_FROM, OPTIMISED_FROM = 3_000, 300_000
 """Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
 terms of the equations' decomposition, four lanes, tolerance 1e-8: compact 42 and 48 ms, 10 and 22 us a step;
 unrolled 60 and 132 ms, 2.2 and 5.4 us; unrolled and optimised 315 and 860 ms, 1.3 and 3.2 us. An own
 integrator takes 18 and 48 us for four lanes; on a quieter machine 6.6 and 15, where unrolled code takes 45
-and 83 ms to compile and 1.5 and 2.3 us a step."""
+and 83 ms to compile and 1.5 and 2.3 us a step.
+"""
 _HOPELESS_STEPS = 32_768
-"""In one stretch: the motion comes to no end, say towards a collision."""
+"""Steps within one stretch after which the motion is given up, say on its way to a collision."""
 _UNEVEN, _FEW_STEPS = 2.5, 8
-"""Longest step over the shortest, up to which they are alike, and so few that it doesn't matter."""
+"""Ratio of longest to shortest step up to which steps count as alike, and a number of steps so small that it
+doesn't matter.
+"""
 _EIGHTY_BITS = int(np.finfo(np.longdouble).nmant) == 63
 _LEAST_TOLERANCE, _LEAST_WIDE_TOLERANCE = 1e-11, 1e-15
-"""Whose errors in a step still stand out of rounding in double precision and in 80 bits; others' are in
-proportion."""
+"""Least tolerances whose step errors still stand out from rounding in double precision and in 80 bits; errors
+of smaller ones are taken in proportion.
+"""
 _ONE_ORDER = math.exp(2.0)
 """What one order more gains in general, which is the tolerance's own step from order to order (Jorba & Zou
-2005); by how much proportions can be missed."""
+2005); by how much proportions can be missed.
+"""
 
 _PARTS = 4
 """Of a step, whose errors are a thousandth of its own or less: the power of 4 that is the series' order."""
@@ -52,7 +62,7 @@ _PARTS = 4
 
 @contextmanager
 def borrowed(stepper: Stepper | None) -> Iterator[None]:
-    """What is done with a run's stepper, or with copies of its engine, leaves no trace."""
+    """Use a run's stepper, or copies of its engine, inside the block without leaving a trace."""
     if stepper is None:
         yield
         return
@@ -67,10 +77,10 @@ def borrowed(stepper: Stepper | None) -> Iterator[None]:
 
 
 class Lanes(Protocol):
-    """The motion and its neighbours, side by side.
+    """A motion and its neighbours, integrated side by side.
 
     Attributes:
-        tolerance: of their steps.
+        tolerance: tolerance of their steps.
     """
 
     tolerance: float
@@ -78,32 +88,33 @@ class Lanes(Protocol):
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """States (states, lanes) at the ends of intervals of time (lanes,), steps that the first lane took,
-        and the time that it got to; None where one isn't finite or takes steps without end.
+        """States (states, lanes) at the ends of time intervals (lanes,), the steps that the first lane took,
+        and the time that it reached; None if a state isn't finite or steps don't end.
 
         Args:
-            most: steps of the first lane, after which all intervals end early alike; they do sooner where its
+            most: steps of the first lane after which all intervals end early alike; they end sooner if its
                 steps change in length.
         """
 
     def again(self, steps: float) -> Lanes:
-        """For so many steps more."""
+        """Lanes suited to the given number of further steps."""
 
 
 class _Evenly:
-    """Ends a stretch where steps have become longer or shorter, as they do in passing something closely:
-    errors that are made there count for more, and are another part of the states.
+    """Ends a stretch when steps have become longer or shorter, as in a close passage.
+
+    Errors made there count for more, and in other states.
     """
 
     def __init__(self) -> None:
         self._most = _HOPELESS_STEPS
 
     def go(self, go: Callable[[int], tuple[int, float, float]], most: int) -> int:
-        """Steps taken.
+        """Take steps while they are alike; returns how many.
 
         Args:
-            go: takes so many steps at most from the same place again; returns how many, the shortest, and the
-                longest.
+            go: takes at most so many steps from the same place again; returns their number, the shortest and
+                the longest.
             most: steps.
         """
         tried = min(self._most, most)
@@ -116,11 +127,9 @@ class _Evenly:
 
 
 class BatchLanes:
-    """All lanes in one call, in code of their own. States that nothing feels, nor any step, stay where they
-    are: they would only be compiled.
+    """All lanes in one call, in compiled code of their own.
 
-    Args:
-        steps: to be taken; decides how it is compiled.
+    States that nothing depends on, not even a step, stay constant: they would only cost compile time.
     """
 
     def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
@@ -142,7 +151,7 @@ class BatchLanes:
         return int(steps >= UNROLLED_FROM) + int(steps >= OPTIMISED_FROM)
 
     def again(self, steps: float) -> Lanes:
-        """As of ``Lanes``."""
+        """See ``Lanes``."""
         if self._level_for(steps) <= self._level:
             return self
         return BatchLanes(self._system, steps, self.tolerance)
@@ -150,7 +159,7 @@ class BatchLanes:
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """As of ``Lanes``."""
+        """See ``Lanes``."""
         integrator, carried = self._integrator, self._carried
 
         def go(most: int) -> tuple[int, float, float]:
@@ -174,11 +183,11 @@ class BatchLanes:
 
 
 class OwnLanes:
-    """One after the other, by an integrator that is there already: nothing has to be compiled.
+    """Lanes one after the other, by an existing integrator: nothing has to be compiled.
 
     Args:
-        integrator: of the system, in double precision; what is used is a copy.
-        loose: whether its states bear a loose tolerance, where many more steps are to be taken.
+        integrator: the system's integrator in double precision, of which a copy is used.
+        loose: whether its states bear a loose tolerance, if many more steps are to be taken.
     """
 
     def __init__(self, system: System, integrator: TaylorEngine, *, loose: bool = True) -> None:
@@ -188,7 +197,7 @@ class OwnLanes:
         self._even = _Evenly()
 
     def again(self, steps: float) -> Lanes:
-        """As of ``Lanes``."""
+        """See ``Lanes``."""
         if steps < OWN_UNTIL - OWN_FIRST:
             return self
         tight = not self._loose and steps < _TIGHT_UNTIL
@@ -197,7 +206,7 @@ class OwnLanes:
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """As of ``Lanes``."""
+        """See ``Lanes``."""
         integrator, result = self._integrator, np.empty_like(states)
 
         def go(most: int) -> tuple[int, float, float]:
@@ -221,12 +230,12 @@ class OwnLanes:
 
 
 class StepperLanes:
-    """One after the other, by a stepper that ends its steps on switching surfaces, or at given times.
+    """Lanes one after the other, by a stepper that ends its steps on switching surfaces or at given times.
 
     Args:
-        start, end: internal units.
-        steps: of the motion between these.
-        stepper: of the system in double precision, borrowed; without one it is compiled.
+        start, end: times, internal units.
+        steps: steps of the motion between these.
+        stepper: the system's stepper in double precision, borrowed; compiled if None.
     """
 
     def __init__(
@@ -242,13 +251,13 @@ class StepperLanes:
         self._pace = steps / (end - start)
 
     def again(self, steps: float) -> Lanes:
-        """As of ``Lanes``."""
+        """See ``Lanes``."""
         return self
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """As of ``Lanes``."""
+        """See ``Lanes``."""
         stepper, result = self._stepper, np.empty_like(states)
         # all lanes are on the sides, and have the signs, that the motion has
         known = self._reached.get(float(begin[0]), self._begin)
@@ -269,14 +278,14 @@ class StepperLanes:
 
 
 class SeriesErrors:
-    """What a tolerance lets a step be wrong by, held against the same step in parts.
+    """Truncation errors that a tolerance allows in a step, from comparing it with the same step in parts.
 
     Errors are those of the series' order, a whole number, and one more term may gain nothing at all (its
     coefficient has a phase): they are looked at with the tolerance as it is. Where they don't stand out of
     double precision's rounding, that is done with 80 bits.
 
     Args:
-        integrator: of the system and the tolerance, in double precision; without one it is compiled.
+        integrator: integrator of system and tolerance in double precision; compiled if None.
     """
 
     def __init__(self, system: System, tolerance: float, integrator: TaylorEngine | None = None) -> None:
@@ -299,7 +308,7 @@ class SeriesErrors:
         )
 
     def of_step(self, state: np.ndarray, time: float) -> np.ndarray:
-        """Error (states,) of the step that begins in a state."""
+        """Error (states,) of the step that begins in the given state."""
         engine = self._integrator
         number = engine.state.dtype.type
         engine.time = number(time)

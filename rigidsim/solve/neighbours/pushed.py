@@ -1,4 +1,4 @@
-"""How a run's rounding errors end, simulated: neighbours of the motion that are pushed at random all along.
+"""Simulated effect of a run's rounding errors: neighbours of the motion that are pushed at random all along.
 
 A neighbour follows the motion at a small distance and gets, again and again, a push as a step's rounding
 gives one, but many times as large. Its distance over that factor is an error as the run's own is: made
@@ -26,29 +26,31 @@ from rigidsim.solve.neighbours.chords import attitude_chords
 from rigidsim.solve.neighbours.lanes import NEIGHBOURS, Lanes, SeriesErrors
 
 _HOPELESS_STEPS = 32_768
-"""More than were expected: the motion comes to no end, say towards a collision."""
+"""Steps beyond the expected number after which the motion is given up, say on its way to a collision."""
 _LARGEST = 2.0**-24
 """Distance from which neighbours are drawn in. A chord that is drawn in leaves the surfaces on which the
-motion's invariants are constant by half its square, which must stay below what the pushes did."""
+motion's invariants are constant by half its square, which must stay below what the pushes did.
+"""
 _DRAWN_IN = 2.0**-2
 _SATURATED = 2.0**-14
-"""Distance that isn't small: the stretch is gone through once more, in two or from nearer."""
+"""Distance that is no longer small: the stretch is repeated in two parts, or from nearer."""
 _FIRST_PUSHES = 2.0**-40
-"""Distance that stands for one epsilon, at first."""
+"""Initial distance that stands for one epsilon."""
 _STEPS_AT_ONCE = 192.0
 _FEWEST_STRETCHES, _MOST_STRETCHES, _FEWEST_OF_WINDOW = 32, 512, 12
 """Between pushes where growth is slow: so many steps, or so many stretches of the whole. They are counted
-in steps, among which those of a close passage are many, not in time, of which they take little."""
+in steps, among which those of a close passage are many, not in time, of which they take little.
+"""
 _FEWEST_STEPS, _FEWEST_OF_ALL = 6.0, 12
 """In a stretch, whose last one is cut short, of the shortest motions; but so many stretches at any rate."""
 _MOST_STEPS_AT_ONCE = 4096
 _LONGER = 1.5
-"""A stretch may last, over the mean, when the motion takes few steps in it."""
+"""Ratio by which a stretch may exceed the mean if the motion takes few steps in it."""
 _CALM, _WILD = 4.0, 16.0
-"""Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
+"""Growth over a stretch below which stretches may become longer, and above which they become shorter."""
 _MOST_CLOSER = 40
 _APART = ("pace", "work", "stride")
-"""States that nothing feels."""
+"""States that nothing depends on."""
 _GROUPS: dict[str, tuple[str, ...]] = {
     "rates": ("wx", "wy", "wz"),
     "position": ("x", "y", "z"),
@@ -58,15 +60,15 @@ _GROUPS: dict[str, tuple[str, ...]] = {
 
 @dataclass
 class Spread:
-    """How far errors of one epsilon at each step have come, at times along the motion.
+    """Growth of errors of one epsilon per step, at times along the motion.
 
     Attributes:
         times: internal units, ascending.
-        steps: that the motion took until then, of the loose tolerance.
+        steps: steps of the loose tolerance that the motion took until then.
         rates, attitude, position, velocity: root mean square over the neighbours, in epsilons of internal
-            units; attitude as an angle, rates relative to their size; zeros where the motion has none.
+            units; attitude as an angle, rates relative to their size; zeros if the motion has none.
         extent, fastest: largest distance from the origin and speed so far, internal units.
-        whole: False where the motion could not be followed to the end asked for.
+        whole: False if the motion could not be followed to the requested end.
     """
 
     times: list[float] = field(default_factory=list)
@@ -82,14 +84,14 @@ class Spread:
 
 @dataclass(frozen=True)
 class Pushes:
-    """What a step does to each state, in epsilons.
+    """Errors that a step adds to each state, in epsilons.
 
     Attributes:
-        own: of the state's own size, at random.
-        shared: of the largest state's, at random.
-        series: what the series is cut off by, over what it is in these states.
-        first: of the state's own size, at the start.
-        clock: of the time, for loads that depend on it.
+        own: random error relative to the state's own size.
+        shared: random error relative to the largest state's size.
+        series: truncation error of the series, over its value in these states.
+        first: error at the start relative to the state's own size.
+        clock: error of the time, for loads that depend on it.
     """
 
     own: float = 0.4
@@ -104,16 +106,16 @@ def _length(vector: np.ndarray) -> float:
 
 
 class Neighbours:
-    """A motion with neighbours.
+    """A motion with neighbours that are pushed along the way.
 
     Args:
         system: built for double precision, without a partner chart.
-        lanes: of it.
-        start, end: of what is to be followed, internal units.
-        steps: that the motion is expected to take there; decides how far apart pushes are.
-        epsilon: what pushes are counted in.
-        rounded: (states,) bool, which of the initial values were.
-        series: of a tolerance far above epsilon.
+        lanes: integrators that carry it.
+        start, end: times between which to follow the motion, internal units.
+        steps: steps that the motion is expected to take, which decide the spacing of pushes.
+        epsilon: unit of the pushes.
+        rounded: (states,) bool, which of the initial values were rounded.
+        series: truncation errors, for a tolerance far above epsilon.
     """
 
     def __init__(
@@ -167,7 +169,7 @@ class Neighbours:
         self.spread = Spread()
 
     def _pace(self, end: float, steps: float, fewest: float) -> None:
-        """Set how far apart pushes are, to a time that takes so many steps."""
+        """Set the spacing of pushes up to a time reached in so many steps."""
         fewest = max(_FEWEST_OF_ALL, min(fewest, steps / _FEWEST_STEPS))
         stretches = min(max(fewest, steps / _STEPS_AT_ONCE), _MOST_STRETCHES)
         stretches = max(stretches, steps / _MOST_STEPS_AT_ONCE)
@@ -176,10 +178,10 @@ class Neighbours:
         self._most_steps = self.steps + 4 * steps + _HOPELESS_STEPS
 
     def elsewhere(self, state: np.ndarray, start: float, end: float, steps: float) -> Neighbours:
-        """Of a part of the motion that begins in another state (states,), in the same lanes.
+        """Neighbours for a part of the motion that begins in another state (states,), in the same lanes.
 
         Args:
-            steps: that the part is expected to take.
+            steps: steps that the part is expected to take.
         """
         other = copy.copy(self)
         other._begin(state, start, end, steps, _FEWEST_OF_WINDOW)
@@ -188,26 +190,26 @@ class Neighbours:
 
     @property
     def lanes(self) -> Lanes:
-        """Those that carry them now."""
+        """The lanes that carry the neighbours now."""
         return self._lanes
 
     @property
     def tolerance(self) -> float:
-        """Of their steps."""
+        """Tolerance of the lanes' steps."""
         return self._lanes.tolerance
 
     def prepare_for(self, steps: float, end: float) -> None:
-        """So many more steps than were expected follow, to another end."""
+        """Prepare for further steps beyond those expected, to another end."""
         self._lanes = self._lanes.again(steps)
         self._pace(end, steps, _FEWEST_STRETCHES)
 
     def follow(self, until: float, go_on: Callable[[], bool], lost: float = math.inf) -> Spread:
-        """Go on to a time, unless all is lost before.
+        """Follow the motion to a time, unless all is lost before.
 
         Args:
-            until: internal units.
-            go_on: asked between stretches; False ends it.
-            lost: spread of the attitude (or the rates) past which nothing more is to be learnt.
+            until: time, internal units.
+            go_on: called between stretches; False ends the work.
+            lost: spread of the attitude (or the rates) past which nothing more can be learnt.
         """
         spread = self.spread
         while spread.whole and self._time < until and go_on() and not self.all_lost(lost):
@@ -215,7 +217,7 @@ class Neighbours:
         return spread
 
     def all_lost(self, lost: float) -> bool:
-        """Whether neither the attitude (or the rates) nor the place can be told any more."""
+        """Whether neither the attitude (or the rates) nor the position can be predicted any more."""
         spread = self.spread
         if not spread.times:
             return False
@@ -224,7 +226,7 @@ class Neighbours:
         return not self._places["position"] or spread.position[-1] * self._epsilon > spread.extent
 
     def _go(self, until: float) -> bool:
-        """One stretch, as long as growth allows; False where the motion can't be followed."""
+        """Follow one stretch, as long as growth allows; False if the motion can't be followed."""
         before, distances = self._states.copy(), self._apart
         for _ in range(_MOST_CLOSER):
             time = min(self._time + self._stretch, until)
@@ -266,8 +268,8 @@ class Neighbours:
         return True
 
     def _advance(self, states: np.ndarray, time: float, most: int) -> tuple[int, float] | None:
-        """Steps taken by the motion, at most so many, and the time that it got to; None where a state isn't
-        finite.
+        """Advance all lanes by at most ``most`` steps of the motion; returns the steps taken and the time
+        reached, or None if a state isn't finite.
         """
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # neighbours' lasts for the stretch
@@ -281,7 +283,9 @@ class Neighbours:
         return max(taken, 1), reached
 
     def _push(self, own: float, sizes: np.ndarray, moved: np.ndarray, taken: int = 0) -> None:
-        """Add errors to the neighbours: ``own`` of each size, and of the series over some steps."""
+        """Add errors to the neighbours: ``own`` relative to each size, and truncation errors of the steps
+        taken.
+        """
         normal = self._random.standard_normal((len(sizes), NEIGHBOURS))
         pushed = own * sizes[:, None] * normal
         pushed[~moved] = 0.0
@@ -298,20 +302,22 @@ class Neighbours:
         self._apart = self._distances(self._states)
 
     def _drawn_in(self, states: np.ndarray, factor: float) -> np.ndarray:
-        """Neighbours nearer by a factor, in the same directions."""
+        """Neighbours moved nearer by a factor, in the same directions."""
         self._factor *= factor
         nearer = states.copy()
         nearer[:, 1:] = states[:, :1] + factor * (states[:, 1:] - states[:, :1])
         return nearer
 
     def _distances(self, states: np.ndarray) -> np.ndarray:
-        """Of each neighbour (neighbours,), relative to the size of what is apart."""
+        """Distance of each neighbour (neighbours,), relative to the size of the respective states."""
         apart = states[:, 1:] - states[:, :1]
         found: np.ndarray = np.sqrt((self._weights @ (apart * apart)).max(axis=0))
         return found
 
     def _weigh(self) -> None:
-        """Of squared differences in squared distances; states that never moved are none to be near to."""
+        """Update the weights of squared differences in squared distances; states that never moved get
+        none.
+        """
         sizes = (self._members * self._largest).max(axis=1, keepdims=True)
         self._weights = np.where(sizes > 0, self._members / np.maximum(sizes, 1e-150) ** 2, 0.0)
 

@@ -1,1 +1,1 @@
-"""Motions with kinks and jumps: steps that end on switching surfaces, and what goes on along them."""
+"""Motions with kinks and jumps: steps that end on switching surfaces, and sliding along them."""

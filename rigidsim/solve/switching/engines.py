@@ -1,7 +1,7 @@
-"""The engines of a motion with switching surfaces, and what the state doesn't tell of it.
+"""Engines of a motion with switching surfaces, and the memory that its state doesn't contain.
 
 Sides are parameters of the equations, and so are the turns of angles and the sign of the quaternion where an
-expression depends on them: both go on from step to step by continuity. Along surfaces the motion has
+expression depends on them: both are continued from step to step. Along surfaces the motion has
 equations of its own, which are compiled when they are first needed.
 """
 
@@ -26,14 +26,14 @@ from rigidsim.solve.switching.resting import Meeting
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe, continued
 from rigidsim.solve.switching.sliding import sliding
 
-_BISECTIONS = 4  # of a step for each bit of the precision
+_BISECTIONS = 4  # bisections of a step per bit of the precision
 
 Root = tuple[Any, int, int]
-"""Time, number of a surface, and the side that it leads to."""
+"""Time, number of a surface, and the side to which it leads."""
 
 
 class SwitchedEngines(Stepper):
-    """What a stepper with surfaces has beside its steps: an engine for each way to go on, and a memory."""
+    """A stepper with surfaces apart from its steps: an engine for each combination of sides, and a memory."""
 
     single_steps = careful = True
 
@@ -65,7 +65,7 @@ class SwitchedEngines(Stepper):
         self._quaternion = [x if same else -x for x in quaternion]
         self._dense = self._integrator
 
-    # --- what it remembers ----------------------------------------------------------------------------------
+    # --- memory ---------------------------------------------------------------------------------------------
 
     @property
     def _along(self) -> tuple[int, ...]:
@@ -73,7 +73,9 @@ class SwitchedEngines(Stepper):
 
     @property
     def _held(self) -> dict[int, tuple[int, int]]:
-        """Surfaces kept to at rest: the one whose side each has, and whether that or the opposite."""
+        """Surfaces kept to at rest: the surface whose side each has, and whether it has that side or the
+        opposite.
+        """
         return {
             j: (abs(mode) - HELD, 1 if mode > 0 else -1)
             for j, mode in enumerate(self._modes)
@@ -113,13 +115,15 @@ class SwitchedEngines(Stepper):
         super().back_to(mark)
 
     def use(self, chart: int) -> None:
-        """Go on in the system (0) or its partner (1), at the same time; the state is to be set."""
+        """Continue in the system (0) or its partner (1) at the same time; the state must be set
+        afterwards.
+        """
         self._chart = chart
         self._enter()
         self._longest = self._bounds[chart]
 
     def _enter(self) -> None:
-        """Go on with the equations of this chart along these surfaces."""
+        """Continue with the equations of this chart along the current surfaces."""
         key = self._chart, self._along, tuple(self._modes[j] for j in self._held)
         if key not in self._slid:
             system = self.system if self._chart == 0 else self.system.partner
@@ -189,16 +193,16 @@ class SwitchedEngines(Stepper):
         return np.array([self.precision.of_double(x) for x in numbers], dtype=self.precision.scalar)
 
     def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
-        """At this boundary; turns and sign go on from the latest step."""
+        """Parameters at this boundary; turns and sign continue from the latest step."""
         turns, sign = self._joined(self.state, self.time)
         return self._pars(turns, sign, over)
 
     def _look(self, state: np.ndarray, time: Scalar) -> Look:
-        """At a state of the latest step."""
+        """Look at the surfaces in a state of the latest step."""
         return self._probe.look(state, time, self._pars(*self._joined(state, time)))
 
     def _values(self, state: np.ndarray, time: Scalar) -> np.ndarray:
-        """The arguments alone, likewise."""
+        """Arguments of the surfaces in a state of the latest step."""
         return self._probe.values(state, time, self._pars(*self._joined(state, time)))[0]
 
     def _joined(self, state: np.ndarray, time: Scalar) -> tuple[list[float], float]:
@@ -221,7 +225,7 @@ class SwitchedEngines(Stepper):
         self._quaternion = [sign * x for x in quaternion]
 
     def _set(self, engine: TaylorEngine) -> None:
-        """Give an engine its parameters at this boundary.
+        """Set an engine's parameters at this boundary.
 
         The engine finds a zero at a step's very beginning again and again, in place of those that follow. So
         an argument that is zero there but for rounding is watched for the zero of its sum with a rounding, on
@@ -242,13 +246,15 @@ class SwitchedEngines(Stepper):
         engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
 
     def _beside(self, value: float, noise: float) -> float:
-        """What to add to an event's expression."""
-        if self._along and abs(value) <= noise:  # it is zero all along the surface, and crosses nothing
+        """Offset to add to an event's expression."""
+        if self._along and abs(value) <= noise:  # it is zero all along the surface and crosses nothing
             return 2 * noise
         return 2.0 ** (-self.precision.bits - BESIDE) if self._fresh and value == 0 else 0.0
 
     def _at_rest(self, on: list[int], look: Look) -> Continuation | None:
-        """How to go on where swings about the meeting of two surfaces have come down to rounding."""
+        """How to continue if swings about the meeting of two surfaces have decayed to rounding; None
+        otherwise.
+        """
         small = [
             i
             for i, mode in enumerate(self._modes)
@@ -267,7 +273,7 @@ class SwitchedEngines(Stepper):
         return meeting.rest(sorted({*small, *kept}), kept)
 
     def _keep_to_surfaces(self) -> None:
-        """Take off what rounding moved the state away from the surfaces that it slides along."""
+        """Remove the rounding that moved the state off the surfaces along which it slides."""
         state = self._integrator.state
         look = self._look(state, self.time)
         for j in (*self._along, *self._held):
@@ -277,10 +283,10 @@ class SwitchedEngines(Stepper):
                 state[:] = state - (look.u[j] / square) * gradient
 
     def _seen(self, j: int, begin: Scalar, before: np.ndarray) -> Scalar | None:
-        """A time of the latest step at which an argument has the sign of its side, if any.
+        """A time within the latest step at which an argument has the sign of its side, or None.
 
         Args:
-            before: the state in which the step began.
+            before: the state at the step's beginning.
         """
         end, mode = self._integrator.time, self._modes[j]
         look = self._look(before, begin)
@@ -297,7 +303,7 @@ class SwitchedEngines(Stepper):
         return begin if beside else None
 
     def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
-        """A root that the engine missed."""
+        """A root that the engine missed, by bisection."""
         for _ in range(_BISECTIONS * self.precision.bits):
             middle = begin + (end - begin) / 2
             if not begin < middle < end:
@@ -310,7 +316,7 @@ class SwitchedEngines(Stepper):
         return end
 
     def _moved(self, j: int) -> int:
-        """The side of a surface that a step leads to, which is taken back; 0 for none."""
+        """The side of a surface to which a trial step leads (it is taken back); 0 for none."""
         engine = self._integrator
         time, before = engine.dtime, np.array(engine.state)
         self._set(engine)

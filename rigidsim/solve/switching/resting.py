@@ -1,4 +1,4 @@
-"""Rest where two switching surfaces meet: in a quantity and in its rate, as of a relay and dry friction.
+"""Rest where two switching surfaces meet, in a quantity and in its rate, as with a relay and dry friction.
 
 With u' = v and v' = r(sign u, sign v), such as a torque -a sign(psi) - b sign(w), the rate of u is zero on
 both surfaces whatever the sides, so that no rule for one surface tells how it goes on. The swings come to
@@ -24,7 +24,7 @@ from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Pro
 _NEAR = 4.0
 """Roundings of its argument within which a rate is zero."""
 _DIFFERENCES = 64.0
-"""Of the square root of epsilon: what a derivative by differences of that size may be wrong by."""
+"""Bound of the error of a derivative by differences of that size, in units of the square root of epsilon."""
 _PARALLEL = 1e-9  # relative
 _GROWING = "swings about it grow from nothing, so that what follows isn't unique"
 _BLENDS = (
@@ -33,7 +33,7 @@ _BLENDS = (
 )
 
 LookAt = Callable[[Mapping[int, int], np.ndarray, Scalar], Look]
-"""From sides by number, a state and a time."""
+"""Function from sides by number, a state and a time to a ``Look``."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class Meeting:
     """Surfaces that meet at a state.
 
     Attributes:
-        at: what there is to know, on sides and at states nearby.
-        state, time: internal units.
-        epsilon: of the precision.
+        at: looks at the surfaces on given sides and at states nearby.
+        state, time: state and time of the meeting, internal units.
+        epsilon: epsilon of the precision.
     """
 
     at: LookAt
@@ -53,12 +53,10 @@ class Meeting:
     epsilon: float
 
     def rest(self, on: Sequence[int], kept: Mapping[int, int]) -> Continuation | None:
-        """How the motion keeps to surfaces that it lies on, or that it could leave them by growing swings;
-        None where it does neither on two of them, or where others than those that it keeps to already take
-        part.
+        """How the motion keeps to surfaces on which it lies, or which it could leave only by growing swings.
 
-        Args:
-            on: numbers of surfaces, ``kept`` among them: those that it slides along, or is held on, and how.
+        None if it does neither on two of them, or if surfaces other than those that it already keeps to take
+        part.
         """
         for held, rate in permutations(on, 2):
             others = [j for j in on if j not in (held, rate)]
@@ -74,8 +72,8 @@ class Meeting:
         return None
 
     def _sign(self, i: int, m: int, others: Sequence[int]) -> int | str:
-        """Whether the side of surface i is that of m (1) or the other (-1) in the field that rests; 0 where
-        none does; in words why that can't be told.
+        """Whether, in the field at rest, the side of surface i is that of m (1) or the opposite (-1); 0 if
+        there is no rest; a text if that can't be decided.
         """
         fixed = dict.fromkeys(others, 1)
         looks: dict[tuple[int, int], Look] = {
@@ -123,7 +121,9 @@ class Meeting:
         return _DIFFERENCES * self.epsilon**0.5
 
     def _kept_to(self, others: Sequence[int], field: np.ndarray, pair: tuple[int, int]) -> np.ndarray:
-        """A field at the sides 1 of other surfaces, which the motion keeps to: at the sides that do."""
+        """A field given for sides 1 of other surfaces that the motion keeps to, converted to the sides with
+        which it does.
+        """
         plain = dict.fromkeys((*others, *pair), 1)
         here = self.at(plain, self.state, self.time)
         parts, felt = [], []
@@ -144,7 +144,7 @@ class Meeting:
         return kept
 
     def _slope(self, i: int, m: int, here: Look) -> float:
-        """Derivative of the rate of surface i by the argument of m; the slower, the wider the difference."""
+        """Derivative of the rate of surface i by the argument of m, by a finite difference."""
         gradient = here.gradients[m].astype(np.float64)
         length = float(np.linalg.norm(gradient))
         if length == 0:
@@ -153,7 +153,7 @@ class Meeting:
         return by / length
 
     def _drift(self, i: int, sides: Mapping[int, int], field: np.ndarray) -> float:
-        """Derivative of the rate of surface i along a field, zero where that keeps to both surfaces."""
+        """Derivative of the rate of surface i along a field; zero if the field keeps to both surfaces."""
         speed = max(float(np.linalg.norm(field)), 1.0)
         return self._difference(i, sides, field / speed, 1.0 / speed) * speed
 
@@ -168,7 +168,9 @@ class Meeting:
         return (there[0] - there[1]) / (2 * step)
 
     def _felt(self, j: int, pair: tuple[int, int], fixed: Mapping[int, int]) -> bool:
-        """Whether the side of a surface changes how the motion crosses a pair of others, or theirs it."""
+        """Whether the side of a surface changes how the motion crosses a pair of others, or the pair changes
+        it.
+        """
         i, m = pair
         here, there = (self.at({**fixed, i: 1, m: 1, j: side}, self.state, self.time) for side in (1, -1))
         if abs(float(here.rate(m) - there.rate(m))) > self.probe.rate_noise(here, m):
@@ -182,7 +184,7 @@ class Meeting:
 def _parts(
     fields: Mapping[tuple[int, int], np.ndarray],
 ) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
-    """Base, and what either side adds; no base where the two don't add up."""
+    """Base field and the contribution of each of the two sides; no base if the two don't add up."""
     base: np.ndarray = (fields[1, 1] + fields[-1, -1]) / 2
     first, second = (fields[1, 1] - fields[-1, 1]) / 2, (fields[1, 1] - fields[1, -1]) / 2
     size = sum(map(np.abs, fields.values()))

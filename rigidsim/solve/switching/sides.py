@@ -1,6 +1,7 @@
-"""On which side of its switching surfaces a motion goes on: decided by the fields of all sides (Filippov).
+"""The side of its switching surfaces on which a motion continues, decided by the fields of all sides
+(Filippov).
 
-Where it arrives on a surface whose other side carries it away, it crosses; where both sides push it back, it
+Arriving on a surface whose other side carries it away, the motion crosses; if both sides push it back, it
 slides along (``rigidsim.solve.switching.sliding``). On several surfaces at once each combination of
 crossing and sliding is tried, and the one that agrees with its own field is taken.
 """
@@ -21,24 +22,25 @@ from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Precision, Scalar
 
 SLIDES = 0
-"""In the place of a side, 1 or -1."""
+"""Mode in place of a side (1 or -1): the motion slides along the surface."""
 HELD = 2
-"""In the place of a side: of a surface that the motion keeps to while it slides along surface number m, whose
-side it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.resting``."""
-_ROUNDINGS = 32.0  # of the terms of an argument, below which it is zero
-_RATE_ROUNDINGS = 1024.0  # of the terms of its rate, which are products of derivatives
+"""Mode in place of a side: the motion keeps to the surface while it slides along surface number m, whose side
+it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.resting``.
+"""
+_ROUNDINGS = 32.0  # units of rounding of an argument's terms, below which it is zero
+_RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of derivatives
 
 
 @dataclass(frozen=True)
 class Look:
-    """What there is to know of the surfaces at a state.
+    """Surfaces and field at a state.
 
     Attributes:
         u: (surfaces,), the arguments.
         by_time: (surfaces,), their partial derivatives.
         gradients: (surfaces, states).
         field: (states,), derivatives of the states.
-        time: internal units.
+        time: time, internal units.
     """
 
     u: np.ndarray
@@ -48,23 +50,23 @@ class Look:
     time: Scalar
 
     def rate(self, j: int) -> Scalar:
-        """Of an argument along the motion."""
+        """Rate of an argument along the motion."""
         return sum((g * f for g, f in zip(self.gradients[j], self.field, strict=True)), self.by_time[j])
 
     def rate_size(self, j: int) -> float:
-        """What the rate's rounding is a part of."""
+        """Size to which the rate's rounding is relative."""
         pairs = zip(self.gradients[j], self.field, strict=True)
         return sum((abs(float(g) * float(f)) for g, f in pairs), abs(float(self.by_time[j])))
 
     def size(self, j: int, states: Sequence[np.ndarray]) -> float:
-        """What the argument's rounding is a part of, where states were of these sizes shortly before."""
+        """Size to which the argument's rounding is relative, for states of these sizes shortly before."""
         largest = [max(abs(float(x)) for x in row) for row in zip(*states, strict=True)]
         terms = (abs(float(g)) * x for g, x in zip(self.gradients[j], largest, strict=True))
         return sum(terms, abs(float(self.by_time[j]) * float(self.time)))
 
 
 class Probe:
-    """Compiled functions of a system that say where its surfaces are."""
+    """Compiled functions of a system that locate its surfaces."""
 
     def __init__(self, system: System, precision: Precision) -> None:
         self._epsilon = float(precision.epsilon)
@@ -93,19 +95,19 @@ class Probe:
     def values(
         self, state: np.ndarray, time: Scalar, pars: np.ndarray
     ) -> tuple[np.ndarray, list[float], list[float]]:
-        """The arguments, in the run's precision; the plain angles and the plain quaternion, where needed."""
+        """Arguments in the run's precision; the plain angles and the plain quaternion if needed."""
         found = self._values(np.array(state), pars=pars, time=time)
         rest = [float(x) for x in found[self.surfaces : -2]]
         return found[: self.surfaces], rest[: self.angles], rest[self.angles :]
 
     def crossings(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[tuple[float, float]]:
-        """Values of the events' expressions, and what rounding of the states, of order one, makes of them."""
+        """Values of the events' expressions, and the effect on them of rounding in states of order one."""
         found = [float(x) for x in self._crossings(np.array(state), pars=pars, time=time)[:-2]]
         noise, half = _RATE_ROUNDINGS * self._epsilon, len(found) // 2
         return [(value, noise * size) for value, size in zip(found[:half], found[half:], strict=True)]
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
-        """Everything."""
+        """Surfaces and field at a state."""
         found = self._everything(np.array(state), pars=pars, time=time)
         s, n = self.surfaces, self._states
         return Look(
@@ -113,28 +115,28 @@ class Probe:
         )
 
     def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
-        """Below which an argument is zero, as far as rounding lets it be known."""
+        """Size below which an argument counts as zero because of rounding."""
         return _ROUNDINGS * self._epsilon * look.size(j, states)
 
     def swing_noise(self, look: Look, j: int, state: np.ndarray) -> float:
-        """Likewise where it is the small difference of states of order one, as swings are that come to rest:
-        what is left of them then is rounding's.
+        """The same for an argument that is a small difference of states of order one, as when swings come to
+        rest and only rounding is left of them.
         """
         gradient = math.hypot(*(float(x) for x in look.gradients[j]))
         return _ROUNDINGS * self._epsilon * gradient * max(abs(float(x)) for x in state)
 
     def rate_noise(self, look: Look, j: int) -> float:
-        """Likewise of its rate."""
+        """Size below which an argument's rate counts as zero because of rounding."""
         return _RATE_ROUNDINGS * self._epsilon * look.rate_size(j)
 
 
 @dataclass(frozen=True)
 class Continuation:
-    """How to go on from some surfaces.
+    """How to continue from some surfaces.
 
     Attributes:
-        modes: for each surface 1, -1 or ``SLIDES``; None where there is no way, or more than one.
-        why: in that case.
+        modes: for each surface 1, -1 or ``SLIDES``; None if there is no way, or more than one.
+        why: the reason in that case.
     """
 
     modes: Mapping[int, int] | None
@@ -143,7 +145,7 @@ class Continuation:
 
 
 class Fields:
-    """The fields of all combinations of sides of some surfaces, at one state."""
+    """Fields of all combinations of sides of some surfaces, at one state."""
 
     def __init__(self, at: Any, probe: Probe, surfaces: Sequence[int]) -> None:
         """``at``: from sides by number to a ``Look``."""
@@ -164,7 +166,7 @@ class Fields:
 
     @property
     def add_up(self) -> bool:
-        """Whether the parts of all surfaces in the field do."""
+        """Whether the contributions of all surfaces to the field add up."""
         m = len(self.surfaces)
         above = self._looks[(1,) * m].field.astype(np.float64)
         below = self._looks[(-1,) * m].field.astype(np.float64)
@@ -180,7 +182,7 @@ class Fields:
         return True
 
     def idle(self) -> list[int]:
-        """Surfaces that the motion stays on, or touches, whatever the sides."""
+        """Surfaces on which the motion stays, or which it touches, whatever the sides."""
         return [
             j
             for j, noise in zip(self.surfaces, self._noise, strict=True)
@@ -188,7 +190,7 @@ class Fields:
         ]
 
     def choose(self) -> Continuation:
-        """The one combination whose field agrees with it."""
+        """The one combination of sides whose field agrees with it."""
         found, added = [], len(self.surfaces) == 1 or self.add_up
         for modes in product((1, -1, SLIDES), repeat=len(self.surfaces)):
             if SLIDES not in modes:
@@ -231,5 +233,5 @@ class Fields:
 
 
 def continued(before: float, plain: float) -> float:
-    """How many full turns a plain angle lacks to be next to a continuous one."""
+    """Full turns to add to a plain angle so that it is nearest to a continuous one."""
     return float(np.rint((before - plain) / (2 * math.pi)))

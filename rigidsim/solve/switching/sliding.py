@@ -18,7 +18,7 @@ from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
 
 MOST_AT_ONCE = 3
-"""Surfaces along which a motion slides at once."""
+"""Largest number of surfaces along which a motion slides at once."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Sliding:
 
     Attributes:
         equations: (variable, right-hand side).
-        sides: what takes the place of each surface's side; the motion leaves it where this reaches 1 or -1.
+        sides: value in place of each surface's side; the motion leaves the surface when it reaches 1 or -1.
     """
 
     equations: list[tuple[Symbolic, Symbolic]]
@@ -37,10 +37,10 @@ class Sliding:
 def sliding(
     system: System, along: Sequence[int], held: Mapping[int, tuple[int, int]] | None = None
 ) -> Sliding:
-    """The equations of a system along surfaces of these numbers.
+    """Equations of a system along the surfaces of these numbers.
 
     Args:
-        held: surfaces that are kept to as well: the one whose side each has, and 1 for the same or -1 for the
+        held: surfaces also kept to: the surface whose side each has, and 1 for the same or -1 for the
             opposite.
     """
     fields = {name: right for name, (_, right) in zip(system.states, system.equations, strict=True)}
@@ -85,7 +85,7 @@ def _reads(expression: Symbolic, along: Sequence[int]) -> bool:
 
 
 def _solved(matrix: list[list[Symbolic]], right: list[Symbolic]) -> list[Symbolic]:
-    """Cramer's rule: the systems have one to three equations."""
+    """Solution by Cramer's rule of one to three equations."""
     whole = _determinant(matrix)
     columns = range(len(right))
     replaced = [[[right[i] if j == k else matrix[i][j] for j in columns] for i in columns] for k in columns]

@@ -21,10 +21,11 @@ from rigidsim.solve.switching.engines import Root, SwitchedEngines
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE
 
-_ATTEMPTS = 32  # at one step
+_ATTEMPTS = 32  # attempts at one step
 _MOST_SWITCHES = 256
-"""At intervals shorter than ``_SHORTEST``: they accumulate, or go on for ever with what rounding leaves of
-their swing, whose time is the square root of its size."""
+"""Switches at intervals shorter than ``_SHORTEST`` that count as an accumulation, or as swings kept up by
+rounding, whose period is the square root of its size.
+"""
 _SHORTEST = 2.0**-8  # internal units of time; with more digits less, see ``_window``
 _ROUNDINGS = 2.0**15  # in the square of an interval
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
@@ -32,11 +33,11 @@ _NEAR = 2.0**-12  # of a step: within it Newton's method improves a root
 
 
 class SwitchingStepper(SwitchedEngines):
-    """A stepper of a system with surfaces, or with angles whose turns matter.
+    """Stepper of a system with surfaces, or with angles whose turns matter.
 
     Attributes:
-        switches: how often it came to a surface so far, in this process.
-        begun: the boundary at which the motion begins, on the sides that it goes to.
+        switches: number of arrivals on surfaces so far, in this process.
+        begun: the boundary at which the motion begins, on the sides to which it leads.
     """
 
     def __init__(
@@ -56,13 +57,13 @@ class SwitchingStepper(SwitchedEngines):
     # --- steps ----------------------------------------------------------------------------------------------
 
     def step(self) -> bool:
-        """One step with dense output, not past a surface; False when the state is no longer finite, or the
-        motion can't be continued (``failure`` says why then).
+        """Take one step with dense output, not past a surface; False if the state is no longer finite, or the
+        motion can't be continued (``failure`` then says why).
         """
         return self._step(self._longest)[0]
 
     def skip(self, count: int) -> bool:
-        """As ``Stepper.skip``, step by step."""
+        """See ``Stepper``; taken step by step."""
         smallest, largest = np.inf, 0.0
         for _ in range(count):
             fine, on = self._step(self._longest)
@@ -75,7 +76,7 @@ class SwitchingStepper(SwitchedEngines):
         return True
 
     def to(self, time: float) -> bool:
-        """As ``Stepper.to``."""
+        """See ``Stepper``."""
         for _ in range(100_000):
             high, low = self._integrator.dtime
             left = (time - high) - low
@@ -86,19 +87,19 @@ class SwitchingStepper(SwitchedEngines):
         return False
 
     def dense(self, time: Scalar) -> np.ndarray:
-        """As ``Stepper.dense``."""
+        """See ``Stepper``."""
         return np.array(self._dense.update_d_output(time))
 
     def settle(self) -> None:
-        """Take note that the state was set from outside: sides are those that it lies on."""
+        """Must be called after the state was set from outside: takes the sides on which it lies."""
         self._roots.clear()
-        # it lies beside surfaces that it kept to
+        # the state lies beside surfaces that it kept to
         self._modes = [mode if abs(mode) == 1 else 1 for mode in self._modes]
         self._agree()
         self._enter()
 
     def _step(self, longest: Scalar) -> tuple[bool, bool]:
-        """Whether all went well, and whether the watcher lets the call go on."""
+        """Take a step: whether all went well, and whether the watcher lets the call continue."""
         if self._unsettled:
             self.failure = self._unsettled
             return False, False
@@ -129,7 +130,7 @@ class SwitchingStepper(SwitchedEngines):
             if not at_once:
                 size = self._again(root, time, before)
                 break
-            # it begins on the surface, and leaves its side at once
+            # the step begins on the surface and leaves its side at once
             log.back_to(events)
             begun.dtime = time
             begun.state[:] = before
@@ -156,12 +157,12 @@ class SwitchingStepper(SwitchedEngines):
         return self.precision.of_double(size)
 
     def _quieten(self) -> None:
-        """Events at the surface that the latest step ended on were found by it."""
+        """Suppress events at the surface where the latest step ended, which found them."""
         time = self.time
         self.log.quiet_until = time + self._width(time) if self._fresh else None
 
     def _again(self, root: Root, time: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar:
-        """The step up to a root, once more nearer to it; returns its size."""
+        """Repeat the step up to a root, closer to it; returns the step's size."""
         engine, size = self._integrator, root[0] - time[0] - time[1]
         muted, self.log.muted = self.log.muted, True
         try:
@@ -184,7 +185,7 @@ class SwitchingStepper(SwitchedEngines):
         return size
 
     def _first_root(self, begin: Scalar, before: np.ndarray) -> Root | None:
-        """The first root at which the step just taken leaves its side."""
+        """The first root at which the step just taken leaves its side; None if there is none."""
         engine = self._integrator
         end, after = engine.time, np.array(engine.state)
         states = [before, after]
@@ -215,7 +216,7 @@ class SwitchingStepper(SwitchedEngines):
     # --- surfaces -------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        """The sides of the start."""
+        """Find the sides at the start."""
         look = self._agree()
         on = [
             j
@@ -232,11 +233,11 @@ class SwitchingStepper(SwitchedEngines):
 
     @property
     def _window(self) -> float:
-        """Internal units of time within which ``_MOST_SWITCHES`` are an accumulation."""
+        """Time (internal units) within which ``_MOST_SWITCHES`` count as an accumulation."""
         return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * self._epsilon) ** 0.5)
 
     def _arrive(self, root: Root, states: list[np.ndarray]) -> bool:
-        """Go on from a surface; False where that can't be."""
+        """Continue from a surface; False if that is impossible."""
         _, j, side = root
         self._fresh = True
         self.switches += 1
@@ -265,8 +266,8 @@ class SwitchingStepper(SwitchedEngines):
         return True
 
     def _agree(self, known: Collection[int] = ()) -> Look:
-        """Put all surfaces but those known on the sides that the state lies on: an argument that reads the
-        side of another surface jumps with it. Returns the last look.
+        """Put all surfaces except the known ones on the sides where the state lies, since an argument that
+        reads another surface's side jumps with it; returns the last look.
         """
         for _ in range(len(self._modes) + 1):
             look, changed = self._look(self.state, self.time), False
@@ -289,7 +290,7 @@ class SwitchingStepper(SwitchedEngines):
             self._keep_to_surfaces()
 
     def _chosen(self, on: list[int], hint: tuple[int, int] | None = None) -> Continuation:
-        """How to go on from surfaces that the state lies on."""
+        """How to continue from the surfaces on which the state lies."""
 
         def at(sides: dict[int, int]) -> Look:
             return self._probe.look(self.state, self.time, self._parameters(sides))
@@ -309,11 +310,11 @@ class SwitchingStepper(SwitchedEngines):
             return Continuation({**idle, **choice.modes})
         if not choice.tangential or hint is None:
             return choice
-        # touched: rounding hides the rates, but the step was seen to get to the other side
+        # touched: rounding hides the rates, but the step was seen to reach the other side
         return Continuation({**idle, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
 
     def _by_trial(self, idle: dict[int, int]) -> Continuation:
-        """At rest on a surface: the side on which a step stays on its own."""
+        """At rest on a surface, find by trial the side on which a step stays on its own."""
         modes = dict(idle)
         for j in idle:
             kept = []

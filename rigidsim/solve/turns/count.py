@@ -36,22 +36,22 @@ from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
 
 DENSE = 1.0
-"""Angle (rad) by which a body turns at most between samples whose angles are joined to the nearest."""
+"""Largest angle (rad) by which a body turns between samples whose angles are joined to the nearest."""
 
 _PART = 0.5  # rad, that the body turns from one point to the next
 _CHUNK = 4096  # points, always as many, so that turns don't depend on timing
 _SWITCHING_CHUNK = 256  # where each step is taken by itself
-_STEPS = 50  # for each point, at most; a motion that takes more isn't followed
+_STEPS = 50  # per point, at most; a motion that takes more isn't followed
 _DOUBTFUL = 2.0  # rad: a jump by more is looked at in parts; one that is missed by a turn is larger than 4
 _FINER = 16  # parts of a part
 _DEPTH = 4
 _POLE = 1e-6  # rad, within which dense samples aren't looked at in parts
-_OFTEN = 0.05  # of the parts; where more are doubtful, the motion rests in a pole, and no path tells more
-_FAR = 0.05  # of a state of the attitude, from which the motion followed is another than the run's
+_OFTEN = 0.05  # of the parts; if more are doubtful, the motion rests in a pole, and no path tells more
+_FAR = 0.05  # difference of an attitude state from which the motion followed is no longer the run's
 _TOLERANCE = 1e-11
 _SPARE = 1.25  # over the fastest rate of a chunk, for the next
 _SLOWER = 64.0  # than its bound, at most: the next chunk is not to be an age
-_WORTH_BUILDING = 2e5  # rad: code that is built in a tenth of the time is half as fast
+_WORTH_BUILDING = 2e5  # rad: code that builds in a tenth of the time runs half as fast
 _TURN = 2 * math.pi
 MOST_OF_A_CLOSED_FORM = 1e6
 """Angle between samples of a closed form up to which turns are counted: about a second's work."""
@@ -62,9 +62,9 @@ class Place:
     """A sample from which turns are counted.
 
     Attributes:
-        time: internal units.
+        time: time, internal units.
         state: (states,) float64, internal units.
-        angles: float64, as the run has them, without turns.
+        angles: float64, the run's angles without turns.
     """
 
     time: float
@@ -73,7 +73,7 @@ class Place:
 
 
 def radians_between(samples: SampleTimes, rate: float) -> float:
-    """By how much a body turns at most between neighbouring samples.
+    """Largest angle by which a body turns between neighbouring samples, rad.
 
     Args:
         rate: bound of each component of the angular velocity, rad/s.
@@ -87,8 +87,8 @@ def angles_to_join(system: System) -> list[Recorded]:
 
 
 def angle_rate(system: System, angles: Sequence[Recorded]) -> float:
-    """Bound of each component of the rate at which the body turns against what the angles are counted from,
-    rad/s: Euler angles from space, others maybe from a frame that turns with an orbit.
+    """Bound (rad/s) of each component of the body's rate against the frame from which the angles count: space
+    for Euler angles, possibly one that turns with an orbit for others.
     """
     moving = any(r.name != "euler_angles" for r in angles)
     if system.plan.average is not None:  # the plane may move, but nothing is told of the place on an orbit
@@ -99,15 +99,16 @@ def angle_rate(system: System, angles: Sequence[Recorded]) -> float:
 
 
 def is_sparse(system: System) -> bool:
-    """Whether samples lie so far apart that they don't tell turns."""
+    """Whether samples are too far apart to tell turns."""
     return radians_between(system.scene.samples, angle_rate(system, angles_to_join(system))) > DENSE
 
 
 def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.ndarray:
-    """Where angles change by nearly half a turn between dense samples: near their pole, not within rounding.
+    """Rows where angles change by nearly half a turn between dense samples, near their pole but not within
+    rounding.
 
     Args:
-        jumps: (n, 3) from the row before, to the nearest.
+        jumps: (n, 3), changes from the row before, to the nearest.
         angles: (n + 1, 3), the row before the first among them.
     """
     middle = angles[:, 1]
@@ -116,14 +117,14 @@ def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.nd
 
 
 class _Plain:
-    """Follows a motion by the engine's own grids."""
+    """Follows a motion with the engine's own grids."""
 
     def __init__(self, system: System, *, compact: bool) -> None:
         start = np.zeros(len(system.states))
         self._engine = compiled_engine(system.equations, start, tol=_TOLERANCE, compact_mode=compact)
 
     def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
-        """The states at ascending times (n,), from the first on; None where it comes to no end."""
+        """States at ascending times (n,), beginning with the first; None if the motion doesn't get there."""
         self._engine.time = times[0]
         self._engine.state[:] = state
         outcome, *_, states = self._engine.propagate_grid(times, max_steps=_STEPS * len(times))
@@ -131,13 +132,13 @@ class _Plain:
 
 
 class _Stepwise:
-    """Follows a motion with switching surfaces, or by a table, step by step."""
+    """Follows a motion with switching surfaces or tabulated orbits step by step."""
 
     def __init__(self, stepper: Stepper) -> None:
         self._stepper = stepper
 
     def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
-        """As ``_Plain.states``."""
+        """See ``_Plain.states``."""
         stepper, found = self._stepper, [state]
         stepper.back_to(replace(stepper.mark(), time=(float(times[0]), 0.0), state=state))
         stepper.settle()
@@ -155,7 +156,7 @@ class TurnCounter:
     """Follows angles from sample to sample.
 
     Args:
-        angles: the recorded variables.
+        angles: the recorded variables with the angles.
     """
 
     def __init__(self, system: System, angles: Sequence[Recorded]) -> None:
@@ -164,7 +165,7 @@ class TurnCounter:
         self._built = False
 
     def begin(self, place: Place) -> None:
-        """Count from a sample on, unless that is where it is counted from already."""
+        """Count from a sample on, unless the counter is there already."""
         if self._place is not None and self._place.time == place.time:
             return
         self._place = place
@@ -174,7 +175,7 @@ class TurnCounter:
         self._rate = self._bound
 
     def follow(self, time: float, seconds: float = 0.2) -> None:
-        """Go on towards the next sample as far as the run itself has come, for so long at most."""
+        """Continue towards the next sample as far as the run itself has come, for at most ``seconds``."""
         started = clock_time.perf_counter()
         while (
             self._place is not None
@@ -185,8 +186,8 @@ class TurnCounter:
             self._advance(time)
 
     def turns(self, place: Place) -> np.ndarray | None:
-        """Full turns (angles,) that a later sample's angles have, counted from where it began; None where the
-        motion followed doesn't lead there.
+        """Full turns (angles,) at a later sample, counted from the beginning; None if the motion followed
+        doesn't lead there.
         """
         while self._time < place.time and not self._lost:
             self._advance(place.time)
@@ -202,7 +203,7 @@ class TurnCounter:
 
     @property
     def _bound(self) -> float:
-        """Of the angular velocity, internal units."""
+        """Bound of the angular velocity, internal units."""
         if not self._built:
             interruptible(self._build)
         return self._largest
@@ -244,7 +245,7 @@ class TurnCounter:
         self._built = True
 
     def _path(self, time: float, state: np.ndarray, end: float, parts: int) -> tuple[np.ndarray, ...] | None:
-        """Times (n + 1,), states, angles (n + 1, angles) and largest rate from a time to another."""
+        """Times (n + 1,), states, angles (n + 1, angles) and largest rate between two times."""
         times = np.linspace(time, end, parts + 1)
         times[0], times[-1] = time, end
         states = self._follower.states(times, state)
@@ -254,7 +255,7 @@ class TurnCounter:
         return times, states, np.nan_to_num(values[:-1].T), np.sqrt(values[-1].max()) + self._source
 
     def _advance(self, limit: float) -> None:
-        """A chunk of points, or as many as there are up to a time."""
+        """Follow a chunk of points, or as many as there are up to a time."""
         parts = min(self._chunk, max(1, math.ceil((limit - self._time) / self._part)))
         end = limit if parts < self._chunk else min(limit, self._time + self._chunk * self._part)
         found = self._path(self._time, self._state, end, parts)
@@ -279,7 +280,7 @@ class TurnCounter:
     def _looked_at(
         self, time: float, state: np.ndarray, end: float, jump: np.ndarray, depth: int
     ) -> np.ndarray:
-        """The change of the angles within a part whose ends don't tell it."""
+        """Change of the angles within a part whose ends don't tell it."""
         found = self._path(time, state, end, _FINER) if depth else None
         if found is None:
             return jump
@@ -291,5 +292,5 @@ class TurnCounter:
 
 
 def nearest(jumps: np.ndarray) -> np.ndarray:
-    """Changes of angles within half a turn."""
+    """Changes of angles reduced to half a turn."""
     return jumps - _TURN * np.rint(jumps / _TURN)

@@ -1,4 +1,4 @@
-"""The system by which a motion is followed between samples: the run's own, or its twin in quaternions.
+"""The system with which a motion is followed between samples: the run's own, or its twin in quaternions.
 
 Euler angles and their momenta have singularities, near which a run changes its chart. Following the motion
 needs neither: the twin carries the same motion, and its states are functions of the run's.
@@ -22,10 +22,10 @@ _CHARTS = ("euler_angles", "canonical")
 
 
 class FollowedSystem:
-    """What is followed in place of a system.
+    """The system that is followed in place of a given one.
 
     Attributes:
-        system: whose motion is followed; None where there is none that can be.
+        system: the system whose motion is followed; None if none can be.
     """
 
     def __init__(self, system: System) -> None:
@@ -39,7 +39,7 @@ class FollowedSystem:
             self.system = None if system.switches else twin
 
     def states(self, block: SampleBlock) -> np.ndarray:
-        """Of the system that is followed, float64, at the samples of a block, (n, states)."""
+        """States of the followed system, float64, at the samples of a block, (n, states)."""
         states = block.states.astype(np.float64)
         if self.system is None or self.system is self._own:
             return states
@@ -59,7 +59,7 @@ class FollowedSystem:
 
 
 def _twin_states(twin: System, chart: System) -> list[hy.expression]:
-    """The states of the twin as expressions of those of a chart."""
+    """States of the twin as expressions of the states of a chart."""
     m = chart.mechanics
     attitude = m.carried(m.attitude)
     known = dict(zip(chart.states, chart.variables, strict=True))

@@ -1,4 +1,4 @@
-"""Angles that are functions of the state, joined from sample to sample with their full turns."""
+"""Joining angles that are functions of the state from sample to sample, with their full turns."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rigidsim.solve.turns.followed import FollowedSystem
 from rigidsim.solve.turns.steady import SteadyAngles, advances_steadily
 
 UNDEFINED = 16.0
-"""Rounding errors of an angle's sine and cosine below which both are but rounding: there it is NaN."""
+"""Rounding errors of an angle's sine and cosine below which both are pure rounding and the angle is NaN."""
 _DOUBTFUL = 2.0  # rad, as in ``turn_count``
 _POLE = 1e-6  # size of an angle's sine and cosine below which dense samples aren't looked at in parts
 
@@ -33,11 +33,11 @@ class Continuity:
 
     Attributes:
         turns: full turns added to the joined angles, (angles,).
-        last_angles, last_quaternion: of the latest sample, float64, the angles before those turns; None
+        last_angles, last_quaternion: latest sample's values, float64, the angles before those turns; None
             before the first block.
-        last_time, last_state: of the latest sample, float64, internal units, where turns are counted from it.
-        wrapped_from: time (internal units) of the first sample whose turns aren't known: from there on angles
-            are recorded within one turn; nan where all are known, and -inf apart from the samples.
+        last_time, last_state: the latest sample's, float64, internal units, if turns are counted from it.
+        wrapped_from: time (internal units) of the first sample with unknown turns: from there on, angles
+            are recorded within one turn; nan if all are known, and -inf for states that aren't samples.
     """
 
     turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
@@ -49,15 +49,15 @@ class Continuity:
 
 
 class JoinedAngles:
-    """The angles of a system that are joined.
+    """The angles of a system that are joined from sample to sample.
 
-    Between dense samples they take the nearest way. Between sparse ones they advance steadily, where that is
+    Between dense samples they take the nearest way. Between sparse ones they advance steadily, if that is
     known (``rigidsim.model.observables.steadiness``), and are followed along the motion elsewhere.
 
     Attributes:
         dense: whether the samples tell all turns.
-        sparse: whether there are angles that are followed, since the samples are too sparse to tell turns.
-        columns: of the system's outputs, one for each angle.
+        sparse: whether angles are followed along the motion, since the samples are too sparse to tell turns.
+        columns: columns of the system's outputs, one for each angle.
 
     Args:
         compiled: compiles expressions of the states.
@@ -99,11 +99,11 @@ class JoinedAngles:
         return bool(self.variables)
 
     def first(self) -> Continuity:
-        """Before the first sample."""
+        """State before the first sample."""
         return Continuity(np.zeros(max(3, len(self.columns)), dtype=np.int64))
 
     def part(self, variable: Recorded) -> slice | None:
-        """Where a variable's angles are among the joined ones; None where it isn't."""
+        """Where a variable's angles are among the joined ones; None if they aren't joined."""
         place = 0
         for joined in self.variables:
             if joined.name == variable.name:
@@ -117,14 +117,14 @@ class JoinedAngles:
         """Angles (n, angles) with their turns, and what the next block is joined to.
 
         Args:
-            angles: without turns.
-            sizes: squared, of those that have one, (their number, n).
+            angles: angles without turns.
+            sizes: squared sizes of those that have one, (their number, n).
         """
         squared = self._all_sizes(sizes, len(angles))
         lost = (squared < self._least) | ~np.isfinite(squared)
         if lost.any():
             angles = angles.copy()
-            angles[lost] = self._zero  # no direction
+            angles[lost] = self._zero  # undefined: no direction
         plain, size = angles.astype(np.float64), np.sqrt(squared)
         times, states = samples.times.astype(np.float64), self._followed.states(samples)
         block = _DoubleSamples(times, states, plain, size)
@@ -143,10 +143,10 @@ class JoinedAngles:
         return found, known
 
     def follow(self, known: Continuity, time: float) -> None:
-        """Count turns from the latest sample on as far as the run has come, for a fifth of a second at most.
+        """Count turns from the latest sample up to where the run is, for at most a fifth of a second.
 
         Args:
-            time: internal units.
+            time: time that the run has reached, internal units.
         """
         latest = _latest(known)
         if self._counter is not None and latest is not None and math.isnan(known.wrapped_from):
@@ -154,7 +154,7 @@ class JoinedAngles:
             self._counter.follow(time)
 
     def _all_sizes(self, sizes: np.ndarray | None, count: int) -> np.ndarray:
-        """(n, angles), squared; 1 for Euler angles, which are told by their middle one."""
+        """Squared sizes (n, angles); 1 for Euler angles, which are judged by their middle one."""
         found = np.ones((count, len(self.columns)))
         if sizes is None:
             return found
@@ -168,12 +168,12 @@ class JoinedAngles:
         return found
 
     def _columns_of(self, variables: Sequence[Recorded]) -> np.ndarray:
-        """Where their angles are among the joined ones."""
+        """Columns of the variables' angles among the joined ones."""
         all_of = np.arange(len(self.columns))
         return np.concatenate([all_of[:0], *(all_of[self.part(r)] for r in variables)])
 
     def _doubtful(self, jumps: np.ndarray, angles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Rows whose turns dense samples don't tell, since an angle is near its pole."""
+        """Rows whose turns dense samples don't tell because an angle is near its pole."""
         found: set[int] = set()
         for variable in self.variables:
             part = self.part(variable)
@@ -186,8 +186,8 @@ class JoinedAngles:
         return np.array(sorted(found), dtype=np.int64)
 
     def _nearest(self, known: Continuity, block: _DoubleSamples) -> np.ndarray:
-        """The full turns (n, angles) from row to row that make each angle nearest to the sample before, but
-        for those near a pole, whose way is followed.
+        """Full turns (n, angles) from row to row that make each angle nearest to the sample before, except
+        near a pole, where the motion is followed.
         """
         before = block.angles[0] if known.last_angles is None else known.last_angles
         angles = np.vstack([before, block.angles])
@@ -204,7 +204,7 @@ class JoinedAngles:
         return made
 
     def _sparse_turns(self, known: Continuity, block: _DoubleSamples) -> tuple[np.ndarray, float]:
-        """The full turns (n, angles) of each row, and from when on those that are followed are lost."""
+        """Full turns (n, angles) of each row, and the time from which those of followed angles are lost."""
         turns = np.zeros(block.angles.shape, dtype=np.int64)
         wrapped_from = known.wrapped_from
         others, steady = self._columns_of(self._others), self._columns_of(self._steady_variables)
@@ -219,7 +219,7 @@ class JoinedAngles:
         return [] if self._steady is None else self._steady.variables
 
     def _advanced(self, known: Continuity, block: _DoubleSamples, columns: np.ndarray) -> np.ndarray:
-        """The full turns (n, columns) from row to row of angles that advance steadily."""
+        """Full turns (n, columns) from row to row of angles that advance steadily."""
         assert self._steady is not None
         made = np.zeros((len(block.times), len(columns)), dtype=np.int64)
         for row in range(len(block.times)):
@@ -239,8 +239,8 @@ class JoinedAngles:
     def _counted(
         self, known: Continuity, block: _DoubleSamples, columns: np.ndarray
     ) -> tuple[np.ndarray, float]:
-        """The full turns (n, columns) of the motion from sample to sample; none once they are lost, and from
-        when on they are.
+        """Full turns (n, columns) counted along the motion from sample to sample, zero once they are lost,
+        and the time from which they are.
         """
         turns = np.zeros((len(block.times), len(columns)), dtype=np.int64)
         latest, before, wrapped_from = _latest(known), known.turns[columns], known.wrapped_from
@@ -252,7 +252,7 @@ class JoinedAngles:
             if self._counter is not None and latest is not None:
                 self._counter.begin(_of(latest, columns))
                 made = self._counter.turns(_of(here, columns))
-            elif self._counter is not None and latest is None:  # the first sample
+            elif self._counter is not None and latest is None:  # at the first sample
                 made = np.zeros(len(columns), dtype=np.int64)
             if made is None:
                 wrapped_from = time
@@ -267,7 +267,7 @@ class _DoubleSamples:
     """Samples in float64, internal units.
 
     Attributes:
-        angles: (n, angles) without turns; sizes: of their sines and cosines, likewise.
+        angles, sizes: (n, angles), angles without turns, and sizes of their sines and cosines.
     """
 
     times: np.ndarray
@@ -276,17 +276,17 @@ class _DoubleSamples:
     sizes: np.ndarray
 
     def place(self, row: int) -> Place:
-        """One of them."""
+        """One sample as a place."""
         return Place(float(self.times[row]), self.states[row], self.angles[row])
 
 
 def _of(place: Place, columns: np.ndarray) -> Place:
-    """With some of its angles."""
+    """A place with only some of its angles."""
     return replace(place, angles=place.angles[columns])
 
 
 def _latest(known: Continuity) -> Place | None:
-    """The latest sample; None without one."""
+    """The latest sample; None if there is none."""
     if known.last_state is None or known.last_angles is None:
         return None
     return Place(known.last_time, known.last_state, known.last_angles)

@@ -1,4 +1,4 @@
-"""Turns of angles that advance so steadily that two samples and their rates tell them."""
+"""Turns of angles that advance so steadily that two samples and their rates determine them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from rigidsim.solve.precision import precision_of
 from rigidsim.solve.turns.count import Place
 
 _OPEN = 0.5
-"""Angle (rad) that may be left open where a turn is told from rates: a sixth of what would mistake it."""
+"""Uncertainty (rad) allowed where a turn follows from rates: a sixth of what would miscount it."""
 
 
 def advances_steadily(system: System, variable: Recorded) -> bool:
-    """Whether the turns of a variable's angles between all samples are told by their rates."""
+    """Whether rates determine the turns of a variable's angles between all samples."""
     if variable.steady is None:
         return False
     spacing = system.scene.samples.largest_spacing
@@ -26,10 +26,10 @@ def advances_steadily(system: System, variable: Recorded) -> bool:
 
 
 class SteadyAngles:
-    """Angles whose turns between samples are told by their rates.
+    """Angles whose turns between samples follow from their rates.
 
     Args:
-        variables: each with ``Recorded.steady``.
+        variables: variables that have ``Recorded.steady``.
     """
 
     def __init__(self, system: System, variables: list[Recorded]) -> None:
@@ -42,10 +42,10 @@ class SteadyAngles:
         self._excursion = np.concatenate([[steady.excursion] * count for steady, count in known])
 
     def turns(self, before: Place, here: Place, sizes: np.ndarray) -> np.ndarray | None:
-        """Full turns (angles,) from one sample to a later one; None where an angle is too near its pole.
+        """Full turns (angles,) from one sample to a later one; None if an angle is too near its pole.
 
         Args:
-            sizes: of the angles' sines and cosines at the latter.
+            sizes: sizes of the angles' sines and cosines at the later sample.
         """
         time = here.time - before.time
         left_open = self._uncertainty * math.ldexp(time, self._unit) + self._excursion
@@ -55,7 +55,7 @@ class SteadyAngles:
         return np.rint((before.angles + advance - here.angles) / (2 * math.pi)).astype(np.int64)
 
     def _rates(self, place: Place) -> np.ndarray:
-        """Of the angles, rad per internal unit of time."""
+        """Rates of the angles, rad per internal unit of time."""
         if self._function is None:
             system = self._system.rounded(precision_of("double").number)
             names = {r.name for r in self.variables}
