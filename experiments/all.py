@@ -40,6 +40,7 @@ STUDIES = (
     "averaged_motions",
     "whole_cycle",
     "cassini_states",
+    "tumbling_averages",
 )
 
 

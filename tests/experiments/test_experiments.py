@@ -34,6 +34,7 @@ SLOW = {  # about how many seconds they take
     "round_off_ensemble": 25,
     "satellite_stability": 15,
     "spectral_lines": 15,
+    "tumbling_averages": 15,
     "whole_cycle": 15,
 }
 
