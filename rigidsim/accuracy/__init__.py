@@ -1,1 +1,1 @@
-"""How right a setting is and what it costs: trials, forecasts, choices, certificates, and their bench."""
+"""Accuracy and cost of settings: trials, forecasts, choices, certificates, and their bench."""

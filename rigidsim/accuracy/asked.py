@@ -1,4 +1,4 @@
-"""What a config asks for in the way of accuracy."""
+"""The accuracy that a config asks for."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ _MOST = 1.0  # rad: for a path that may be anywhere
 
 
 def leaves_choice(experiment: Experiment) -> bool:
-    """Whether ``accuracy`` is given and precision, tolerance or method are open to be chosen for it."""
+    """Whether ``accuracy`` is given and precision, tolerance or method are left open to be chosen for it."""
     integrator = experiment.config.integrator
     fixed = {"precision", "tolerance", "method"} <= integrator.model_fields_set
     return wanted(experiment) is not None and not fixed
 
 
 def wanted(experiment: Experiment) -> float | None:
-    """The accuracy of the attitude to choose settings for, rad; None where none is asked for.
+    """Accuracy of the attitude for which settings are chosen, rad; None if none is asked for.
 
-    Errors of the path are, for its size, about as large as those of the attitude; the certificate says what
-    they are, and a dearer setting is chosen where they are larger than that.
+    Errors of the path are, relative to its size, about those of the attitude; the certificate tells what
+    they are, and a more costly setting is chosen if they are larger.
     """
     integrator = experiment.config.integrator
     found = [] if integrator.accuracy is None else [float(integrator.accuracy)]
     if integrator.accuracy_axis is not None and not experiment.config.model.reduced:
-        found.append(float(integrator.accuracy_axis))  # no axis is further off than the attitude
+        found.append(float(integrator.accuracy_axis))  # no axis errs by more than the attitude
     if integrator.accuracy_position is not None:
         scene = build_scene(experiment)
         if scene.position is None or scene.velocity is None:

@@ -1,7 +1,7 @@
-"""How right is a run really: its attitude against an independent and better solution, at a set of times.
+"""Certified accuracy of a run: its attitude against an independent, better solution at a set of times.
 
-What is certified is the largest difference found, some more for what lies between the times compared, and
-what the reference itself may be wrong by (``rigidsim.accuracy.reference``).
+The certified error is the largest difference found, plus a margin for the times between those compared, plus
+the reference's own error (``rigidsim.accuracy.reference``).
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What was found.
+    """Result of a certification.
 
     Attributes:
         error: bound of the attitude error at the times compared, the end among them, rad.
         end: the difference found at the end itself, rad.
-        how: against what.
-        times: how many.
-        place: bound of the position's error at the same times, m; None where no accuracy of it was asked for.
+        how: description of the reference.
+        times: number of times compared.
+        place: bound of the position error at the same times, m; None if no accuracy of it was asked for.
     """
 
     error: float
@@ -59,12 +59,12 @@ class Certificate:
     place: float | None = None
 
     def keeps(self, accuracy: float, accuracy_position: float | None) -> bool:
-        """Whether both errors are within what was asked for."""
+        """Whether both errors are within the requested accuracies."""
         within = accuracy_position is None or (self.place is not None and self.place <= accuracy_position)
         return self.error <= accuracy and within
 
     def as_dict(self) -> dict[str, float | str | int]:
-        """For the summary."""
+        """Values for the summary."""
         place: dict[str, float | str | int] = {}
         if self.place is not None:
             place["certified_position"] = self.place
@@ -78,11 +78,11 @@ class Certificate:
 
 @dataclass(frozen=True)
 class Shortfall:
-    """An accuracy that was asked for and not certified.
+    """A requested accuracy that was not certified.
 
     Attributes:
         asked, certified: rad.
-        how: against what.
+        how: description of the reference.
     """
 
     code: ClassVar[str] = "accuracy_not_certified"
@@ -92,7 +92,7 @@ class Shortfall:
 
     @property
     def message(self) -> str:
-        """For the user."""
+        """Message for the user."""
         return (
             f"accuracy = {self.asked:.3g} rad was asked for, but only {self.certified:.2g} rad could be "
             f"certified ({self.how}); choose a higher precision or a nearer end"
@@ -113,16 +113,16 @@ def certify(
     """Compare a finished run with an independent solution.
 
     Args:
-        dataset: of the run.
-        experiment: that was run.
-        accuracy: asked for, rad; decides how good the reference must be.
-        accuracy_position: asked for, m; None where the path need not be compared.
-        known: of the motion, where it was looked at already.
-        told: of the comparisons, as in ``try_setting``.
-        policy: of references.
+        dataset: dataset of the run.
+        experiment: the experiment that was run.
+        accuracy: requested accuracy, rad, which decides how good the reference must be.
+        accuracy_position: requested accuracy, m; None if the path need not be compared.
+        known: what is known of the motion, if it was examined before.
+        told: receives the progress of comparisons, as in ``try_setting``.
+        policy: policy for references.
 
     Returns:
-        None where the run recorded too little to be compared.
+        None if the run recorded too little to be compared.
     """
     if dataset.sizes["time"] == 0:
         return None
@@ -142,12 +142,12 @@ def certify(
 
 
 class _Compared:
-    """A run's recorded attitudes, and what others say at the same times.
+    """A run's recorded attitudes, and other solutions at the same times.
 
     Attributes:
-        setting: of the run.
-        largest: of the differences from the latest reference, rad.
-        own: that reference's own error, at most, rad.
+        setting: setting of the run.
+        largest: largest difference from the latest reference, rad.
+        own: bound of that reference's own error, rad.
     """
 
     def __init__(self, dataset: xarray.Dataset, trials: Trials, motion: KnownMotion, policy: Policy) -> None:
@@ -173,7 +173,7 @@ class _Compared:
         self.largest = self.own = math.inf
 
     def against(self, reference: Reference) -> Certificate | None:
-        """The certificate that a reference gives; None where it can't be had."""
+        """The certificate that a reference gives; None if it is impossible."""
         policy = self._policy
         rows = self._rows[policy.wide_times if reference.kind is ReferenceKind.CLOSED_FORM else policy.times]
         safety = policy.safety if len(rows) == self._count else policy.picked_safety
@@ -193,7 +193,7 @@ class _Compared:
 
         self.largest = float(difference.max())
         self.own = own_error(reference, self.setting, self.largest, self._motion, distance, policy)
-        # a quaternion's own last bit: what is recorded can't be compared more closely
+        # recorded values can't be compared more closely than a quaternion's last bit
         floor = 2.0 ** (2 - self.setting.bits)
         error = safety * self.largest + self.own + floor
         if not self.largest < INCOMPARABLE:
@@ -206,8 +206,8 @@ class _Compared:
         return Certificate(min(error, math.pi), float(difference[-1]), reference.how, len(rows), place)
 
     def _place_error(self, reference: Reference, apart: float, safety: float) -> float:
-        """What a path may be wrong by, by its distance from the reference's: errors of the two are as those
-        of a step are, but for scatter.
+        """Bound of a path's error from its distance to the reference's path: the two errors are in the ratio
+        of their errors per step, up to scatter.
         """
         if reference.kind is ReferenceKind.CLOSED_FORM:
             return safety * apart
@@ -223,7 +223,7 @@ class _Compared:
 
 
 def shortfall(certificate: Certificate, accuracy: float) -> Shortfall | None:
-    """What an accuracy asked for (rad) was missed by; None where it was certified."""
+    """By what a requested accuracy (rad) was missed; None if it was certified."""
     if certificate.error <= accuracy:
         return None
     return Shortfall(accuracy, min(certificate.error, math.pi), certificate.how)
@@ -232,8 +232,8 @@ def shortfall(certificate: Certificate, accuracy: float) -> Shortfall | None:
 def verdict(
     certificate: Certificate, accuracy: float | None, accuracy_position: float | None = None
 ) -> str | None:
-    """The warning for a summary where what was asked for (rad, and m of the path) wasn't certified; None
-    where it was.
+    """Warning for a summary if the requested accuracies (rad, and m of the path) weren't certified; None if
+    they were.
     """
     short = None if accuracy is None else shortfall(certificate, accuracy)
     if short is not None:

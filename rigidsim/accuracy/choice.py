@@ -1,9 +1,9 @@
-"""``[integrator] accuracy``: the cheapest setting that keeps the attitude as right as was asked for.
+"""Choice of the cheapest setting that keeps the attitude as accurate as ``[integrator] accuracy`` asks.
 
 Settings are tried over the motion's beginning, which is the whole of a short run, against a better one
 (``rigidsim.accuracy.forecast``); what wasn't tried follows from what was: errors of rounding are in
-proportion to the precision's epsilon, those of the series to the tolerance. A choice is a forecast: what the
-run really kept is certified afterwards (``rigidsim.accuracy.certificate``).
+proportion to the precision's epsilon, those of the series to the tolerance. A choice is a forecast: the
+accuracy that the run really kept is certified afterwards (``rigidsim.accuracy.certificate``).
 
 Choices depend on counts alone, never on a clock, so that a config always chooses the same.
 """
@@ -34,13 +34,13 @@ _LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100
 
 @dataclass(frozen=True)
 class ChoiceMargins:
-    """Between what is forecast and what was asked for.
+    """Margins between the forecast and the requested accuracy.
 
     With the defaults 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice
     the cheapest setting of a full search (``experiments/accuracy_certificates.py``).
 
     Attributes:
-        safety: the accuracy over the largest forecast.
+        safety: ratio of the accuracy to the largest acceptable forecast.
         hope: of the accuracy: worth a try where the next precision costs ten times as much; hope_long: the
             same of a long run, which mostly does better than forecast from its beginning.
         progress: of the error forecast of a setting that failed: what the next must promise.
@@ -57,13 +57,13 @@ MARGINS = ChoiceMargins()
 
 @dataclass(frozen=True)
 class Choice:
-    """A setting and what is forecast of it.
+    """A chosen setting and its forecast.
 
     Attributes:
-        forecast: attitude error at the end, rad.
-        steps: natural steps, roughly.
+        forecast: forecast attitude error at the end, rad.
+        steps: approximate number of natural steps.
         why: one sentence for the summary.
-        known: of the motion.
+        known: what is known of the motion.
     """
 
     setting: Setting
@@ -80,16 +80,16 @@ def chosen(
     beyond: Setting | None = None,
     told: Told | None = None,
 ) -> tuple[Experiment, Choice | None]:
-    """The experiment with the settings that its ``accuracy`` asks for written into it.
+    """The experiment with the settings that its ``accuracy`` asks for written into it, and the choice.
 
     Keys that the config gives stay as they are; where it gives precision, tolerance and method, nothing is
     chosen and the run is only certified. The text has what was chosen in its keys, so that it means the
     same run again.
 
     Args:
-        loads: given from Python.
-        beyond: a setting that was run and didn't keep the accuracy; only dearer ones are looked at.
-        told: of the trials, as in ``try_setting``.
+        loads: loads given from Python.
+        beyond: a setting that was run and missed the accuracy; only more costly ones are considered.
+        told: receives the progress of trials, as in ``try_setting``.
 
     Raises:
         ConfigError: no setting reaches the accuracy; says what can be reached.
@@ -118,11 +118,11 @@ def choose(
     """The cheapest setting whose forecast keeps an accuracy, within what the config leaves open.
 
     Args:
-        accuracy: rad, at the end.
-        beyond, told: as of ``chosen``.
+        accuracy: attitude accuracy at the end, rad.
+        beyond, told: as in ``chosen``.
 
     Raises:
-        ConfigError: none does.
+        ConfigError: no setting does.
     """
     forecasts = Forecasts(experiment, accuracy, loads, told)
     motion = forecasts.motion
@@ -148,8 +148,8 @@ def choose(
 
 
 def _first(forecasts: Forecasts, candidates: list[Setting], most: float, hope: float) -> Choice | None:
-    """The first of the candidates that is forecast to be within ``most``, or within ``hope`` where only
-    another precision would do better.
+    """The first candidate whose forecast is within ``most``, or within ``hope`` if only another precision
+    would do better; None if there is none.
     """
     motion = forecasts.motion
     steps = int(motion.steps)
@@ -165,7 +165,7 @@ def _first(forecasts: Forecasts, candidates: list[Setting], most: float, hope: f
 
 
 def _candidates(experiment: Experiment, motion: KnownMotion) -> list[Setting]:
-    """All that the config leaves open."""
+    """All settings that the config leaves open."""
     integrator = experiment.config.integrator
     given = integrator.model_fields_set
     formulation = integrator.formulation

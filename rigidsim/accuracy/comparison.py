@@ -1,4 +1,4 @@
-"""Attitudes compared with every digit, at the samples that are worth comparing."""
+"""Comparison of attitudes with every digit, at the samples that matter."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def spread_times(experiment: Experiment, count: int, until: float = 1.0) -> list
 
 
 def rows_to_compare(dataset: xarray.Dataset, most: int) -> np.ndarray:
-    """All samples, or of each of ``most`` stretches the one where the body turns fastest, and the last."""
+    """All samples, or the one of fastest rotation in each of ``most`` stretches, and the last."""
     count = dataset.sizes["time"]
     if count <= most:
         return np.arange(count)
@@ -72,7 +72,7 @@ def rows_to_compare(dataset: xarray.Dataset, most: int) -> np.ndarray:
 
 
 def exact_times(dataset: xarray.Dataset, rows: np.ndarray) -> list[mpmath.mpf]:
-    """Of some rows, mpf seconds."""
+    """Times of some rows, s (mpf)."""
     parts = zip(*parts_of(dataset, "time", rows), strict=True)
     with mpmath.workprec(1200):
         return [mpmath.fsum(float(part) for part in row) for row in parts]

@@ -1,4 +1,4 @@
-"""What a setting costs, counted: so that no clock decides what is chosen."""
+"""Cost of a setting as a count, so that no clock decides what is chosen."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class UnitCosts:
     are off by more than 1.3.
 
     Attributes:
-        steps: of a step over the square of its Taylor order, in that of double precision.
-        digits_step: the same at 50 digits, in proportion to the digits above.
-        projected: factor of a step after which invariants are projected.
-        closed_start, closed_sample: of a closed form's first sample, and of each one, to 53 bits.
-        wide_closed_sample, digits_closed_sample: of each to 64 or 113 bits, and to 50 digits.
-        seconds: that the unit takes, for a free body on one core: for messages only.
+        steps: cost of a step over the square of its Taylor order, relative to double precision.
+        digits_step: the same at 50 digits, proportional to the digits beyond.
+        projected: cost factor of a step after which invariants are projected.
+        closed_start, closed_sample: cost of a closed form's first sample, and of each one, to 53 bits.
+        wide_closed_sample, digits_closed_sample: cost of each to 64 or 113 bits, and to 50 digits.
+        seconds: duration of the unit for a free body on one core; for messages only.
     """
 
     steps: Mapping[str | int, float] = field(default_factory=lambda: _STEPS)
@@ -44,13 +44,13 @@ MEASURED = UnitCosts()
 
 
 def cost(setting: Setting, steps: float, samples: int, *, units: UnitCosts = MEASURED) -> float:
-    """In steps of double precision at its epsilon, roughly.
+    """Approximate cost in steps of double precision at its epsilon.
 
     A step's work goes with the square of the Taylor order; steps are about as long at any tolerance.
 
     Args:
-        steps: natural steps of the run; of no account to a closed form.
-        samples: of the run; they cost next to nothing where steps are taken.
+        steps: natural steps of the run; irrelevant for a closed form.
+        samples: samples of the run; they cost next to nothing if steps are taken.
     """
     digits = max(1.0, setting.precision / 50) if isinstance(setting.precision, int) else None
     if setting.method == "closed_form":

@@ -1,4 +1,4 @@
-"""Laws of errors: what rounding and the motion itself let a good integration be wrong by."""
+"""Error laws: the error that rounding and the motion itself leave to a good integration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rigidsim.solve.closed_form import ClosedForm
 
 CLOSED_FORM = 50.0
-"""eps: rounding of a sample from a closed form, thirty operations and sines right to 4 ulp, at any time."""
+"""In eps: error of a sample from a closed form, thirty operations and sines right to 4 ulp, at any time."""
 
 _LARGEST_EXPONENT = 600.0  # keeps products within doubles
 
@@ -31,7 +31,7 @@ def round_off_law(tolerance: float, steps: int, rate: float, duration: float) ->
 
 
 def attitude_error(level: float, steps: int, rate: float, seconds: float, growth: Growth) -> float:
-    """The law times what the motion amplifies errors by, rad: errors of this size are made at each step."""
+    """The round-off law times the motion's amplification, rad, for errors of size ``level`` at each step."""
     return round_off_law(level, steps, rate, seconds) * growth.at(seconds)
 
 
@@ -56,10 +56,10 @@ def held_error(
 
 
 def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedForm | None, str]:
-    """The closed form of a scene's motion; where it has none, None and why not.
+    """The closed form of a scene's motion, or None and the reason why there is none.
 
     Args:
-        driven: whether loads are given from Python, of which the scene knows nothing.
+        driven: whether loads unknown to the scene are given from Python.
     """
     from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
 
@@ -70,9 +70,9 @@ def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedFor
 
 
 def motion_growth(prepared: InitialValueProblem) -> Growth:
-    """How strongly the motion itself amplifies errors (some 30 ms).
+    """Amplification of errors by the motion itself (takes some 30 ms).
 
-    Measured in quaternions, or in rates where no attitude is carried: a chart's own singularity is another
+    Measured in quaternions, or in rates if no attitude is carried: a chart's own singularity is another
     matter. A closed form makes no errors on the way that could grow.
     """
     if prepared.closed is not None:
@@ -85,7 +85,7 @@ def motion_growth(prepared: InitialValueProblem) -> Growth:
 
 
 def _beyond_measure(prepared: InitialValueProblem, growth: Growth) -> Growth:
-    """The growth of a motion past an unstable axis, where offsets became too large to be measured.
+    """Growth for a motion past an unstable axis, where offsets became too large to be measured.
 
     In elliptic functions of parameter m a change of m moves each passage by 1 / (1 - m) times as much, as far
     as there is time to: errors grow no faster than exp(p t), with p the rate of the functions' argument. The

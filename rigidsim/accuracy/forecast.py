@@ -1,4 +1,4 @@
-"""Errors of settings at a run's end, forecast from short trials over its beginning.
+"""Forecasts of settings' errors at a run's end, from short trials over its beginning.
 
 Laws: errors of rounding grow like t^1.5 (Brouwer 1937), or t with projected invariants; those of the series
 at most like t^2; both times the motion's own growth. Short motions are tried whole.
@@ -27,21 +27,21 @@ _LARGEST_EXPONENT = 600.0  # keeps products within doubles
 
 @dataclass(frozen=True)
 class Extrapolation:
-    """From what trials show to a run's end.
+    """Extrapolation from trials to a run's end.
 
     With the defaults 96 of 100 choices cost at most twice the cheapest setting of a full search, and 199 of
     200 were kept (``experiments/accuracy_certificates.py``).
 
     Attributes:
-        steps: natural ones of a trial, at most.
-        times: compared; closed_times: of a closed form, a sample of which may take milliseconds.
-        saturated: rad, past which errors are no longer small, and don't scale.
-        closed_floor: roundings of a closed form, at least.
-        exponential: power of time past which growth is none.
-        power: of time, at most, where it is one.
-        series, projected, rounding: the same, at least, for errors of series, and of rounding with projected
+        steps: largest number of natural steps of a trial.
+        times, closed_times: times compared; fewer for a closed form, whose samples may take milliseconds.
+        saturated: error (rad) past which errors are no longer small, and don't scale.
+        closed_floor: least error of a closed form, in roundings.
+        exponential: power of time past which growth counts as exponential.
+        power: largest power of time of any other growth.
+        series, projected, rounding: least powers for errors of series, and of rounding with projected
             invariants and without.
-        clearly: times the law of rounding is less than the accuracy: then nobody needs to measure it.
+        clearly: ratio of accuracy to round-off law from which rounding needn't be measured.
     """
 
     steps: int = PILOT_STEPS
@@ -61,7 +61,7 @@ class Extrapolation:
 
         Args:
             early, late: largest errors over the first quarter of a trial, and over all of it.
-            part: of the run that was tried.
+            part: part of the run that was tried.
         """
         early = max(early, late * 1e-300)
         power = math.log(late / early) / math.log(4)
@@ -77,12 +77,12 @@ LAW = Extrapolation()
 
 
 class Forecasts:
-    """Errors of settings, measured where that is cheap, and forecast from what was measured elsewhere.
+    """Errors of settings, measured if that is cheap, otherwise forecast from what was measured.
 
     Attributes:
-        motion: what is known of it.
-        samples: of the run.
-        part: of the run that is tried.
+        motion: what is known of the motion.
+        samples: number of samples of the run.
+        part: part of the run that is tried.
     """
 
     def __init__(
@@ -95,10 +95,10 @@ class Forecasts:
         law: Extrapolation = LAW,
         policy: Policy = STANDARD,
     ) -> None:
-        """Look at a motion's beginning.
+        """Examine a motion's beginning.
 
         Args:
-            accuracy: asked for, rad: what is obviously within it isn't tried.
+            accuracy: requested accuracy, rad; a setting obviously within it isn't tried.
             loads, told: as in ``try_setting``.
         """
         self._experiment, self._accuracy, self._law, self._policy = experiment, accuracy, law, policy
@@ -111,7 +111,7 @@ class Forecasts:
         self._references: dict[Setting, Trial | None] = {}
 
     def error(self, setting: Setting) -> float:
-        """Forecast at the run's end, rad; measures what it needs."""
+        """Forecast error at the run's end, rad; measures what it needs."""
         if setting.method == "closed_form":
             return self._closed_error(setting)
         rounding = self._rounding(setting)
@@ -120,7 +120,7 @@ class Forecasts:
         return max(rounding, self._series(setting))
 
     def measure(self, setting: Setting) -> bool:
-        """Try a setting itself, if that is worth it; False where nothing new can be learnt."""
+        """Try a setting itself, if worthwhile; False if nothing new can be learnt."""
         if setting.method == "closed_form" or setting.tolerance is None or setting in self._measured:
             return False
         if setting.bits > 53:
@@ -129,7 +129,7 @@ class Forecasts:
         return True
 
     def why(self, setting: Setting) -> str:
-        """Where the forecast is from, for the summary."""
+        """Origin of the forecast, for the summary."""
         if setting.method == "closed_form":
             return "its solution in closed form costs less than its steps"
         if setting.tolerance is None and self._obvious(setting):
@@ -140,7 +140,7 @@ class Forecasts:
         return f"from trials in double precision over the {extent}, whose errors shrink with epsilon"
 
     def _closed_error(self, setting: Setting) -> float:
-        """Of a closed form; it costs the same at any horizon, so that it is compared over all of it."""
+        """Error of a closed form, compared over the whole run since it costs the same at any horizon."""
         if setting not in self._measured:
             floor = self._law.closed_floor * epsilon(setting.precision)
             self._measured[setting] = math.inf
@@ -154,7 +154,7 @@ class Forecasts:
         return self._measured[setting]
 
     def _obvious(self, setting: Setting) -> bool:
-        """Whether rounding is clearly no matter."""
+        """Whether rounding is clearly negligible."""
         return self.motion.rounding(setting.precision) * self._law.clearly <= self._accuracy
 
     def _rounding(self, setting: Setting) -> float:
@@ -189,7 +189,7 @@ class Forecasts:
             return math.inf
         errors = angles_between(trial.attitudes, reference.attitudes)
         late = float(errors.max())
-        if late > self._law.saturated:  # no longer small: only the law knows how large it would be
+        if late > self._law.saturated:  # no longer small: only the law tells how large it would be
             return max(late, self.motion.error(setting.level))
         late = max(late, epsilon(setting.precision))
         if self.part >= 1.0:
@@ -197,7 +197,9 @@ class Forecasts:
         return self._law.at_end(float(errors[: len(errors) // 4].max()), late, self.part, setting)
 
     def _reference(self, setting: Setting) -> Trial | None:
-        """What a setting's trial is held against: double precision where rounding is no matter."""
+        """The trial against which a setting's trial is compared: in double precision if rounding is
+        negligible.
+        """
         precision = "double" if self._obvious(setting) else "extended"
         steps = self.motion.steps * self.part
         best = stepped_reference(precision, self.motion, steps, self._policy, setting.formulation)

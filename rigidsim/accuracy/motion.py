@@ -1,4 +1,4 @@
-"""What the beginning of a motion tells of the whole: its steps, their cost, and how its errors grow."""
+"""Forecast of a whole motion from its beginning: its steps, their cost, and the growth of its errors."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
 
 PILOT_STEPS = 20_000
-"""Of double precision at its epsilon: some tens of milliseconds."""
+"""Pilot steps in double precision at its epsilon: some tens of milliseconds."""
 _FEWEST_STEPS = 16  # for the law of rounding, which is one of many steps
 
 
 @dataclass(frozen=True)
 class Pilot:
-    """A motion's first steps.
+    """A motion's first steps, as a pilot.
 
     Attributes:
-        taken: how many.
+        taken: number of steps taken.
         step: their mean length, internal units.
-        whole: natural steps of the whole motion, if they go on so.
-        seconds_per_step: CPU.
+        whole: natural steps of the whole motion, extrapolated.
+        seconds_per_step: CPU seconds per step.
     """
 
     taken: int
@@ -55,9 +55,9 @@ def run_pilot(
 
     Args:
         stepper: at the motion's start, which is the clock's.
-        skip: takes so many steps with what is done between them; the stepper's own by default.
-        steps: at most, or a chunk more; and none after the last sample.
-        seconds: of CPU, at most, or a chunk more.
+        skip: takes a number of steps, with anything done between them; the stepper's own by default.
+        steps: largest number of steps, give or take a chunk; none after the last sample.
+        seconds: largest CPU time, s, give or take a chunk.
         chunk: steps taken at once, at first; doubled each time up to ``largest_chunk``.
         warming: steps before those whose cost is measured.
     """
@@ -86,11 +86,11 @@ class KnownMotion:
     """What is known of a motion before its long run.
 
     Attributes:
-        steps: of double precision at its epsilon, over the whole run.
+        steps: steps of double precision at its epsilon over the whole run.
         rate: bound of the angular velocity, rad/s.
         seconds: the run's length.
-        growth: of errors by the motion itself.
-        holds: whether it has invariants to project, be it the quaternion's norm alone.
+        growth: amplification of errors by the motion itself.
+        holds: whether it has invariants to project, if only the quaternion's norm.
         closed: whether it has a closed form.
     """
 
@@ -102,21 +102,21 @@ class KnownMotion:
     closed: bool
 
     def error(self, level: float) -> float:
-        """Attitude error at the end, rad, from random errors of this size at each step, which the motion
+        """Attitude error at the end, rad, for random errors of size ``level`` at each step, which the motion
         amplifies.
         """
         steps = max(int(self.steps), _FEWEST_STEPS)
         return attitude_error(1.0, steps, self.rate, self.seconds, self.growth) * level
 
     def rounding(self, precision: str | int) -> float:
-        """Attitude error of rounding at the end, rad."""
+        """Attitude error at the end from rounding, rad."""
         return self.error(epsilon(precision))
 
 
 def motion_of(
     experiment: Experiment, *, loads: Sequence[Load] = (), pilot_steps: int = PILOT_STEPS
 ) -> KnownMotion:
-    """Look at the beginning of a motion (some tens of milliseconds)."""
+    """Examine the beginning of a motion (some tens of milliseconds)."""
     scene = trial_scene(experiment, Setting())
     prepared = compactly(prepare_scene(experiment, scene, loads=loads))
     clock, precision = prepared.clock, prepared.precision

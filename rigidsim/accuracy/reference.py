@@ -1,4 +1,4 @@
-"""What a solution is held against, and how wrong that may be itself: the one policy of choices, certificates,
+"""References against which solutions are held, and their own errors: one policy for choices, certificates,
 and the bench.
 
 A reference never shares the arithmetic of what it judges. It is the closed form with more digits, or an
@@ -22,20 +22,21 @@ from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.records import dataclass
 
 INCOMPARABLE = 0.5
-"""rad, past which a difference says nothing but that digits are gone."""
+"""Difference (rad) past which all digits are gone."""
 LEAST_DIGITS = 50
-"""Of a reference with digits: 16 beyond quadruple precision."""
+"""Least digits of a multi-precision reference: 16 beyond quadruple precision."""
 _SPARE_DIGITS = 20  # of a reference for digits, beyond theirs
 _SECOND: dict[str | int, float] = {"quadruple": 1e-30, LEAST_DIGITS: 1e-44}
 """Tolerances of the second best of a precision: a thousand epsilons or more, so that it is another solution;
-in extended and double precision "auto" without projected invariants is."""
+in extended and double precision "auto" without projected invariants is.
+"""
 _SAME_VARIABLES = 10.0
-"""What solutions in the same variables may both be wrong by, over their distance."""
+"""Ratio of the common error of solutions in the same variables to their distance."""
 
 
 @dataclass(frozen=True)
 class Policy:
-    """How far references go, and what margins are kept.
+    """Policy for references: how far they go, and which margins are kept.
 
     With the defaults no certificate of 200 random scenes was exceeded by the true error, and 199 of these
     runs were certified as they asked (``experiments/accuracy_certificates.py``).
@@ -69,11 +70,11 @@ class Policy:
     as_bad: float = 3.0
 
     def scatter_of(self, setting: Setting, steps: float) -> float:
-        """Of a setting's errors over so many steps."""
+        """Scatter of a setting's errors over so many steps."""
         return self.scatter if setting.tolerance is None else self.scatter_with_series(steps)
 
     def scatter_with_series(self, steps: float) -> float:
-        """The same of any setting whose tolerance is above its epsilon."""
+        """The same for any setting whose tolerance is above its epsilon."""
         return self.scatter + self.scatter_of_series * math.sqrt(steps)
 
 
@@ -81,7 +82,7 @@ STANDARD = Policy()
 
 
 class ReferenceKind(Enum):
-    """What a reference is."""
+    """Kind of a reference."""
 
     CLOSED_FORM = "closed form"
     FINER = "smaller errors per step"
@@ -90,14 +91,14 @@ class ReferenceKind(Enum):
 
 @dataclass(frozen=True)
 class Reference:
-    """What a solution may be held against."""
+    """A reference against which a solution may be held."""
 
     setting: Setting
     kind: ReferenceKind = ReferenceKind.FINER
 
     @property
     def how(self) -> str:
-        """For the summary."""
+        """Description for the summary."""
         if self.kind is ReferenceKind.CLOSED_FORM:
             return f"against the closed form, {self.setting.precision}"
         if self.kind is ReferenceKind.PEER:
@@ -111,11 +112,11 @@ class Reference:
 def references(
     setting: Setting, motion: KnownMotion, accuracy: float, policy: Policy = STANDARD
 ) -> list[Reference]:
-    """Those of a whole run, from cheap to costly.
+    """References for a whole run, from cheap to costly.
 
     Args:
-        setting: of the run.
-        accuracy: asked for, rad; decides how good those with many digits must be.
+        setting: setting of the run.
+        accuracy: requested accuracy, rad, which decides how good those with many digits must be.
     """
     loose = setting.method == "taylor" and setting.tolerance is not None
     stepped: list[str | int] = []
@@ -143,7 +144,7 @@ def references(
 
 
 def digits_beyond(precision: str | int) -> int:
-    """Of a reference for a precision."""
+    """Digits of a reference for a precision."""
     return max(LEAST_DIGITS, int(working_bits(precision) * 0.302) + _SPARE_DIGITS)
 
 
@@ -160,7 +161,7 @@ def stepped_reference(
     than 64 bits rounding doesn't matter, nor does it over a short way in double precision.
 
     Args:
-        steps: that it takes, roughly.
+        steps: approximate number of steps.
     """
     projected = working_bits(precision) <= 64 and (precision != "double" or steps > policy.extended_steps)
     return Setting(precision, formulation=formulation, hold_invariants=projected and motion.holds)
@@ -169,7 +170,7 @@ def stepped_reference(
 def _only_as_good(
     reference: Setting, setting: Setting, motion: KnownMotion, accuracy: float, policy: Policy
 ) -> Setting:
-    """A reference with many digits needs less than all."""
+    """A multi-precision reference with no more accuracy than needed."""
     if reference.bits <= 64:
         return reference
     tolerance = policy.clearly * accuracy / max(1.0, motion.error(1.0))
@@ -179,18 +180,18 @@ def _only_as_good(
 
 
 def closed_form_to(digits: int) -> Reference:
-    """The closed form, whatever it is to judge: for many settings at once."""
+    """The closed form to so many digits, for many settings at once."""
     return Reference(Setting(digits, method="closed_form"), ReferenceKind.CLOSED_FORM)
 
 
 def best_and_second(precision: str | int) -> tuple[Setting, Setting]:
-    """The best that a precision can do, and the second best, by which the error of the best is known."""
+    """The best setting of a precision, and the second best, from which the error of the best is known."""
     return Setting(precision, hold_invariants=True), Setting(precision, _SECOND.get(precision))
 
 
 def equals_of(best: Setting, there: Iterable[Setting]) -> list[Setting]:
-    """Solutions that are as good as a precision's best, or nearly so: of extended and double precision those
-    in the rotation matrix's elements too, which round other initial values and coefficients.
+    """Solutions as good as a precision's best, or nearly so: in extended and double precision also those with
+    rotation-matrix states, which round other initial values and coefficients.
     """
     second = _SECOND.get(best.precision)
     return [
@@ -206,8 +207,8 @@ def equals_of(best: Setting, there: Iterable[Setting]) -> list[Setting]:
 
 
 def errors_of_best(best: Setting, distances: Mapping[Setting, np.ndarray]) -> np.ndarray:
-    """Errors (samples,) in rad of the best solution of a precision: its largest distance so far from others
-    that are as good.
+    """Errors (samples,), rad, of the best solution of a precision: its largest distance so far from equally
+    good ones.
 
     Those in the same variables have begun with the same rounded values, and take the same steps until
     invariants are first projected: such a distance alone was up to six times (13 once) too small.
@@ -225,7 +226,7 @@ def errors_of_best(best: Setting, distances: Mapping[Setting, np.ndarray]) -> np
 
 
 def closed_form_error(digits: int) -> float:
-    """Of a closed form to so many digits, rad: two of them are left to rounding."""
+    """Error of a closed form to so many digits, rad: two of them are left to rounding."""
     return 10.0 ** (2 - digits)
 
 
@@ -237,14 +238,14 @@ def own_error(
     distance: Callable[[Setting], float],
     policy: Policy,
 ) -> float:
-    """What a reference may be wrong by, rad.
+    """Bound of a reference's own error, rad.
 
     A pilot may not have seen how strongly the motion amplifies errors; differences have.
 
     Args:
-        setting: of the run that is judged.
-        difference: of the run from the reference, largest.
-        distance: of the reference from another setting's solution, largest; inf where there is none.
+        setting: setting of the run being judged.
+        difference: largest difference of the run from the reference.
+        distance: largest distance of the reference from another setting's solution; inf if there is none.
     """
     if reference.kind is ReferenceKind.CLOSED_FORM:
         return 0.0  # dozens of digits more than the run

@@ -13,10 +13,10 @@ from rigidsim.solve.problem import auto_tolerance
 
 @dataclass(frozen=True)
 class Setting:
-    """How to integrate.
+    """A way to integrate.
 
     Attributes:
-        precision: as in a config.
+        precision: precision as in a config.
         tolerance: None for "auto".
     """
 
@@ -28,7 +28,7 @@ class Setting:
 
     @property
     def title(self) -> str:
-        """For tables."""
+        """Title for tables."""
         if self.method == "closed_form":
             return f"closed form, {self.precision}"
         tolerance = "" if self.tolerance is None else f", tolerance {self.tolerance:.0e}"
@@ -37,26 +37,26 @@ class Setting:
 
     @property
     def bits(self) -> int:
-        """Of the significand."""
+        """Bits of the significand."""
         return working_bits(self.precision)
 
     @property
     def step_tolerance(self) -> float:
-        """What the step control works with."""
+        """Tolerance that the step control works with."""
         return auto_tolerance(epsilon(self.precision)) if self.tolerance is None else self.tolerance
 
     @property
     def level(self) -> float:
-        """Size of the errors made at each step: a tolerance below epsilon makes none smaller."""
+        """Size of the errors made at each step; a tolerance below epsilon doesn't reduce it."""
         return max(self.tolerance or 0.0, epsilon(self.precision))
 
     @property
     def taylor_order(self) -> int:
-        """Of the series that the tolerance needs: Jorba and Zou 2005, eq. 11."""
+        """Order of the Taylor series that the tolerance needs (Jorba and Zou 2005, eq. 11)."""
         return max(2, math.ceil(1 - math.log(self.step_tolerance) / 2))
 
     def overrides(self, *, without: Collection[str] = ()) -> list[str]:
-        """As ``KEY=VALUE`` texts for ``rigidsim.load``.
+        """The setting as ``KEY=VALUE`` texts for ``rigidsim.load``.
 
         Args:
             without: keys of ``[integrator]`` to leave out.
@@ -77,12 +77,12 @@ def epsilon(precision: str | int) -> float:
 
 
 def precision_title(precision: str | int) -> str:
-    """For tables; ``precision_titled`` reads it back."""
+    """Title of a precision for tables; ``precision_titled`` reads it back."""
     return f"{precision} digits" if isinstance(precision, int) else precision
 
 
 def precision_titled(title: str) -> str | int:
-    """The precision of a title."""
+    """The precision with a given title."""
     return int(title.removesuffix(" digits")) if title.endswith(" digits") else title
 
 

@@ -1,4 +1,4 @@
-"""A motion integrated in memory, nothing written: for comparing settings with one another."""
+"""Trials: a motion integrated in memory, without files, to compare settings."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from rigidsim.solve.status import Status
 _TOLD_EVERY = 0.05  # seconds
 
 Told = Callable[[str, float], None]
-"""Is told a setting's title and how far its trial has come (0 to 1), some tens of times per second."""
+"""Receives a setting's title and the progress of its trial (0 to 1), some tens of times per second."""
 
 
 @dataclass
 class Trial:
-    """What a trial gave.
+    """Result of a trial.
 
     Attributes:
-        setting: that it was made with.
+        setting: setting of the trial.
         attitudes: float64 parts of the quaternions, each (samples, 4).
-        places: of the positions, m, each (samples, 3); empty where the body has none.
+        places: float64 parts of the positions, m, each (samples, 3); empty if the body has none.
         drifts: largest relative drift of each invariant at the samples.
-        cpu_seconds: of the integration alone; compile_seconds: before it.
+        cpu_seconds, compile_seconds: CPU time of the integration alone, and of compiling.
         work: steps times Taylor order squared times states: a count that doesn't jitter.
-        rows: samples reached.
+        rows: number of samples reached.
         histories: relative drift (samples,) of each invariant.
     """
 
@@ -86,10 +86,10 @@ def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath
     accuracy of that is asked for.
 
     Args:
-        times: where to sample, mpf seconds in ascending order; None keeps the experiment's.
+        times: sample times, s (mpf), ascending; None keeps the experiment's.
 
     Raises:
-        ConfigError: the scene can't be integrated so.
+        ConfigError: the scene can't be integrated with this setting.
     """
     config = experiment.config
     integrator = config.integrator.model_copy(
@@ -128,15 +128,15 @@ def try_setting(
 
     Args:
         experiment: gives the scene; its own ``[integrator]`` is replaced by the setting.
-        times: where to sample, mpf seconds; None keeps the experiment's.
-        loads: given from Python.
-        go_on: asked between chunks; a status ends the trial.
-        told: the setting's title, and how far the trial has come (0 to 1), some tens of times per second.
-        compact: compiled in a tenth of the time to code that takes up to twice as long a step in double
+        times: sample times, s (mpf); None keeps the experiment's.
+        loads: loads given from Python.
+        go_on: called between chunks; a status ends the trial.
+        told: receives the title and the trial's progress (0 to 1), some tens of times per second.
+        compact: compile in a tenth of the time to code that takes up to twice as long per step in double
             precision, and as long in the others; rounding differs.
 
     Raises:
-        ConfigError: the scene can't be integrated so (no closed form, nothing to hold, ...).
+        ConfigError: the scene can't be integrated with it (no closed form, nothing to project, ...).
     """
     started = time.process_time()
     scene = trial_scene(experiment, setting, times)
@@ -181,8 +181,8 @@ class Trials:
     """Trials of one motion, in compact code.
 
     Attributes:
-        loads: given from Python.
-        told: of each, as in ``try_setting``.
+        loads: loads given from Python.
+        told: receives the progress of each trial, as in ``try_setting``.
     """
 
     experiment: Experiment
@@ -190,8 +190,8 @@ class Trials:
     told: Told | None = None
 
     def whole(self, setting: Setting, times: Sequence[mpmath.mpf]) -> Trial | None:
-        """A trial that reached the last of the times (mpf seconds); None where the scene can't be integrated
-        so (a chart, a load, no closed form), or not so far.
+        """A trial that reached the last of the times (s, mpf); None if the scene can't be integrated with the
+        setting (a chart, a load, no closed form), or not so far.
         """
         try:
             trial = try_setting(
@@ -203,7 +203,7 @@ class Trials:
 
 
 def _telling(check: Check, told: Told, title: str, start: float, last: float) -> Check:
-    """A check between chunks that also tells how far a trial has come."""
+    """A check between chunks that also reports the progress of a trial."""
     latest = time.monotonic()
 
     def both(progress: Progress) -> Status | None:
@@ -218,5 +218,5 @@ def _telling(check: Check, told: Told, title: str, start: float, last: float) ->
 
 
 def compactly(prepared: InitialValueProblem) -> InitialValueProblem:
-    """The same, to be compiled in compact mode."""
+    """The same problem, to be compiled in compact mode."""
     return replace(prepared, precision=replace(prepared.precision, compact=True))

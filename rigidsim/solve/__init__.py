@@ -1,1 +1,1 @@
-"""Numbers: precisions, the loop over steps, sampling, evaluation."""
+"""Numerical solution: precisions, the loop over steps, sampling, evaluation."""

@@ -22,12 +22,12 @@ STEPS_BETWEEN = 32
 
 
 class AngleState(NamedTuple):
-    """Which angles the angle states stand for; all fields are empty or 0 without angle states.
+    """Which Euler angles the angle states stand for; all fields are empty or 0 without angle states.
 
     Attributes:
         turns: full turns of the angle states.
-        chart: 0 where they are of the asked sequence, 1 of its partner (``rigidsim.solve.charts``).
-        reference: in the partner chart the asked angles at the latest natural step, rad; zeros otherwise.
+        chart: 0 for angles of the requested sequence, 1 for those of its partner (``rigidsim.solve.charts``).
+        reference: in the partner chart, the requested angles at the latest natural step, rad; else zeros.
     """
 
     turns: tuple[int, ...] = ()
@@ -36,15 +36,15 @@ class AngleState(NamedTuple):
 
 
 class AngleWrapping:
-    """Counts the full turns that are taken off the angle states.
+    """Counts the full turns removed from the angle states.
 
     Attributes:
-        positions: of the angles among the states; empty without any.
+        positions: indices of the angles among the states; empty if there are none.
         angles: what the angle states stand for now.
 
     Args:
         context: mpmath context with more digits than the precision.
-        unit: binary exponent of the unit of the angle states, rad.
+        unit: binary exponent of the angle states' unit, rad.
     """
 
     def __init__(

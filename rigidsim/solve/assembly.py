@@ -1,4 +1,4 @@
-"""What integrates a prepared scene, put together: stepper, corrections, evaluation."""
+"""Assembly of what integrates a prepared scene: stepper, corrections, evaluation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.turns.count import MOST_OF_A_CLOSED_FORM, radians_between
 
 _RADIANS_AT_ONCE = 5e4
-_PATIENCE = 0.1  # seconds, in place of those of other runs
+_PATIENCE = 0.1  # seconds, in place of the usual patience
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Assembly:
     """The parts of an integration.
 
     Attributes:
-        projection: puts invariants back; None where that isn't asked for.
+        projection: puts invariants back; None if not requested.
     """
 
     wrapping: AngleWrapping
@@ -44,13 +44,13 @@ class Assembly:
 
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
-    """Compile everything that a prepared scene needs to go from its start. Ctrl-C is heeded meanwhile.
+    """Compile everything that a prepared scene needs to run from its start; Ctrl-C is heeded meanwhile.
 
     Args:
-        stride: natural steps between corrections at most (``CorrectedStepper``).
+        stride: largest number of natural steps between corrections (``CorrectedStepper``).
 
     Raises:
-        ConfigError: invariants are to be projected where there are none.
+        ConfigError: invariants are to be projected but there are none.
     """
     return interruptible(lambda: _assembled(prepared, stride))
 
@@ -65,7 +65,7 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
         projection = Projection(system, precision, start, late=prepared.holds_late)
     interval = steps_between(precision, late=prepared.holds_late)
     corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
-    countable = not system.turning  # from samples alone nobody can tell what such a load does
+    countable = not system.turning  # samples alone can't tell what such a load does
     if prepared.closed is not None:
         countable = radians_between_samples(prepared) <= MOST_OF_A_CLOSED_FORM
     evaluator = Evaluator(system, precision, wrapping, countable=countable)
@@ -73,7 +73,7 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
 
 
 def radians_between_samples(prepared: InitialValueProblem) -> float:
-    """By how much the body turns at most."""
+    """Largest angle by which the body turns between neighbouring samples, rad."""
     return radians_between(prepared.scene.samples, float(prepared.system.rate_bound))
 
 
@@ -86,14 +86,14 @@ def sampler(
     pacing: Pacing = MEASURED,
     most_steps: int | None = None,
 ) -> Sampler:
-    """What takes a prepared scene through its samples: its closed form where it has one, or the integration.
+    """The sampler of a prepared scene: its closed form if it has one, otherwise the integration.
 
     Args:
-        parts: assembled of it.
+        parts: the assembled parts.
         receiver: receives the samples in order.
-        check: asked again and again, with the progress; a status ends the run.
-        start: where to go on; None begins.
-        most_steps: natural steps, counted from the run's beginning, that are never exceeded; a closed form
+        check: called repeatedly with the progress; a status ends the run.
+        start: where to continue; None starts at the beginning.
+        most_steps: limit of natural steps, counted from the run's beginning; a closed form
             takes none.
     """
     clock, precision = prepared.clock, prepared.precision
@@ -111,7 +111,9 @@ def sampler(
 
 
 def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
-    """The check, and turns counted as far as the run has come, a part of a chunk's time each."""
+    """The check, extended by counting turns up to where the run is, for a part of a chunk's time each
+    call.
+    """
 
     def checked(progress: Progress) -> Status | None:
         stop = check(progress)
@@ -131,7 +133,9 @@ def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
 
 
 def _in_small_blocks(pacing: Pacing, radians: float) -> Pacing:
-    """Blocks of samples between which turns are counted within a fraction of a second."""
+    """Pacing with blocks of samples so small that turns between them are counted within a fraction of a
+    second.
+    """
     rows = max(1, int(_RADIANS_AT_ONCE / radians))
     return replace(
         pacing,

@@ -1,4 +1,4 @@
-"""Compiling takes seconds in which no signal is heeded: another thread does it, and Ctrl-C ends the wait."""
+"""Compiling without blocking Ctrl-C: another thread compiles, and a signal ends the wait."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from collections.abc import Callable
 from typing import TypeVar
 
 _NAME = "rigidsim build"
-_LOOK = 0.05  # seconds
+_LOOK = 0.05  # seconds between checks
 _given_up = threading.Event()
 
 T = TypeVar("T")
 
 
 def interruptible(work: Callable[[], T]) -> T:
-    """Do something that leaves Python's lock free, such as compiling, and wait for it.
+    """Run work that releases Python's lock, such as compiling, and wait for it interruptibly.
 
-    In the main thread, the only one that signals reach, the work is done by another one. A signal handler
-    that raises ends the wait; the work itself goes on and what it makes is lost.
+    In the main thread, the only one that signals reach, another thread does the work. A signal handler that
+    raises ends the wait; the work itself goes on and its result is lost.
 
     Raises:
-        KeyboardInterrupt: after ``give_up``, before anything is begun.
+        KeyboardInterrupt: after ``give_up``, before any work begins.
     """
     if threading.current_thread() is not threading.main_thread():
         return work()
@@ -47,15 +47,15 @@ def interruptible(work: Callable[[], T]) -> T:
 
 
 def building() -> bool:
-    """Whether such work is under way, be it work that nobody waits for any more."""
+    """Whether such work is under way, even if nobody waits for it any more."""
     return any(thread.name == _NAME for thread in threading.enumerate())
 
 
 def give_up() -> None:
-    """Begin no such work for the main thread any more, until ``take_up``: nobody would wait for it."""
+    """Begin no more such work for the main thread until ``take_up``, since nobody would wait for it."""
     _given_up.set()
 
 
 def take_up() -> None:
-    """Such work may begin."""
+    """Allow such work again."""
     _given_up.clear()

@@ -31,17 +31,17 @@ from rigidsim.solve.engine import CompiledFunction, TaylorEngine
 from rigidsim.solve.precision import Precision, Scalar
 
 NEAR = 0.5
-"""Singular factor from which a chart is left."""
+"""Singular factor below which a chart is left."""
 
-_SWING = math.pi / 2  # of the outer angles within a step, from which it is looked at in parts
-_HALVINGS = 10  # of a step at most; what remains is a straight line but for 1e-4 of its length
-_STRAIGHT = math.pi - 2.0**-7  # swing in such a part from which it went straight through
+_SWING = math.pi / 2  # of the outer angles within a step, from which the step is examined in parts
+_HALVINGS = 10  # of a step at most; the remainder is a straight line to 1e-4 of its length
+_STRAIGHT = math.pi - 2.0**-7  # swing in such a part from which it passed straight through
 _NEAR_POLE = 2.0**-20  # singular factor below which a reference doesn't tell its branch
 _TURN = 2 * math.pi
 
 
 class Lift:
-    """Joins the asked sequence's angles in the partner chart to the ones before."""
+    """Joins the requested sequence's angles, in the partner chart, to the ones before."""
 
     def __init__(self, sequence: str, precision: Precision) -> None:
         self._sequence, self._partner = sequence, partner_sequence(sequence)
@@ -49,20 +49,20 @@ class Lift:
         self._pole = 4 * float(precision.epsilon)
 
     def branch(self, middle: float) -> float:
-        """+1 or -1: which of the two triples a middle angle belongs to."""
+        """Branch (+1 or -1) of the two triples of angles to which a middle angle belongs."""
         return math.copysign(1.0, singular_factor(self._sequence, middle, math))
 
     def __call__(self, before: Sequence[float], angles: Angles) -> tuple[Angles, int, float]:
-        """The asked angles next to some shortly before.
+        """The requested angles nearest to some shortly before.
 
         Args:
-            before: asked angles, continuous.
-            angles: of the partner sequence.
+            before: requested angles, continuous.
+            angles: angles of the partner sequence.
 
         Returns:
-            The asked angles; +1 or -1 within rounding of their singularity (else 0): whether the sum or the
-            difference of the outer ones is all that is known; and how far the first one swung, were the
-            middle one to stay on its branch.
+            The requested angles; +1 or -1 within rounding of their singularity (else 0): whether the sum or
+            the difference of the outer ones is all that is known; and how far the first one swung if the
+            middle one stayed on its branch.
         """
         first, middle, last = across(self._partner, list(angles), math)
         side = pole_of_partner(self._partner, list(angles), math)
@@ -91,9 +91,9 @@ class Lift:
 
 
 class Charts:
-    """The chart that a run is in, and the way from one to the other.
+    """The chart that a run is in, and the changes between charts.
 
-    Called by the engine after each natural step; what it remembers stands in the wrapping's ``angles`` and in
+    Called by the engine after each natural step; its memory is in the wrapping's ``angles`` and in
     ``changes``, both part of a checkpoint.
 
     Attributes:
@@ -124,28 +124,28 @@ class Charts:
 
     @property
     def chart(self) -> int:
-        """0 in the asked sequence, 1 in its partner."""
+        """0 in the requested sequence, 1 in its partner."""
         return self._wrapping.angles.chart
 
     def near(self, state: np.ndarray) -> bool:
-        """Whether the chart in use is to be left here."""
+        """Whether the chart in use must be left in this state."""
         return abs(singular_factor(self._sequences[self.chart], float(state[self._middle]), math)) < NEAR
 
-    # --- following the asked angles ---------------------------------------------------------------------
+    # --- following the requested angles ------------------------------------------------------------------
 
     def begin(self, time: Scalar) -> None:
-        """Steps follow; the latest ones' boundaries may be forgotten."""
+        """Prepare for steps; the boundaries of earlier ones are forgotten."""
         self._passed = [(time, self._wrapping.angles.reference)]
 
     def __call__(self, integrator: TaylorEngine) -> bool:
-        """After a natural step: follow it; False where the chart is to be left."""
+        """Follow a natural step; False if the chart must be left."""
         state = integrator.state
         if self.chart:
             self._follow(integrator, integrator.time, state, _HALVINGS)
         return not self.near(state)
 
     def _follow(self, integrator: TaylorEngine, time: Scalar, state: np.ndarray, halvings: int) -> None:
-        """The asked angles from the latest known up to a state within the latest step."""
+        """Follow the requested angles from the latest known ones to a state within the latest step."""
         known = self._wrapping.angles
         joined, _, swing = self._lift(known.reference, self._angles(state))
         if swing > _SWING and halvings:
@@ -163,8 +163,8 @@ class Charts:
         return a, b, c
 
     def references(self, times: np.ndarray) -> np.ndarray | None:
-        """The asked angles (n, 3), rad, before each of the times within the steps since ``begin``; None in
-        the asked chart.
+        """The requested angles (n, 3), rad, before each of the times within the steps since ``begin``; None
+        in the requested chart.
         """
         if not self.chart:
             return None
@@ -176,7 +176,7 @@ class Charts:
     # --- changing ---------------------------------------------------------------------------------------
 
     def change(self, state: np.ndarray) -> np.ndarray:
-        """Enter the other chart; returns the same state there, and counts."""
+        """Change to the other chart and count the change; returns the same state in it."""
         known, angles = self._wrapping.angles, self._angles(state)
         sign = self._quaternion(angles, known)
         if self.chart:

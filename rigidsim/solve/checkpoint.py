@@ -1,4 +1,4 @@
-"""A checkpoint as one value: where the integration resumes, what joins the samples, and what was counted.
+"""A checkpoint as one value: where the integration resumes, what joins the samples, and the counts so far.
 
 ``rigidsim.solve.checkpoint_arrays`` turns it into arrays for a file, and back.
 """
@@ -16,7 +16,7 @@ from rigidsim.solve.turns.joined import Continuity
 
 @dataclass(frozen=True)
 class Position:
-    """Where a run's samples go on, with the same bits.
+    """Position from which a run continues with the same bits.
 
     Attributes:
         boundary: a step boundary past all samples before ``next_sample``.
@@ -29,12 +29,12 @@ class Position:
 
 @dataclass(frozen=True)
 class Undefined:
-    """Samples at which a recorded variable is NaN.
+    """Number of samples at which a recorded variable is NaN.
 
     Attributes:
-        count: of them, among those so far.
-        leading: of them, those before its first defined sample.
-        since: time of the first one past those (s); nan where there is none.
+        count: number of such samples so far.
+        leading: how many of them precede its first defined sample.
+        since: time of the first one after those (s); nan if there is none.
     """
 
     count: int = 0
@@ -44,18 +44,18 @@ class Undefined:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What was counted and watched from a run's beginning on, over all its sessions.
+    """Counts and extremes from a run's beginning, over all its sessions.
 
     Attributes:
         largest_drift, final_drift: relative drifts of the samples so far, by invariant.
-        put_back: what was put back until the latest sample, by projected invariant.
+        put_back: corrections put back until the latest sample, by projected invariant.
         nearest_singularity, singularity_time: smallest singular factor of a chart of Euler angles, and when
             (s).
-        undefined: by recorded variable that has such samples.
+        undefined: undefined samples by recorded variable that has any.
         smallest_step, largest_step: internal units.
-        redone_steps: taken back and taken again.
-        sessions: that took part.
-        wall_seconds, cpu_seconds, integration_seconds: that they took; the last in the engine alone.
+        redone_steps: steps taken back and repeated.
+        sessions: number of sessions.
+        wall_seconds, cpu_seconds, integration_seconds: time they took; the last in the engine alone.
     """
 
     largest_drift: dict[str, float]
@@ -75,7 +75,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """All that a later session needs."""
+    """Everything that a later session needs."""
 
     position: Position
     continuity: Continuity

@@ -21,19 +21,19 @@ from rigidsim.solve.stepper import Mark
 from rigidsim.solve.turns.joined import Continuity
 
 Arrays = dict[str, np.ndarray]
-"""Names to float64 or int64 arrays."""
+"""Float64 or int64 arrays by name."""
 
 _STEP = 512  # a power of two that every type holds
 
 
 def pack(values: np.ndarray, precision: Precision, name: str) -> Arrays:
-    """Exact arrays ``NAME_parts`` (parts, n) and, beyond double, ``NAME_exponents`` (n,) of scalars (n,)."""
+    """Scalars (n,) as exact arrays ``NAME_parts`` (parts, n) and, beyond double, ``NAME_exponents`` (n,)."""
     if precision.narrow:
         return {f"{name}_parts": np.asarray(values, dtype=np.float64)[None, :]}
     exponents = np.zeros(len(values), dtype=np.int64)
     scaled = np.array(values, dtype=precision.scalar)
     up, down = _power(precision, _STEP), _power(precision, -_STEP)
-    for i in range(len(scaled)):  # to a size whose residuals are no denormal doubles
+    for i in range(len(scaled)):  # scale to a size whose residuals are no denormal doubles
         while scaled[i] != 0 and abs(scaled[i]) < down:
             scaled[i] = scaled[i] * up
             exponents[i] -= _STEP
@@ -41,7 +41,7 @@ def pack(values: np.ndarray, precision: Precision, name: str) -> Arrays:
 
 
 def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) -> np.ndarray:
-    """The scalars that were packed.
+    """Scalars restored from packed arrays.
 
     Raises:
         ValueError: arrays of another shape or precision.
@@ -67,7 +67,7 @@ def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) ->
 
 
 def _lifted(part: np.ndarray, precision: Precision) -> np.ndarray:
-    """float64 numbers in the run's own type; ``astype`` makes multi-precision numbers of 53 bits."""
+    """Float64 numbers in the run's own type; ``astype`` would make multi-precision numbers of 53 bits."""
     if precision.scalar is not hy.real:
         return part.astype(precision.scalar)
     return np.array([hy.real(float(x), precision.bits) for x in part], dtype=hy.real)
@@ -125,14 +125,14 @@ def unpack_checkpoint(
     recorded: Sequence[str],
     start: StepBoundary,
 ) -> Checkpoint:
-    """What was packed.
+    """A checkpoint restored from its arrays.
 
     Args:
         invariants, recorded: the system's invariants and recorded variables, in order.
-        start: any boundary of the system that is resumed, for what it has to remember.
+        start: any boundary of the resumed system, as a template of what it has to remember.
 
     Raises:
-        KeyError, ValueError: it belongs to another system or precision.
+        KeyError, ValueError: the checkpoint belongs to another system or precision.
     """
     time, state = unpack(arrays, precision, "time"), unpack(arrays, precision, "state")
     steps, events, next_sample = _numbers(arrays, "counts", 3)
@@ -190,12 +190,12 @@ def _numbers(arrays: Mapping[str, np.ndarray], name: str, count: int) -> list[fl
 
 
 def _values(found: Mapping[str, float], names: Sequence[str]) -> list[float]:
-    """In the order of the names; nan where there is none."""
+    """Values in the order of the names; nan for missing ones."""
     return [found.get(name, math.nan) for name in names]
 
 
 def _by_name(values: Iterable[float], names: Sequence[str]) -> dict[str, float]:
-    """Those that are there."""
+    """Values by name, without missing ones."""
     pairs = zip(names, map(float, values), strict=False)  # older runs have none of some
     return {name: value for name, value in pairs if not math.isnan(value)}
 
@@ -207,7 +207,7 @@ def _pack_undefined(found: Mapping[str, Undefined], names: Sequence[str]) -> np.
 
 
 def _unpack_undefined(table: np.ndarray | None, names: Sequence[str]) -> dict[str, Undefined]:
-    """Those of which there are samples; older checkpoints don't tell, and have none."""
+    """Variables with undefined samples; older checkpoints hold none."""
     if table is None:
         return {}
     if table.shape != (len(names), 3):
@@ -255,10 +255,10 @@ def pack_events(found: Sequence[FoundEvent], precision: Precision) -> Arrays:
 
 
 def unpack_events(arrays: Mapping[str, np.ndarray], precision: Precision, states: int) -> list[FoundEvent]:
-    """What was packed.
+    """Crossings restored from packed arrays.
 
     Args:
-        states: number of them.
+        states: number of states.
 
     Raises:
         ValueError: the arrays don't belong together.

@@ -1,7 +1,7 @@
-"""What heyoka compiles, once in a process: what a trial or an earlier run compiled serves the next one.
+"""Cache of what heyoka compiles: code compiled for a trial or an earlier run in this process is reused.
 
-What other processes compiled is found on disk (``HEYOKA_CACHE_DIR``), in a cache that is kept small here.
-Even with compiled code in heyoka's own cache an engine or a function takes some 10 ms to put together, which
+Code compiled by other processes is found on disk (``HEYOKA_CACHE_DIR``), in a cache that is kept small here.
+Even with compiled code in heyoka's own cache, an engine or a function takes some 10 ms to assemble, which
 is more than many runs take.
 """
 
@@ -24,12 +24,13 @@ T = TypeVar("T")
 
 _HEYOKAS_LIMIT = 20 << 30
 DISK_LIMIT = 256 << 20
-"""Bytes of compiled code on disk, of some five hundred scenes. heyoka's own limit is 20 GiB; compiling takes
-ten times as long when the cache has grown to a few of them."""
+"""Largest size of compiled code on disk (bytes), enough for some five hundred scenes. heyoka's own limit is
+20 GiB; compiling takes ten times as long when the cache has grown to a few of them.
+"""
 
 
 class Kept(Generic[T]):
-    """The latest things that were made of the same description.
+    """Cache of the latest objects made, by the description they were made from.
 
     Args:
         most: how many are kept.
@@ -41,11 +42,11 @@ class Kept(Generic[T]):
         self._lock = Lock()
 
     def get(self, description: object, make: Callable[[], T]) -> T:
-        """What was made of this description, or what is made now.
+        """The object made earlier from this description, or a new one.
 
         Args:
-            description: all that it depends on. It is compared by its serialised bytes, since expressions
-                that count as equal can differ in the sign of a zero.
+            description: everything that the object depends on. It is compared by its serialised bytes, since
+                expressions that count as equal can differ in the sign of a zero.
         """
         key = pickle.dumps(description)
         with self._lock:
@@ -53,7 +54,7 @@ class Kept(Generic[T]):
                 self._made.move_to_end(key)
                 return self._made[key]
         limit_disk_cache()
-        made = make()  # seconds, during which others aren't kept waiting
+        made = make()  # seconds, during which others needn't wait
         with self._lock:
             self._made[key] = made
             if len(self._made) > self._most:
@@ -63,7 +64,8 @@ class Kept(Generic[T]):
 
 @cache
 def limit_disk_cache() -> None:
-    """Before anything is compiled: what wasn't used for longest leaves the cache on disk when it is full.
+    """Limit heyoka's cache on disk before anything is compiled; the least recently used code is dropped when
+    it is full.
 
     A limit that somebody has set, with ``heyoka.llvm_state.set_diskcache_limit``, is left as it is.
     """
@@ -72,7 +74,7 @@ def limit_disk_cache() -> None:
 
 
 class CodeStore:
-    """Functions and engines that were compiled."""
+    """Functions and engines compiled so far."""
 
     def __init__(self) -> None:
         self.functions: Kept[CompiledFunction] = Kept(32)
@@ -84,8 +86,8 @@ _stores = [CodeStore()]
 
 @contextmanager
 def kept_in(store: CodeStore) -> Iterator[None]:
-    """Take compiled code from this store alone meanwhile, in all threads: for code that is compiled otherwise
-    than its description tells.
+    """Use only this store of compiled code inside the block, in all threads: for code compiled otherwise than
+    its description tells.
     """
     _stores.append(store)
     try:
@@ -97,7 +99,7 @@ def kept_in(store: CodeStore) -> Iterator[None]:
 def compiled_function(
     expressions: Sequence[Any], variables: Sequence[Any], **options: Any
 ) -> CompiledFunction:
-    """As ``heyoka.cfunc``; such functions have no state, and several threads may call the same."""
+    """Like ``heyoka.cfunc``, but cached; the functions have no state and may be called by several threads."""
     expressions, variables = list(expressions), list(variables)
     return _stores[-1].functions.get(
         (expressions, variables, sorted(options.items())),
@@ -106,7 +108,9 @@ def compiled_function(
 
 
 def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> TaylorEngine:
-    """As ``heyoka.taylor_adaptive``, without events: an engine of one's own, as if it were newly compiled."""
+    """Like ``heyoka.taylor_adaptive`` without events, but cached: the caller gets an engine of its own, as if
+    newly compiled.
+    """
     made = _stores[-1].engines.get(
         (list(equations), initial, sorted(options.items())),
         lambda: hy.taylor_adaptive(list(equations), initial, **options),

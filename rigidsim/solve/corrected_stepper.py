@@ -1,4 +1,4 @@
-"""What is done to the state at fixed counts of natural steps, so that bits depend on no clock or sampling.
+"""Corrections of the state at fixed counts of natural steps, so that bits depend on no clock or sampling.
 
 A step is never clamped to a sample, but some corrections have to be made along the way: angles are brought
 back into one turn, and the engine's time, which is a sum of two numbers, is put back on a single one. They
@@ -27,21 +27,22 @@ from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.trail import Waypoints
 
 STRIDE = 1024
-"""Natural steps between two corrections where only time is corrected: half a millisecond, so that the calls
-that this takes cost less than a hundredth."""
+"""Natural steps between corrections if only time is corrected: half a millisecond, so that the calls cost
+less than a hundredth of it.
+"""
 
 _NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True)
 class StepBoundary:
-    """A natural step boundary of a run: all that the integration needs to resume with the same bits.
+    """A natural step boundary of a run, with everything the integration needs to resume with the same bits.
 
     Attributes:
         mark: the engine's time and state, and counts.
         angles: what the angle states stand for.
-        chart_changes: so far.
-        projection: a copy of ``Projection.memory``; (0,) where nothing is projected.
+        chart_changes: number of chart changes so far.
+        projection: a copy of ``Projection.memory``; (0,) if nothing is projected.
     """
 
     mark: Mark
@@ -51,23 +52,23 @@ class StepBoundary:
 
 
 _NEAR = 3
-"""Steps that are sooner taken one by one than together, with the next guess of how many they are."""
+"""Number of steps (with its next guess) below which they are sooner taken one by one than together."""
 
 
 class CorrectedStepper:
-    """Takes steps and makes the corrections when they are due.
+    """Takes steps and makes corrections when they are due.
 
     Attributes:
-        projection: puts invariants back, where asked for.
+        projection: puts invariants back, if requested.
         whole_times: whether time is a single number at each stride's start. Not where events or switching
             surfaces are looked for: a step back could cross one twice; nor where steps are cut short.
-        charts: of a run in Euler angles; None without.
+        charts: charts of a run in Euler angles; None for others.
         collapsed: whether steps have become too small to ever arrive.
         waypoints: some of the boundaries after corrections.
 
     Args:
-        stride: natural steps between corrections at most; results depend on it, within rounding.
-        projection_interval: natural steps between projections at most.
+        stride: largest number of natural steps between corrections; affects results within rounding.
+        projection_interval: largest number of natural steps between projections.
     """
 
     def __init__(
@@ -110,7 +111,7 @@ class CorrectedStepper:
 
     @property
     def collapsed(self) -> bool:
-        """Whether steps have become too small to ever arrive, be it at the next whole time."""
+        """Whether steps have become too small to ever arrive, even at the next whole time."""
         return self._stuck or self.stepper.collapsed
 
     def boundary(self) -> StepBoundary:
@@ -136,8 +137,8 @@ class CorrectedStepper:
         self.stepper.back_to(boundary.mark)
 
     def arrive(self, boundary: StepBoundary, moment: Scalar) -> StepBoundary:
-        """Back to a boundary before a moment, and on by the same steps to the first one at or past it, where
-        nothing is corrected yet; the boundary before that.
+        """Go back to a boundary before a moment, and on by the same steps to the first boundary at or past
+        it, without corrections there; returns the boundary before that.
         """
         most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
         end, goal, slow = float(self.stepper.time), float(moment), False
@@ -145,7 +146,7 @@ class CorrectedStepper:
         while most > 1:
             here, begin, whole = self.boundary(), float(self.stepper.time), most
             part, size = most // 2, (end - begin) / most
-            if not slow and begin < goal < end:  # where steps of one size would come to
+            if not slow and begin < goal < end:  # where steps of equal size would end
                 part = min(max(int((goal - begin) / size), 1), most - 1)
             self.skip(part)
             if self.stepper.time >= moment:
@@ -164,8 +165,8 @@ class CorrectedStepper:
             self.correct()
 
     def skip(self, count: int) -> bool:
-        """``count`` steps without dense output, fewer where they collapse; False when the state is no longer
-        finite. The stepper's smallest and largest step are those of all.
+        """Take ``count`` steps without dense output, fewer if they collapse; False if the state is no longer
+        finite. The stepper's smallest and largest step then refer to all of them.
         """
         stepper, smallest, largest = self.stepper, math.inf, 0.0
         while count > 0 and not self.collapsed:
@@ -182,16 +183,16 @@ class CorrectedStepper:
         """Samples within the steps of the latest call, taken before the corrections that follow it.
 
         Args:
-            first: index of the first.
-            times, states: of each, as of ``SampleBlock``.
+            first: index of the first sample.
+            times, states: those of each sample, as in ``SampleBlock``.
         """
         reference = None if self.charts is None else self.charts.references(times)
-        # what was put back until a sample: by all corrections before its own step
+        # corrections put back before a sample: by all corrections before its own step
         put_back = _NOTHING if self.projection is None else self.projection.corrections
         return SampleBlock.of(first, times, states, self.wrapping.angles, put_back, reference)
 
     def correct(self) -> None:
-        """Make the corrections if they are due; dense output of the latest step is void then."""
+        """Make the corrections if they are due; dense output of the latest step is then void."""
         change = self.charts is not None and self.charts.near(self.stepper.state)
         due = self.stepper.steps % self.stride == 0
         if not (due or change):

@@ -1,4 +1,4 @@
-"""heyoka's integrators and compiled functions as types: the part of their interface that is used here."""
+"""Types of heyoka's integrators and compiled functions: the part of their interface used here."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from rigidsim.solve.precision import Scalar
 
 CompiledFunction: TypeAlias = Callable[..., np.ndarray]
-"""What ``heyoka.cfunc`` returns: from inputs (k,) or (k, n) to outputs, in the precision of its own."""
+"""Function returned by ``heyoka.cfunc``: from inputs (k,) or (k, n) to outputs, in its own precision."""
 
 
 class TaylorEngine(Protocol):
-    """What ``heyoka.taylor_adaptive`` returns.
+    """Integrator returned by ``heyoka.taylor_adaptive``.
 
     Attributes:
-        time, dtime: where it stands, internal units; the second as two numbers whose sum it is.
-        state: (states,), a view that can be assigned to; pars: likewise, up to the last that is read.
-        order: of the Taylor series; tol: their tolerance.
+        time, dtime: current time, internal units; the second as two numbers whose sum it is.
+        state, pars: (states,) and parameters up to the last that is read; views that can be assigned to.
+        order, tol: order and tolerance of the Taylor series.
         tc: (states, order + 1), Taylor coefficients of the latest step that was asked to keep them.
-        decomposition: terms that a step's derivatives are made of.
+        decomposition: terms of which a step's derivatives consist.
     """
 
     time: Scalar
@@ -34,13 +34,13 @@ class TaylorEngine(Protocol):
     decomposition: list[Any]
 
     def step(self, max_delta_t: Scalar, *, write_tc: bool = False) -> tuple[Any, Scalar]:
-        """One step: its outcome and size."""
+        """Take one step: its outcome and size."""
 
     def propagate_until(self, t: Scalar, **options: Any) -> tuple[Any, ...]:
-        """Many steps: outcome, smallest and largest step, their count, dense output and the callback."""
+        """Take many steps: outcome, smallest and largest step, their count, dense output and the callback."""
 
     def propagate_grid(self, grid: np.ndarray, **options: Any) -> tuple[Any, ...]:
-        """Likewise, with the states at given times in place of dense output, last."""
+        """Take many steps; the last item is the states at given times instead of dense output."""
 
     def update_d_output(self, t: Scalar) -> np.ndarray:
-        """The state at a time within the latest step, in a buffer that is used again."""
+        """State at a time within the latest step, in a buffer that is reused."""

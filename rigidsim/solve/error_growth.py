@@ -1,4 +1,4 @@
-"""How strongly a motion amplifies errors, measured on its beginning by nearby motions.
+"""Amplification of errors by a motion, measured on its beginning with nearby motions.
 
 The round-off law (see ``rigidsim.accuracy.error_law``) holds for motions whose errors grow with time as a
 change of frequency does. Near an unstable axis, or in chaos, they grow exponentially for a while, and a
@@ -23,9 +23,11 @@ _WINDOW = 64  # comparisons after each launch
 _OFFSET = 2.0**-30  # of the scaled states: far above rounding, far below the motion
 _SEEN = 2.0**-24  # distances between which an offset that saturates shows how fast it grew
 _SATURATED = 2.0**-7
-"""Distance of the size of the motion, from which an offset grows no more: what is found is a lower bound."""
+"""Distance, relative to the motion's size, past which an offset grows no more, so that the growth is a lower
+bound.
+"""
 _STABLE = 4.0
-"""Stable motions show up to about this, since an offset is no pure change of frequency."""
+"""Factor up to which stable motions appear to grow, since an offset is no pure change of frequency."""
 _DOUBLING = math.log(
     2.0
 )  # growth of a linear law from half a window to a whole one, measured as 0.69 +- 0.03
@@ -35,16 +37,16 @@ _LARGEST_EXPONENT = 600.0  # keeps products within doubles
 
 @dataclass(frozen=True)
 class Growth:
-    """Result of the pilot.
+    """Measured growth of errors.
 
     Attributes:
         factor: largest growth of an offset in rates and attitude, over the linear growth |w| t / sqrt 3 of
             a stable motion; 1 where it is no larger than a few times that.
-        seconds: how much of the motion was looked at.
-        rate: of exponential growth beyond each comparison's window, 1/s; zero where growth is linear.
-        window: length of a comparison, seconds.
+        seconds: length of the motion examined, s.
+        rate: rate of exponential growth beyond each comparison's window, 1/s; zero for linear growth.
+        window: length of a comparison, s.
         saturated: whether ``factor`` is a lower bound only, since an offset became as large as the motion.
-        passing_rate: median rate of growth of the offsets that did, 1/s.
+        passing_rate: median growth rate of the offsets that saturated, 1/s.
     """
 
     factor: float
@@ -55,7 +57,7 @@ class Growth:
     passing_rate: float = 0.0
 
     def at(self, seconds: float) -> float:
-        """Amplification over a run of this length."""
+        """Amplification over a run of ``seconds``."""
         exponent = self.rate * max(0.0, seconds - self.window)
         return self.factor * math.exp(min(exponent, _LARGEST_EXPONENT))
 
@@ -68,7 +70,7 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
 
     Args:
         system: built for ``precision``, which should be double: stability has no precision.
-        start, end: of the run, internal units.
+        start, end: start and end of the run, internal units.
     """
     apart = ("x", "y", "z", "vx", "vy", "vz", "pace")
     followed = [i for i, name in enumerate(system.states) if name not in apart]
@@ -117,7 +119,7 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
 
 
 def _passing_rate(times: list[float], grown: list[float]) -> list[float]:
-    """How fast an offset grew that saturated, in a list; an empty one for others."""
+    """Growth rate of an offset that saturated, in a list; empty for others."""
     if not grown or max(grown) < _SATURATED:
         return []
     late = next(i for i, distance in enumerate(grown) if distance >= _SATURATED)

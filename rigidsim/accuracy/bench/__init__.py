@@ -1,1 +1,1 @@
-"""Measuring how fast and how right the settings of one scene are."""
+"""Measuring speed and accuracy of a scene's settings."""

@@ -1,4 +1,4 @@
-"""For this accuracy, use this: the cheapest of the settings measured, by decades."""
+"""Advice from a measurement: the cheapest setting for each decade of accuracy."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class BestSetting:
     Attributes:
         error: its largest attitude error, rad.
         cost: CPU time relative to the default setting's.
-        seconds: of the motion that this was measured over.
-        less: whether that is less than for the other settings, which is why they don't compare.
+        seconds: length of the motion over which this was measured, s.
+        less: whether that is less than for the other settings, so that costs don't compare.
         keys: lines of ``[integrator]``.
     """
 
@@ -41,7 +41,7 @@ class BestSetting:
 def advice(dataset: xarray.Dataset) -> list[BestSetting]:
     """For each decade of accuracy from 1 rad on, the cheapest setting that reaches it.
 
-    A setting that was measured over less of the motion is named only where no other reaches the accuracy.
+    A setting that was measured over less of the motion is named only if no other reaches the accuracy.
     """
     error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
     status = dataset["status"].values
@@ -86,7 +86,7 @@ def _advice_of(
 
 
 def _keys(one: xarray.Dataset) -> tuple[str, ...]:
-    """Lines for ``[integrator]``."""
+    """The setting as lines for ``[integrator]``."""
     precision = precision_titled(str(one["precision"].item()))
     keys = [f"precision = {precision}" if isinstance(precision, int) else f'precision = "{precision}"']
     if one["method"].item() == "closed_form":

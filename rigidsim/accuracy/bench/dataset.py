@@ -1,4 +1,4 @@
-"""A measurement of settings as labelled data, and which of them no other beats."""
+"""A measurement of settings as labelled data, and its Pareto front."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
     """The measurement as xarray data: dimensions ``setting``, ``time``, ``invariant``.
 
     Errors are in rad, costs relative to the default setting (double precision, quaternions). Where a setting
-    was not measured its numbers are nan and ``reason`` says why.
+    was not measured, its numbers are nan and ``reason`` says why.
     """
     import xarray
 
@@ -130,14 +130,14 @@ def _tolerance(setting: Setting) -> float:
 
 
 def trusted_error(dataset: xarray.Dataset) -> np.ndarray:
-    """Largest attitude errors, none below what the reference can tell."""
+    """Largest attitude errors, but at least what the reference can resolve."""
     largest, own = dataset["attitude_error_largest"].values, dataset["reference_error"].values
     return np.asarray(np.maximum(largest, own))
 
 
 def on_front(dataset: xarray.Dataset) -> np.ndarray:
-    """Whether no setting is both cheaper and at least as accurate; only for those measured over all that was
-    measured, since errors over less of a motion don't compare.
+    """Whether no setting is both cheaper and at least as accurate; only for settings measured over the full
+    length, since errors over less of a motion don't compare.
     """
     error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
     fit = (dataset["status"].values == RowStatus.MEASURED.value) & np.isfinite(error) & np.isfinite(cost)

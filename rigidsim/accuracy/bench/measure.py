@@ -1,11 +1,11 @@
-"""Speed and accuracy of one scene, measured over every kind of setting.
+"""Measuring the speed and accuracy of a scene's settings.
 
 Every setting integrates the scene's own motion, attitude included, and is held against a reference whose
 own error is known (``rigidsim.accuracy.reference``): the closed form to 50 digits where there is one, else
 the best that a higher precision can do. Speeds are taken over several fresh processes, in turn
 (``rigidsim.accuracy.bench.worker``).
 
-A budget of time bounds it all: long motions are measured over their beginning, quadruple precision over less
+A time budget bounds it all: long motions are measured over their beginning, quadruple precision over less
 of it, and what doesn't fit is listed as left out. Nothing is extrapolated.
 """
 
@@ -35,11 +35,11 @@ _LEAST_BUDGET = 5.0
 
 @dataclass(frozen=True)
 class Timing:
-    """How a budget of time is spent.
+    """How a time budget is spent.
 
     Attributes:
-        grace: seconds for what a measurement can't do without, be the machine busy.
-        exploring: part of the budget until attitudes must be there.
+        grace: extra seconds for what a measurement can't do without, on a busy machine.
+        exploring: part of the budget by which attitudes must be there.
         single: part of the budget that one setting may take.
         passes: CPU seconds of passes for each setting in each process: their median is then known to a
             few per cent.
@@ -55,7 +55,7 @@ TIMING = Timing()
 
 
 class RowStatus(StrEnum):
-    """What became of a setting; the values stand in datasets."""
+    """Outcome of measuring a setting; the values stand in datasets."""
 
     MEASURED = "measured"
     SHORT = "measured over less"
@@ -65,15 +65,15 @@ class RowStatus(StrEnum):
 
 @dataclass
 class Row:
-    """What is known of one setting.
+    """Results for one setting.
 
     Attributes:
-        part: of the horizon that it was measured over.
-        status: what became of it.
+        part: part of the horizon over which it was measured.
+        status: outcome of the measurement.
         problem: why it was not measured, for the user.
         attitudes: float64 parts (samples, 4).
-        unit_seconds: CPU seconds per step (closed form: per sample), one for each process.
-        default_seconds: the default's, in the same processes.
+        unit_seconds: CPU seconds per step (closed form: per sample), for each process.
+        default_seconds: those of the default setting, in the same processes.
     """
 
     setting: Setting
@@ -90,13 +90,13 @@ class Row:
 
     @property
     def measured(self) -> bool:
-        """Whether its attitudes are there, to the end of its part."""
+        """Whether its attitudes were computed to the end of its part."""
         return self.status in (RowStatus.MEASURED, RowStatus.SHORT)
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """All that was measured; see ``rigidsim.workflows.tradeoff`` for the dataset."""
+    """Results for all settings; see ``rigidsim.workflows.tradeoff`` for the dataset."""
 
     experiment: Experiment
     plan: Plan
@@ -107,7 +107,7 @@ class Measurement:
     seconds: float
 
     def reference_of(self, row: Row) -> ReferenceSolution:
-        """What a setting is held against."""
+        """The reference against which a setting is held."""
         if row.setting.precision == "quadruple" and self.wide_reference is not None:
             return self.wide_reference
         return self.reference
@@ -121,8 +121,8 @@ class Measurement:
         return angles_between(mine, theirs), reference.error[:count]
 
     def cost(self, row: Row) -> tuple[float, float, float]:
-        """CPU time per simulated second relative to the default's: median, least and largest of the
-        processes; nan where its speed was not measured.
+        """CPU time per simulated second relative to the default's: median, least and largest over the
+        processes; nan if speed was not measured.
         """
         default = next(r for r in self.rows if r.setting == DEFAULT)
         scale = (self._units(row) / row.part) / (default.steps / default.part)
@@ -132,13 +132,13 @@ class Measurement:
         return statistics.median(ratios), min(ratios), max(ratios)
 
     def cpu_seconds(self, row: Row) -> float:
-        """Of the setting over its part: steps (or samples) times the median of a step's cost."""
+        """CPU seconds of the setting over its part: steps (or samples) times a step's median cost."""
         if not row.unit_seconds:
             return math.nan
         return self._units(row) * statistics.median(row.unit_seconds)
 
     def _units(self, row: Row) -> float:
-        """What is paid for: steps, or samples of a closed form."""
+        """Number of units that cost time: steps, or samples of a closed form."""
         return self.plan.samples * row.part if row.setting.method == "closed_form" else row.steps
 
 
@@ -157,13 +157,13 @@ def measure(
     """Measure the settings of a scene.
 
     Args:
-        budget: seconds that it may take, roughly.
-        repeats: fresh processes in which speeds are taken.
+        budget: approximate time limit, s.
+        repeats: number of fresh processes in which speeds are measured.
         plan: what to measure over; None for as much as the budget allows.
-        reference: "best", or "extended" to use that setting where nothing better can be had in time.
-        full: every tolerance in every formulation and precision.
-        settings: to compare, beside the default; None for every kind.
-        told: called with what is being done.
+        reference: "best", or "extended" to use that setting if nothing better is possible in time.
+        full: measure every tolerance in every formulation and precision.
+        settings: settings to compare with the default; None for every kind.
+        told: called with a description of each stage.
 
     Raises:
         ConfigError: the config can't be run.
@@ -206,7 +206,7 @@ def _explore(
         row.part = plan.short if wide else plan.part
         tasks.append(attitude_task(plan, row.setting, timing.single * budget, wide=wide))
         row.problem = f"left out: the budget of {budget:g} s was used up before its turn"
-    # without the default there is nothing to compare with: on a busy machine it may be late
+    # without the default there is no comparison: on a busy machine it may be late
     first_by = time.monotonic() + timing.grace
     for answer in ask(experiment, tasks, deadline=deadline, first_by=first_by):
         row = rows[answer.index]
@@ -238,7 +238,7 @@ def _time(
     timing: Timing,
     told: Callable[[str], None],
 ) -> int:
-    """Take speeds in fresh processes, in a different order in each; returns how many got through."""
+    """Measure speeds in fresh processes, in a different order in each; returns how many completed."""
     measured = [row for row in rows if row.measured]
     done = 0
     for repeat in range(repeats):

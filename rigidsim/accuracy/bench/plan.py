@@ -1,4 +1,4 @@
-"""Which settings are measured, and over how much of the motion: what a budget of time allows."""
+"""Which settings are measured, and over how much of the motion, within a time budget."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare_scene
 
 DEFAULT = Setting()
-"""What every cost is relative to."""
+"""Setting that every cost is relative to."""
 FORMULATIONS = ("quaternion", "rotation_matrix", "euler_angles", "canonical")
 _TOLERANCES: dict[str, tuple[float, ...]] = {
     "double": (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14),
@@ -31,17 +31,17 @@ _FEW_TOLERANCES = (1e-6, 1e-10)  # of the other formulations in double precision
 
 @dataclass(frozen=True)
 class Budgeting:
-    """How a budget of time is divided.
+    """How a time budget is divided.
 
     Costs are in steps of the default setting, measured and rounded up.
 
     Attributes:
-        pilot_steps: that the pace of the default setting is taken from.
-        all_share, all_cost: of all settings together.
-        reference_share, reference_cost: of the reference in quadruple precision.
-        quadruple_share, quadruple_cost: of all quadruple settings.
-        digits_share, digits_cost: of the reference for these.
-        samples, short_samples: where attitudes are compared, over the whole part and over the short one.
+        pilot_steps: steps of the pilot that measures the pace of the default setting.
+        all_share, all_cost: share of the budget and cost of all settings together.
+        reference_share, reference_cost: the same for the reference in quadruple precision.
+        quadruple_share, quadruple_cost: the same for all quadruple settings.
+        digits_share, digits_cost: the same for the reference of these.
+        samples, short_samples: number of attitudes compared, over the whole part and over the short one.
     """
 
     pilot_steps: int = 4000
@@ -65,12 +65,12 @@ class Plan:
     """How much of the motion is measured.
 
     Attributes:
-        start, end: of the experiment, seconds.
-        steps: of the default setting over all of it, roughly.
-        part, short: measured over, by most settings and by quadruple precision.
+        start, end: start and end of the experiment, s.
+        steps: approximate steps of the default setting over all of it.
+        part, short: parts measured by most settings and by quadruple precision.
         times: seconds, ascending; the first ``short_count`` reach to the end of ``short``.
-        closed: whether the scene has a closed form; why: else why not.
-        samples: that the experiment itself records.
+        closed, why: whether the scene has a closed form, and if not, why.
+        samples: number of samples that the experiment itself records.
     """
 
     start: float
@@ -86,11 +86,11 @@ class Plan:
 
 
 def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
-    """All settings, those that matter most first: a budget cuts at the end.
+    """All settings, the most important first, since a budget cuts at the end.
 
     Args:
         closed: whether the scene has a closed form.
-        full: every tolerance in every formulation and precision.
+        full: include every tolerance in every formulation and precision.
     """
 
     def both(settings: list[Setting]) -> list[Setting]:
@@ -107,7 +107,7 @@ def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
     ]
     few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in FORMULATIONS[1:]])
     rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in FORMULATIONS[1:]]
-    # by which the error of a reference is known, where nothing better can be had
+    # needed to know the error of a reference, if nothing better is possible
     others = [] if closed else [Setting(p, formulation="rotation_matrix") for p in ("double", "extended")]
     listed = [
         *plain[:2],
@@ -124,7 +124,7 @@ def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
 
 
 def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING) -> Plan:
-    """From a short pilot of the default setting.
+    """Make a plan from a short pilot of the default setting.
 
     Args:
         budget: seconds for everything.
@@ -166,7 +166,7 @@ def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING)
 
 
 def grid(start: float, end: float, part: float, count: int) -> tuple[float, ...]:
-    """Times over the first part of a motion that single precision means exactly too."""
+    """Times over the first part of a motion that are exact in single precision too."""
     exact = start + (end - start) * part * np.arange(1, count + 1) / count
     rounded = exact.astype(np.float32)
     late = rounded.astype(np.float64) > exact

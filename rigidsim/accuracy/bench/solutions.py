@@ -1,4 +1,4 @@
-"""The references of a measurement, integrated in a process of their own while the settings are tried."""
+"""References of a measurement, integrated in a process of their own while the settings are tried."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.records import dataclass
 
-_WITHOUT_END = 1e6  # seconds: a reference is stopped by the deadline alone
+_WITHOUT_END = 1e6  # seconds: a reference is stopped only by the deadline
 
 Solutions = Mapping[Setting, list[np.ndarray]]
-"""Attitudes of settings, float64 parts (samples, 4)."""
+"""Attitudes by setting, float64 parts (samples, 4)."""
 
 
 @dataclass(frozen=True)
 class ReferenceSolution:
-    """Attitudes to hold others against.
+    """Attitudes against which others are held.
 
     Attributes:
         attitudes: float64 parts (samples, 4).
         error: (samples,) estimate of their own error, rad.
-        how: in words.
+        how: description of the reference.
     """
 
     setting: Setting
@@ -47,10 +47,11 @@ class ReferenceSolution:
 
 
 def attitude_task(plan: Plan, setting: Setting, patience: float, *, wide: bool) -> Task:
-    """Attitudes of a setting over the plan's times, or where it is ``wide`` over the short part of them.
+    """Task that computes a setting's attitudes over the plan's times, or over the short part of them if it is
+    ``wide``.
 
     Args:
-        patience: CPU seconds that it may take.
+        patience: limit of CPU seconds.
     """
     times = plan.times[: plan.short_count] if wide else plan.times
     return Task(setting, "attitudes", times, patience)
@@ -85,17 +86,17 @@ class ReferenceThread(threading.Thread):
                 if answer.problem is None:
                     parts = [np.array(part) for part in answer.values["attitudes"]]
                     self._found[self._tasks[answer.index].setting] = parts
-        except BaseException as error:  # told in the main thread
+        except BaseException as error:  # reported in the main thread
             self._failure = error
 
     def found(self, measured: Solutions) -> tuple[ReferenceSolution, ReferenceSolution | None]:
-        """The reference, and the one for quadruple precision where it needs another.
+        """The reference, and a separate one for quadruple precision if needed.
 
         Args:
-            measured: solutions over the same times, the best of which must do where nothing better is there.
+            measured: solutions over the same times, the best of which serves if there is nothing better.
 
         Raises:
-            RigidsimError: there is none.
+            RigidsimError: there is no reference.
         """
         if self._failure is not None:
             raise self._failure
@@ -117,7 +118,7 @@ class ReferenceThread(threading.Thread):
 
 
 def _best_of(precision: str | int, solutions: Solutions) -> ReferenceSolution | None:
-    """The best solution of a precision, where there are others that its error is known by."""
+    """The best solution of a precision, if there are others from which its error is known; else None."""
     best, _ = best_and_second(precision)
     equals = equals_of(best, solutions)
     if best not in solutions or not equals:

@@ -1,4 +1,4 @@
-"""Settings measured in processes of their own, so that speed, crashes and endless compilations stay there.
+"""Settings measured in processes of their own, to which speed, crashes and endless compilations are confined.
 
 Two integrators that are built alike can differ in speed for their whole life, by a factor of up to 2.6, so
 that speeds have to be compared over fresh processes. A process gets its tasks as JSON on stdin and answers
@@ -41,13 +41,13 @@ _CLOSED_ROWS = {True: 2000, False: 4}  # of a pass in double, and in mpmath
 
 @dataclass(frozen=True)
 class Task:
-    """What to do with a setting.
+    """What to do with one setting.
 
     Attributes:
         kind: "attitudes" (integrate and answer with attitudes and drifts) or "speed".
-        times: to sample at, seconds.
-        patience: CPU seconds that an integration may take, or that repeated passes should.
-        steps: of the whole motion, where known: passes don't go past its end.
+        times: sample times, s.
+        patience: CPU seconds that an integration may take, or that repeated passes should take.
+        steps: steps of the whole motion, if known, since passes don't go past its end.
     """
 
     setting: Setting
@@ -57,23 +57,23 @@ class Task:
     steps: int = 1_000_000
 
     def as_json(self) -> dict[str, Any]:
-        """For ``task_of``."""
+        """JSON values for ``task_of``."""
         return asdict(self)
 
 
 def task_of(given: dict[str, Any]) -> Task:
-    """A task from JSON."""
+    """A task from its JSON values."""
     return Task(**{**given, "setting": Setting(**given["setting"]), "times": tuple(given["times"])})
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of one task.
+    """Result of one task.
 
     Attributes:
-        index: of the task.
-        values: what was measured; empty where nothing was.
-        problem: why not, or not to the end, in words; None where all went well.
+        index: index of the task.
+        values: what was measured; empty if nothing was.
+        problem: why not, or not to the end, in words; None if all went well.
     """
 
     index: int
@@ -135,12 +135,12 @@ def speed(experiment: Experiment, task: Task) -> dict[str, Any]:
         corrected.back_to(start)
         return corrected.skip(count)
 
-    steps(min(task.steps, _LONGEST_WARMING))  # charts are compiled when they are first needed
+    steps(min(task.steps, _LONGEST_WARMING))  # charts are compiled when first needed
     return {"seconds": _per_unit(steps, min(32, task.steps), task.steps, task.patience)}
 
 
 def _per_unit(one_pass: Callable[[int], bool], count: int, most: int, patience: float) -> float:
-    """Median over passes of seconds per unit; passes are lengthened until they can be measured."""
+    """Median over passes of the seconds per unit; passes are lengthened until they can be measured."""
     begun, passes = time.process_time(), []
     while True:
         started = time.process_time()
@@ -172,7 +172,7 @@ def work(stdin: TextIO, stdout: TextIO) -> None:
 
 
 def refusal(error: RigidsimError) -> str:
-    """An error's problems in one line."""
+    """An error's problems on one line."""
     return "; ".join(map(str, error.problems)) if isinstance(error, ConfigError) else str(error)
 
 
@@ -193,9 +193,9 @@ def ask(
     is up the process is stopped, and the tasks that are left have no answer.
 
     Args:
-        deadline: on ``time.monotonic``'s clock.
-        first_by: the same for the first answer, where it may be later.
-        python: the interpreter of the process.
+        deadline: deadline on ``time.monotonic``'s clock.
+        first_by: deadline of the first answer, which may be later.
+        python: interpreter of the process.
     """
     first = 0
     while first < len(tasks):
@@ -216,7 +216,7 @@ def ask(
 def _answers(
     child: _Child, first: int, deadline: float, first_by: float
 ) -> Generator[Answer, None, int | None]:
-    """Returns the first task without an answer, or None when time was up."""
+    """Yield answers; returns the first task without an answer, or None when time is up."""
     following = first
     while True:
         try:
@@ -234,7 +234,7 @@ def _answers(
 
 
 class _Child:
-    """A process with its tasks, and the lines that it answers."""
+    """A process with its tasks, and the lines that it writes."""
 
     def __init__(self, experiment: Experiment, tasks: Sequence[Task], python: str) -> None:
         self._process = subprocess.Popen(
@@ -273,7 +273,7 @@ class _Child:
 
     @property
     def code(self) -> int | None:
-        """Exit code."""
+        """Exit code; None while it runs."""
         return self._process.returncode
 
     def last_words(self) -> str:
@@ -281,7 +281,7 @@ class _Child:
         return f" ({self._errors[-1]})" if self._errors else ""
 
     def end(self) -> None:
-        """Stop it if it still runs."""
+        """Stop the process if it still runs."""
         try:
             self._process.wait(timeout=5.0 if self._closed else 0.0)
         except subprocess.TimeoutExpired:

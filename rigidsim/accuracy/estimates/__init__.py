@@ -1,1 +1,1 @@
-"""The errors that a run announces: from neighbours of its motion, or from its closed form."""
+"""Estimates of a run's errors, from neighbours of its motion or from its closed form."""

@@ -1,4 +1,4 @@
-"""A run whose neighbours are followed to learn how its errors grow, and what was found of it."""
+"""A run whose neighbours are followed to learn how its errors grow, and the result."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class Course:
     """A run whose neighbours are to be followed.
 
     Attributes:
-        start, end: internal units.
-        steps: that it took.
-        waypoints: boundaries of its steps; None where there are none.
-        stepper: of the run; it, or copies of its engine, are used where that is good enough.
-        nearest: singular factor of the run's chart where it was smallest; 1 for charts that are changed.
-        uneven: its longest step over its shortest.
-        lost: errors in epsilons past which nothing is to be learnt.
+        start, end: times, internal units.
+        steps: steps that it took.
+        waypoints: some of its step boundaries; None if there are none.
+        stepper: the run's stepper; it, or copies of its engine, are used if good enough.
+        nearest: smallest singular factor of the run's chart; 1 for charts that are changed.
+        uneven: ratio of its longest step to its shortest.
+        lost: errors in epsilons past which nothing can be learnt.
     """
 
     prepared: InitialValueProblem
@@ -46,21 +46,21 @@ class Course:
 
     @property
     def own(self) -> Stepper | None:
-        """The run's stepper where it can carry the neighbours."""
+        """The run's stepper if it can carry the neighbours; None otherwise."""
         single = self.prepared.system.partner is None and self.prepared.precision.name == "double"
         return self.stepper if single else None
 
 
 @dataclass(frozen=True)
 class Followed:
-    """What was found.
+    """Result of following neighbours.
 
     Attributes:
-        share: of the run's time that neighbours were carried along from its start on, be it until no digit is
-            left.
-        windows: looked at beyond that; ``in_windows``: what part of the run they are.
-        more: by how much more errors grow in these than in as much of the beginning, root mean square, by
-            quantity; 1 where they don't.
+        share: share of the run's time over which neighbours were carried from its start, possibly until no
+            digit is left.
+        windows, in_windows: windows examined beyond that, and the part of the run they cover.
+        more: how much more errors grow in these than in as much of the beginning, root mean square, by
+            quantity; 1 if they don't.
     """
 
     spread: Spread

@@ -1,8 +1,9 @@
-"""How wrong a run gets until its end, from neighbours of its motion (``rigidsim.solve.neighbours.pushed``).
+"""Estimate of a run's errors until its end, from neighbours of its motion
+(``rigidsim.solve.neighbours.pushed``).
 
-The size of a step's errors is known: an epsilon's rounding of each state, and what the tolerance lets the
-series be cut off by. What becomes of them is measured, over the whole run or as much of it as the cost
-allows. Where the motion has a closed form, some samples are simply held against that.
+The size of a step's errors is known: an epsilon's rounding of each state, and the truncation error of the
+series that the tolerance allows. Their growth is measured over the whole run or as much of it as the cost
+allows. If the motion has a closed form, some samples are simply compared with that.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from rigidsim.solve.trail import SampleTrail, Waypoints
 
 _LAST_BITS = 0.5  # of a recorded value, rounded
 _LABEL = 0.25  # of a sample's time, rounded: what is recorded belongs to another moment
-_AS_LARGE = 4.0  # as the whole way: of a place that can't be told
+_AS_LARGE = 4.0  # the whole way: bound for a position that can't be predicted
 
 
 @dataclass(frozen=True)
@@ -35,15 +36,15 @@ class Estimate:
 
     Attributes:
         attitude: rad, at most pi; None without an attitude.
-        rates: of the angular velocity, relative to its size.
-        position, velocity: m and m/s; None where the body has no place.
-        amplification: of the attitude's error (or the rates') over the law of rounding errors; 1 for a stable
+        rates: error of the angular velocity, relative to its size.
+        position, velocity: m and m/s; None if the body has no position.
+        amplification: ratio of the attitude's error (or the rates') to the round-off law; 1 for a stable
             motion.
-        growth_rate: 1/s, of exponential growth; 0 where it is none.
-        predictable_seconds: after the start, from which digits are gone; None for motions whose errors don't
+        growth_rate: rate of exponential growth, 1/s; 0 if there is none.
+        predictable_seconds: time after the start at which digits are gone; None if errors don't
             grow exponentially.
-        seconds: of the run that neighbours followed from its start on; ``share``: the same as a part of it.
-        how: in words.
+        seconds, share: how far neighbours were followed from the start, in s and as a part of the run.
+        how: description of the method.
         closed_form: whether the scene has one, against which the run was held.
     """
 
@@ -61,7 +62,7 @@ class Estimate:
 
     @property
     def leading(self) -> float:
-        """Of the attitude; without one of the rates."""
+        """Error of the attitude, or of the rates if no attitude is carried."""
         return self.rates if self.attitude is None else self.attitude
 
 
@@ -81,17 +82,17 @@ def estimate_errors(
     """Estimate the errors of a run.
 
     Args:
-        steps: that it took.
-        reached: the time that it got to, seconds.
-        trail: some of the run's samples, to be held against a closed form.
-        waypoints: some of its step boundaries, where growth is looked at besides the beginning.
-        stepper: of the run; it is used where that is good enough, and left as it was.
-        nearest: singular factor of the run's chart where it was smallest.
-        uneven: its longest step over its shortest.
-        go_on: asked again and again; False ends it.
+        steps: steps that it took.
+        reached: the time that it reached, s.
+        trail: some of the run's samples, to be compared with a closed form.
+        waypoints: some of its step boundaries, where growth is examined besides the beginning.
+        stepper: the run's stepper; used if good enough, and left as it was.
+        nearest: smallest singular factor of the run's chart.
+        uneven: ratio of its longest step to its shortest.
+        go_on: polled repeatedly; False ends the estimate.
 
     Returns:
-        None where ``go_on`` ended it.
+        None if ``go_on`` ended it.
     """
     scene, system = prepared.scene, prepared.system
     carried = system.requirements.formulation != "rates"
@@ -128,7 +129,7 @@ def _of_closed_form(prepared: InitialValueProblem, error: float, carried: bool) 
 def _by_comparison(
     prepared: InitialValueProblem, found: ExactError, law: float, seconds: float, margins: Margins
 ) -> Estimate:
-    """What was found, and some more for what lies between the samples that were compared."""
+    """Estimate from the errors found, with a margin for the times between the samples compared."""
     bits, label = _LAST_BITS * float(prepared.precision.epsilon), label_rounding(prepared, seconds)
     rate = float(prepared.system.rate_bound)
     extent, speed = _size(prepared.scene.position), _size(prepared.scene.velocity)
@@ -151,7 +152,7 @@ def _by_comparison(
 
 
 def label_rounding(prepared: InitialValueProblem, seconds: float) -> float:
-    """By which times of samples are rounded, seconds."""
+    """Rounding error of sample times, s."""
     late = max(abs(float(prepared.scene.start)), abs(float(prepared.scene.start) + seconds))
     return _LABEL * float(prepared.precision.epsilon) * late
 

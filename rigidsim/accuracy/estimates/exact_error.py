@@ -1,4 +1,4 @@
-"""How wrong a run is where its motion has a closed form: simply by comparison, at any horizon."""
+"""Error of a run whose motion has a closed form, by comparison, at any horizon."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity"
 
 @dataclass(frozen=True)
 class ExactError:
-    """Largest at some samples, the last among them.
+    """Largest errors at some samples, the last among them.
 
     Attributes:
-        attitude: rad; None without one.
-        rates: relative to their size; None where they are no states.
-        position, velocity: m and m/s; None where the body has no place.
+        attitude: rad; None if none is carried.
+        rates: relative to their size; None if they aren't states.
+        position, velocity: m and m/s; None if the body has no position.
     """
 
     attitude: float | None
@@ -34,11 +34,11 @@ class ExactError:
 
 
 def exact_error(prepared: InitialValueProblem, form: ClosedForm, trail: SampleTrail) -> ExactError:
-    """Hold a run's samples against the closed form of its motion, which is evaluated in the run's precision
-    or better: it makes some roundings at any time.
+    """Compare a run's samples with the closed form of its motion, evaluated in the run's precision or better,
+    which rounds only a few times at any time.
 
     Args:
-        form: of the scene.
+        form: closed form of the scene.
         trail: some samples, at least one.
     """
     precision = precision_of("double") if prepared.precision.narrow else prepared.precision
@@ -56,7 +56,7 @@ def exact_error(prepared: InitialValueProblem, form: ClosedForm, trail: SampleTr
 
 
 class _Reader:
-    """What the states of a system say, compiled once."""
+    """Quantities that the states of a system stand for, compiled once."""
 
     def __init__(self, system: System, precision: Precision) -> None:
         self._system, attitude = system, system.mechanics.attitude
@@ -69,7 +69,7 @@ class _Reader:
             self._function = hy.cfunc(attitude.quaternion, system.variables, compact_mode=True, **options)
 
     def read(self, state: np.ndarray) -> dict[str, np.ndarray]:
-        """The quaternion (4,), and vectors in SI as the nearest doubles and what is left, (2, 3)."""
+        """The quaternion (4,), and vectors in SI as the nearest doubles and their residuals, (2, 3)."""
         found: dict[str, np.ndarray] = {}
         if self._function is not None:
             found["attitude"] = np.array(self._function(state))
@@ -82,7 +82,7 @@ class _Reader:
 
 
 def _apart(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> dict[str, float]:
-    """Distances, SI; of rates relative to their size."""
+    """Distances in SI; for rates, relative to their size."""
     found: dict[str, float] = {}
     for name in one.keys() & other.keys():
         a, b = one[name], other[name]
@@ -95,7 +95,7 @@ def _apart(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> dict[str
 
 
 def _vector(system: System, values: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """Three states in SI as the nearest doubles, and what is left, (2, 3)."""
+    """Three states in SI as the nearest doubles and their residuals, (2, 3)."""
     places = [system.states.index(name) for name in names]
     exponents = np.array([system.state_exponents[i] for i in places], dtype=np.int32)
     high = np.array([float(values[i]) for i in places])
@@ -104,7 +104,7 @@ def _vector(system: System, values: np.ndarray, names: tuple[str, ...]) -> np.nd
 
 
 def _angle(one: np.ndarray, other: np.ndarray) -> float:
-    """Between attitudes given as quaternions, up to their sign, rad."""
+    """Angle between attitudes given as quaternions, up to their sign, rad."""
     opposite = sum(float(a) * float(b) for a, b in zip(one, other, strict=True)) < 0
     apart = [float(a + b) if opposite else float(a - b) for a, b in zip(one, other, strict=True)]
     return 4 * math.asin(min(math.hypot(*apart) / 2, 1.0))

@@ -1,4 +1,4 @@
-"""How far a run's neighbours are followed, and what carries them: as much as the cost allows.
+"""How far a run's neighbours are followed, and with which integrator, within a limited cost.
 
 A run of some ten thousand steps is followed to its end. Of a longer one the beginning is, and windows that
 are spread over the rest; where errors grow in any of them by more than time makes them, the whole run is
@@ -40,7 +40,7 @@ def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Follo
     """Follow a run's neighbours.
 
     Args:
-        go_on: asked again and again; False ends it.
+        go_on: polled repeatedly; False ends it.
     """
     with borrowed(course.stepper):
         return _follow_as_needed(course, margins, go_on)
@@ -66,12 +66,12 @@ def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool
 
 
 def leading(spread: Spread, carried: bool) -> np.ndarray:
-    """Errors of the attitude; without one of the rates."""
+    """Errors of the attitude, or of the rates if no attitude is carried."""
     return np.array(spread.attitude if carried else spread.rates)
 
 
 def _affordable(course: Course, margins: Margins) -> float:
-    """Steps that may be followed: so many whatever they cost, or for a small part of the run's cost."""
+    """Steps that may be followed: a fixed number whatever they cost, or a small part of the run's cost."""
     if course.prepared.system.stepwise:
         return max(margins.switching_steps, margins.switching_share * course.steps)
     dearer = dict(margins.dearer).get(course.prepared.precision.name)
@@ -102,7 +102,7 @@ def _affordable_by_twin(course: Course, margins: Margins) -> float:
 def _follow(
     course: Course, part: float, tolerance: float, margins: Margins, go_on: Callable[[], bool]
 ) -> tuple[Followed, bool]:
-    """Follow a part of a run, and all of it where that is called for; and whether it was followed tightly."""
+    """Follow a part of a run, and all of it if necessary; also returns whether it was followed tightly."""
     start, steps, carried = course.start, course.steps, course.carried
     waypoints = _waypoints(course, part, margins) if part < 1 else []
     first = part * margins.beginning if waypoints else part
@@ -151,7 +151,7 @@ def _prepare(neighbours: Neighbours, steps: float, end: float) -> None:
 
 
 def _waypoints(course: Course, part: float, margins: Margins) -> list[Waypoint]:
-    """Where windows begin; none where the neighbours' states are others than the run's."""
+    """Where windows begin; none if the neighbours' states differ from the run's."""
     system = course.prepared.system
     own = course.own is not None and part * course.steps < margins.most_own_steps
     if course.waypoints is None or system.stepwise or not (own or _same_states(course.prepared)):
@@ -169,7 +169,7 @@ def _windows(
     share: float,
     go_on: Callable[[], bool],
 ) -> list[Spread]:
-    """Errors that begin in each window, together so much of the run."""
+    """Errors that begin in each window; together the windows cover a share of the run."""
     length = share * (course.end - course.start) / len(waypoints)
     steps, seen = share * course.steps / len(waypoints), []
     for waypoint in waypoints:
@@ -182,7 +182,7 @@ def _windows(
 
 
 def _more(beginning: Spread, until: float, windows: list[Spread], least: float) -> dict[str, float]:
-    """As of ``Followed``, at least so much; the beginning as far as to a time."""
+    """``Followed.more``, at least ``least``; the beginning counts up to a time."""
     last = min(int(np.searchsorted(beginning.times, until)), len(beginning.times) - 1)
     found = {}
     for name in ("rates", "attitude", "position", "velocity"):
@@ -194,7 +194,7 @@ def _more(beginning: Spread, until: float, windows: list[Spread], least: float) 
 
 
 def _suspicious(spread: Spread, start: float, carried: bool, power: float) -> bool:
-    """Whether errors grow with more than a power of time, or the motion couldn't be followed."""
+    """Whether errors grow faster than a power of time, or the motion couldn't be followed."""
     if not (spread.whole and spread.times):
         return not spread.whole
     times, found = np.array(spread.times) - start, [leading(spread, carried)]
@@ -207,7 +207,9 @@ def _suspicious(spread: Spread, start: float, carried: bool, power: float) -> bo
 
 
 def _same_states(prepared: InitialValueProblem) -> bool:
-    """Unless they have singularities that a loose tolerance would run into."""
+    """Whether neighbours have the run's states, which they do unless a loose tolerance would run into
+    singularities of these.
+    """
     return prepared.system.requirements.formulation not in ("euler_angles", "canonical")
 
 
@@ -221,10 +223,10 @@ def _by_itself(course: Course, part: float, tolerance: float, margins: Margins) 
 
 
 def _neighbours(course: Course, part: float, first: float, tolerance: float, margins: Margins) -> Neighbours:
-    """At the start.
+    """Neighbours at the start of a run.
 
     Args:
-        part: of the run that is to be followed, ``first``: from its start on.
+        part, first: parts of the run to be followed, in all and from its start on.
     """
     steps = course.steps * part
     prepared, own = course.prepared, course.own
@@ -265,12 +267,12 @@ def _neighbours(course: Course, part: float, first: float, tolerance: float, mar
 
 
 def loose(prepared: InitialValueProblem) -> bool:
-    """Whether the tolerance lets steps be wrong by more than rounding does."""
+    """Whether the tolerance allows larger step errors than rounding causes."""
     return prepared.effective_tolerance > 2 * float(prepared.precision.epsilon)
 
 
 def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
-    """Of a step.
+    """Errors of a step.
 
     Args:
         stand_in: whether quaternions take the place of the run's states.
@@ -296,7 +298,7 @@ def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
 
 
 def _condition(course: Course) -> float:
-    """What canonical momenta make of a rounding error, root mean square over the steps.
+    """Amplification of a rounding error by canonical momenta, root mean square over the steps.
 
     Rates are I^-1 K^T p: a rounded momentum is of the size of the largest moment and is divided by the
     smallest, and K has the inverse of the singular factor s in it. In passing the singularity the rates that

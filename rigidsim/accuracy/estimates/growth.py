@@ -1,4 +1,4 @@
-"""How errors grew along a motion: as a power of time, or exponentially, and from when on digits are gone."""
+"""Growth of errors along a motion: power of time or exponential, and when digits are gone."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 UNCERTAIN = 1e-2
-"""rad (or relative to the rates); what is so uncertain is no result any more."""
+"""Error (rad, or relative to the rates) above which a result counts as lost."""
 
 
 def power_of_time(times: np.ndarray, errors: np.ndarray) -> float:
-    """Of time that errors grew with over the last three quarters."""
+    """Power of time with which errors grew over the last three quarters."""
     largest = np.maximum.accumulate(errors)
     early = int(np.searchsorted(times, times[-1] / 4))
     if not (0 < largest[early] < math.inf and times[early] < times[-1] and largest[-1] < math.inf):
@@ -22,14 +22,14 @@ def power_of_time(times: np.ndarray, errors: np.ndarray) -> float:
 def exponential_growth(
     times: np.ndarray, errors: np.ndarray, exponent: int, stable: float, least: float
 ) -> tuple[float, float | None]:
-    """Rate of exponential growth, 1/s, and when digits are gone, seconds after the start; 0 and None where
-    growth is none.
+    """Rate of exponential growth, 1/s, and when digits are gone, seconds after the start; 0 and None if
+    growth isn't exponential.
 
     Args:
-        times: internal units, whose binary exponent is ``exponent``, since the start.
+        times: times since the start, internal units, whose binary exponent is ``exponent``.
         errors: rad, or relative.
-        stable: power of time that errors of stable motions grow with.
-        least: past which growth is none.
+        stable: power of time with which errors of stable motions grow.
+        least: power of time up to which growth doesn't count as exponential.
     """
     largest = np.maximum.accumulate(errors)
     gone = int(np.searchsorted(largest, UNCERTAIN))

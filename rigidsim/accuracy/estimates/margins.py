@@ -1,4 +1,4 @@
-"""What the estimate of a run's errors assumes, and how far it looks."""
+"""Assumptions and limits of the estimate of a run's errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class Margins:
-    """What the estimate assumes, and how far it looks.
+    """Assumptions and limits of an estimate of errors.
 
     With the defaults the errors of the campaign's scenes are covered as ``experiments/README.md`` shows
     (``experiments/error_coverage.py``).

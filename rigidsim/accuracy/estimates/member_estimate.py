@@ -1,6 +1,6 @@
-"""How wrong the members of a batch get until their ends, from neighbours of their motions.
+"""Errors of a batch's members until their ends, from neighbours of their motions.
 
-As of a single run (``rigidsim.accuracy.estimates.estimate``): the same pushes, the same margins. Each
+As for a single run (``rigidsim.accuracy.estimates.estimate``), with the same pushes and margins. Each
 member's neighbours are followed over all of its motion, at a loose tolerance; where errors grow so much
 that a motion so followed becomes another one, once more at the run's own.
 
@@ -27,27 +27,28 @@ from rigidsim.solve.neighbours.pushed import Pushes
 
 LOOSE = 1e-8
 """Tolerance of the lanes, as of single runs. At 1e-6, whose steps cost half, errors beside a separatrix were
-announced ten times larger."""
+announced ten times larger.
+"""
 _DRIFTED = 1e-2
-"""Of the tolerance times growth, from which a motion so loosely followed is another one."""
+"""Tolerance times growth from which a motion followed so loosely becomes a different one."""
 _BY_CHANCE = 8.0
-"""Epsilons of tolerance up to which a step's error is rounding's, at random."""
+"""Tolerance in epsilons up to which a step's error is mostly random rounding."""
 _TIGHTER = 2.0**-10
-"""A run of so much of the tolerance is right, as far as errors of the tolerance go."""
+"""Factor on the tolerance of a run that counts as exact, as far as errors of the tolerance go."""
 _MORE_STEPS = 4
 _LAST_BITS = 0.5  # of a recorded value, rounded
 _LABEL = 0.25  # of a sample's time, rounded
-_AS_LARGE = 4.0  # as the whole way: of a place that can't be told
+_AS_LARGE = 4.0  # the whole way: bound for a position that can't be predicted
 
 
 @dataclass(frozen=True)
 class MemberErrors:
-    """Largest errors of members until their last samples, (members,); nan of those that have none.
+    """Largest errors of members until their last samples, (members,); nan for those that have none.
 
     Attributes:
         attitude: rad, at most pi; None without an attitude.
-        rates: of the angular velocity, relative to its size.
-        position, velocity: m and m/s; None where the body has no place.
+        rates: error of the angular velocity, relative to its size.
+        position, velocity: m and m/s; None if the body has no position.
     """
 
     attitude: np.ndarray | None
@@ -57,15 +58,15 @@ class MemberErrors:
 
     @property
     def uncertain(self) -> np.ndarray:
-        """Whose digits are gone."""
+        """Mask of the members whose digits are gone."""
         return (self.rates if self.attitude is None else self.attitude) > UNCERTAIN
 
 
 class MemberEstimates:
-    """Of a family's members, with what they need compiled once.
+    """Estimates for a family's members, with what they need compiled once.
 
     Args:
-        width: lanes of the batch that ran them.
+        width: number of lanes of the batch that ran them.
     """
 
     def __init__(self, family: Family, width: int, margins: Margins = MARGINS) -> None:
@@ -77,7 +78,7 @@ class MemberEstimates:
         """Errors of a block's members.
 
         Args:
-            numbers: that the block was run from.
+            numbers: numbers from which the block was run.
         """
         ran = np.array([status is not None for status in block.status]) & (block.reached > 0)
         some = np.flatnonzero(ran)
@@ -134,12 +135,12 @@ class MemberEstimates:
 
     @property
     def _by_chance(self) -> bool:
-        """Whether rounding is what makes errors."""
+        """Whether errors come mainly from rounding."""
         asked, epsilon = self._prepared.effective_tolerance, float(self._prepared.precision.epsilon)
         return asked <= _BY_CHANCE * epsilon
 
     def _compared(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spreads:
-        """How far members are from what a tighter tolerance makes of them, in epsilons."""
+        """Distance of members from runs at a tighter tolerance, in epsilons."""
         lanes = self._through(self._prepared.effective_tolerance * _TIGHTER)
         most = _MORE_STEPS * int(starts.steps.max()) + 1000
         here = block.states[:, :, some]

@@ -1,1 +1,1 @@
-"""How wrong an averaged model is, and which one is good enough."""
+"""Errors of averaged models, and the choice of a model that is good enough."""

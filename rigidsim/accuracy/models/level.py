@@ -1,4 +1,6 @@
-"""Which model keeps an accuracy of axes: the most averaged one whose measured error is within it."""
+"""Choice of the model for a requested accuracy of axes: the most averaged one whose measured error is within
+it.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +19,10 @@ CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)
 
 @dataclass(frozen=True)
 class Considered:
-    """A level that was looked at.
+    """A model level that was considered.
 
     Attributes:
-        error: forecast of its modelling error from the beginning of the span, rad; None where it has none.
+        error: forecast of its modelling error from the beginning of the span, rad; None if there is none.
         why_not: why it isn't taken; empty for the one that is.
     """
 
@@ -31,7 +33,7 @@ class Considered:
 
 @dataclass(frozen=True)
 class LevelChoice:
-    """What ``level = "auto"`` came to."""
+    """Result of ``level = "auto"``."""
 
     experiment: Experiment
     level: str
@@ -41,16 +43,17 @@ class LevelChoice:
 def choose_level(
     experiment: Experiment, *, loads: Sequence[Load] = (), without: Sequence[str] = ()
 ) -> LevelChoice | None:
-    """The model for the accuracy of axes that is asked for, each measured over the beginning of the span.
+    """Choose the model for the requested accuracy of axes, each level measured over the beginning of the
+    span.
 
-    What isn't an average's to tell, such as a quaternion recorded, leaves the full model, whose attitude is
-    held to the same accuracy then.
+    Recording something that no average provides, such as a quaternion, leaves the full model, whose attitude
+    is then held to the same accuracy.
 
     Args:
-        without: levels that were tried and didn't keep it.
+        without: levels that were tried and missed it.
 
     Returns:
-        None where the level is given.
+        None if the level is given.
 
     Raises:
         ConfigError: no accuracy is asked for.
@@ -80,7 +83,7 @@ def choose_level(
 
 
 def fully(experiment: Experiment) -> Experiment:
-    """The full model of an experiment whose level is open; others as they are.
+    """An experiment with its open level set to the full model; others unchanged.
 
     Raises:
         ConfigError: no accuracy is asked for.

@@ -1,8 +1,8 @@
-"""How wrong an averaged model is: measured over windows in which every rotation is resolved beside it.
+"""Error of an averaged model, measured over windows in which every rotation is resolved beside it.
 
 At the beginning, the middle and the end of the span the full motion starts from the averaged one's state,
-with what averaging removed added back, and both are followed. What they differ by is a growth, which is
-extrapolated over the span, and an oscillation, which is there whatever the span. A run that is hardly longer
+with what averaging removed added back, and both are followed. Their difference is a growth, which is
+extrapolated over the span, plus an oscillation, whatever the span. A run that is hardly longer
 than the windows is followed to its end instead. The errors of the integration itself are another matter
 (``rigidsim.accuracy.estimates.estimate``).
 """
@@ -27,28 +27,28 @@ from rigidsim.solve.trail import SampleTrail
 
 _ORBITS = 8  # of the slowest source, from which a growth is told from what goes round with it
 _FEWEST_ORBITS = 2
-_ROTATIONS = 4000  # some 20,000 steps
+_ROTATIONS = 4000  # rotations per window, some 20,000 steps
 _MOST_ROTATIONS = 20_000  # for the fewest orbits
 _LEAST_ROTATIONS = 50
 _LIBRATIONS = 2
 _WHOLE = 4  # windows that a run is followed to its end in place of
 _SPARE = 2.0
-"""Times the extrapolated growth: it is told from three windows, and varies between them."""
-_SPARE_OF_WHOLE = 1.25  # for what lies between the samples
+"""Factor on the extrapolated growth, which is measured in three windows and varies between them."""
+_SPARE_OF_WHOLE = 1.25  # for the times between the samples
 _TURN = 2 * math.pi
 
 
 @dataclass(frozen=True)
 class ModellingError:
-    """What a reduced model leaves out.
+    """Error of a reduced model.
 
     Attributes:
-        momentum, figure: of the directions recorded, until the end of the run, rad; at most pi.
-        growth: rad/s, of the momentum's direction.
-        oscillation: rad, which doesn't grow: what isn't added back of the momentum's direction.
+        momentum, figure: errors of the recorded directions until the end of the run, rad; at most pi.
+        growth: growth of the momentum's direction error, rad/s.
+        oscillation: part that doesn't grow, rad: what isn't added back to the momentum's direction.
         whole: whether the full model was followed to the end.
-        how: in words.
-        cpu_seconds: that it took.
+        how: description of the measurement.
+        cpu_seconds: CPU time of the measurement, s.
     """
 
     level: str
@@ -63,7 +63,7 @@ class ModellingError:
 
     @property
     def worst(self) -> float:
-        """Of both directions."""
+        """The larger error of both directions, rad."""
         return max(self.momentum, self.figure or 0.0)
 
 
@@ -73,11 +73,11 @@ def measure_modelling(
     """Measure the modelling error of a run.
 
     Args:
-        trail: some of the run's samples; without them windows lie at the beginning alone.
-        go_on: asked again and again; False ends it.
+        trail: some of the run's samples; without them, there is only a window at the beginning.
+        go_on: polled repeatedly; False ends the measurement.
 
     Returns:
-        None where ``go_on`` ended it, or where the full model can't be followed.
+        None if ``go_on`` ended it, or if the full model can't be followed.
     """
     average = prepared.system.plan.average
     assert average is not None
@@ -107,7 +107,7 @@ def measure_modelling(
 
 
 def _length(scene: Scene, average: Average) -> float:
-    """Of a window, seconds."""
+    """Length of a window, s."""
     rates = rotation_rates(average)
     rotation = _TURN / max(rates)
     if average.resonance is not None:
@@ -122,7 +122,7 @@ def _length(scene: Scene, average: Average) -> float:
 def _places(
     prepared: InitialValueProblem, trail: SampleTrail | None, begin: float, end: float, length: float
 ) -> list[tuple[float, list[Any]]]:
-    """Middle and end: the samples that are nearest, with the states there, the momentum's direction first."""
+    """Middle and end: the nearest samples, with the states there, the momentum's direction first."""
     context, exponent = prepared.scene.context, prepared.system.scaling.time
     kept = [] if trail is None else trail.samples
     seen = [
@@ -162,7 +162,7 @@ def _extrapolated(
     doubt = max(w.doubt for w in windows)
     mean = np.abs(rates.mean(axis=0)) + (rates.max(axis=0) - rates.min(axis=0)) / 2
     along, across = (float(x) + doubt for x in mean)
-    # an error across the precession changes its rate, along it
+    # an error across the precession changes the rate along it
     shear = float(average.shear(prepared.scene.context, prepared.scene.start))
     grown = math.hypot(along + shear * across * span / 2, across) * span
     oscillation = max(w.recorded for w in windows)

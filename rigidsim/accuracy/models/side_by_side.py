@@ -29,23 +29,24 @@ from rigidsim.solve.status import Status
 
 _FEWEST_SAMPLES, _MOST_SAMPLES = 2000, 16_000
 _SAMPLES_PER_ROTATION = 2
-"""What goes on within a rotation rises to its largest in a few of them, near a periapsis: with 2000 samples
-of 7500 rotations a quarter of it was missed."""
+"""Samples per rotation: near a periapsis, changes within a rotation reach their maximum in a few of them;
+with 2000 samples of 7500 rotations a quarter of it was missed.
+"""
 _TURN = 2 * math.pi
 
 
 @dataclass(frozen=True)
 class Window:
-    """Where both models ran side by side.
+    """A window over which both models ran side by side.
 
     Attributes:
-        start, end: seconds.
-        steps, reduced_steps: of the full model and of the other.
+        start, end: times, s.
+        steps, reduced_steps: steps of the full and of the reduced model.
         momentum, figure: largest distance between the directions of the angular momentum and of the figure
-            axis, with what averaging removed added back, rad; None where the body tumbles.
+            axis, with what averaging removed added back, rad; None if the body tumbles.
         recorded, recorded_figure: the same for the directions as the run records them.
-        growth: of the distance of the momenta, along and across its precession, rad/s.
-        doubt: by how much the growth of the window's parts differs, rad/s.
+        growth: growth of the momenta's distance, along and across the precession, rad/s.
+        doubt: difference of growth between the window's parts, rad/s.
     """
 
     start: float
@@ -61,12 +62,12 @@ class Window:
 
 
 def rotation_rates(average: Average) -> list[float]:
-    """Of the free rotation, rad/s."""
+    """Rates of the free rotation, rad/s."""
     return [abs(float(average.motion.precession_rate)), abs(float(average.motion.wobble_rate))]
 
 
 def _sample_count(average: Average, seconds: float) -> int:
-    """At which both models are compared."""
+    """Number of samples at which both models are compared."""
     rotations = seconds * max(rotation_rates(average)) / _TURN
     return int(min(max(_FEWEST_SAMPLES, _SAMPLES_PER_ROTATION * rotations), _MOST_SAMPLES))
 
@@ -79,7 +80,7 @@ def side_by_side(
     states: Sequence[Any],
     go_on: Callable[[], bool],
 ) -> Window | None:
-    """Both models side by side; None where one doesn't get to the end."""
+    """Run both models side by side; None if one doesn't reach the end."""
     exponent = prepared.system.scaling.momentum
     count = _sample_count(average, end - begin)
     scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
@@ -123,13 +124,13 @@ def _starting(
     exponent: int,
     count: int,
 ) -> Scene:
-    """The full scene from a time on: the body as it was at its start, turned by as little as brings its
-    momentum to where it is now; as the slow motion has it where it keeps pace with its source.
+    """The full scene from a time on: the body as at its start, turned by the smallest rotation that brings
+    its momentum to the present one; in a resonance, as given by the slow motion.
 
     Args:
-        states: of the averaged motion.
-        exponent: binary, of the internal unit of angular momentum.
-        count: of samples.
+        states: states of the averaged motion.
+        exponent: binary exponent of the internal unit of angular momentum.
+        count: number of samples.
     """
     context = scene.context
     instant = fraction_of(context.mpf(begin)) if begin != float(scene.start) else scene.samples.begin
@@ -157,7 +158,7 @@ def _starting(
 
 
 class _AsDoubles(SampleReceiver):
-    """Keeps what is recorded in memory, as doubles."""
+    """Keeps recorded variables in memory, as doubles."""
 
     def __init__(self, evaluator: Evaluator, names: Sequence[str]) -> None:
         self._evaluator = evaluator
@@ -169,7 +170,7 @@ class _AsDoubles(SampleReceiver):
             pieces.append(np.asarray(recorded[name][0], dtype=np.float64))
 
     def of(self, name: str) -> np.ndarray:
-        """(samples, 3)."""
+        """A recorded vector, (samples, 3)."""
         return np.concatenate(self._pieces[name])
 
 
@@ -181,7 +182,7 @@ def _followed(
     names: list[str],
     go_on: Callable[[], bool],
 ) -> tuple[int, dict[str, np.ndarray]] | None:
-    """Steps, and what was asked for at all samples; None where the motion doesn't get there."""
+    """Steps, and the variables asked for at all samples; None if the motion doesn't reach the end."""
     config = scene.config
     model = config.model.model_copy(update={"level": level, "short_period": short_period and level != FULL})
     plain = {"precision": "double", "tolerance": "auto", "hold_invariants": False}
@@ -202,7 +203,7 @@ def _followed(
 
 
 def _basis(path: np.ndarray) -> np.ndarray:
-    """Rows: unit vectors along a path of directions, and across it."""
+    """Unit vectors, as rows, along a path of directions and across it."""
     middle = path[len(path) // 2]
     along = path[-1] - path[0]
     along = along - (along @ middle) * middle
@@ -213,7 +214,7 @@ def _basis(path: np.ndarray) -> np.ndarray:
 
 
 def _slope(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Of each column, weighted with a Hann window, so that oscillations have little say."""
+    """Slope of each column, weighted with a Hann window to suppress oscillations."""
     x = times - times.mean()
     weights = np.sin(np.pi * (times - times[0]) / (times[-1] - times[0])) ** 2
     x = x - (weights @ x) / weights.sum()

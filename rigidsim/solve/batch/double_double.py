@@ -16,7 +16,7 @@ Array = Any  # float64: an array, or a number for all members
 
 _OWN = 2.0**-100
 _UNDERFLOW = 2.0**-960
-"""Where products lose their second parts; a result as small as that is never trusted."""
+"""Size below which products lose their second parts; such a small result is never trusted."""
 _SPLITTER = 2.0**27 + 1
 _SPARE = 1 + 2.0**-40  # for the roundings of the bounds themselves
 
@@ -60,7 +60,7 @@ def add(x: Doubled, y: Doubled) -> Doubled:
 
 
 def negative(x: Doubled) -> Doubled:
-    """Exactly."""
+    """Negative, exactly."""
     return Doubled(-x.high, -x.low, x.error)
 
 
@@ -83,7 +83,7 @@ def multiply(x: Doubled, y: Doubled) -> Doubled:
 
 
 def scale(x: Doubled, factor: Array) -> Doubled:
-    """Times a power of two, exactly."""
+    """Product with a power of two, exactly."""
     tiny = np.where(np.abs(x.high * factor) > _UNDERFLOW, 0.0, _UNDERFLOW)
     return Doubled(x.high * factor, x.low * factor, x.error * factor + np.where(x.high == 0, 0.0, tiny))
 
@@ -122,13 +122,13 @@ def root(x: Doubled) -> Doubled:
 
 
 def absolute(x: Doubled) -> Doubled:
-    """Size."""
+    """Absolute value."""
     sign = np.where(x.high < 0, -1.0, 1.0)
     return Doubled(x.high * sign, x.low * sign, x.error)
 
 
 def extreme(x: Doubled, y: Doubled, *, largest: bool) -> Doubled:
-    """The larger or smaller of two; where they can't be told apart either may stand for both."""
+    """The larger or smaller of two; if they can't be told apart, either may stand for both."""
     difference = subtract(x, y)
     first = difference.high > 0 if largest else difference.high < 0
     own = np.where(first, x.error, y.error)
@@ -138,13 +138,13 @@ def extreme(x: Doubled, y: Doubled, *, largest: bool) -> Doubled:
 
 
 def sign_of(x: Doubled) -> tuple[Array, Array]:
-    """-1, 0 or 1, and whether that is certain."""
+    """Sign (-1, 0 or 1), and whether it is certain."""
     certain = (np.abs(x.high) > 2 * x.error) | ((x.error == 0) & np.isfinite(x.high))
     return np.sign(x.high), certain & np.isfinite(x.error)
 
 
 def nearest_double(x: Doubled) -> tuple[Array, Array]:
-    """The double nearest to the number meant, and whether that is certain."""
+    """The double nearest to the exact number, and whether that is certain."""
     gap = np.spacing(np.nextafter(np.abs(x.high), 0.0)) / 2
     certain = ((x.error == 0) & (x.low == 0)) | (np.abs(x.low) + 2 * x.error < gap)
     return x.high, certain & np.isfinite(x.high) & np.isfinite(x.error)

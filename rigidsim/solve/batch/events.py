@@ -1,4 +1,4 @@
-"""Events of a family: expressions that the batch engine watches, with what differs between members.
+"""Events of a family: expressions that the batch engine watches, with parameters that differ between members.
 
 As in a single run an expression is given a unit in which it is of order one, and is taken off a zero that the
 motion begins at (``rigidsim.solve.events``). Both depend on the member, so that they are parameters.
@@ -21,10 +21,10 @@ _BITS = 53
 
 
 class EventExpressions:
-    """A family's events.
+    """Events of a family, with their parameters.
 
     Attributes:
-        parameters: how many they have beside those that they share with the equations.
+        parameters: number of parameters besides those shared with the equations.
     """
 
     def __init__(self, traced: TracedSystem) -> None:
@@ -33,7 +33,7 @@ class EventExpressions:
         self.parameters = 2 * len(self._meant)
 
     def over_parameters(self) -> list[tuple[Any, int]]:
-        """Expressions, with directions; to each belong a shift and a factor."""
+        """Expressions with their directions, each with a shift and a factor as parameters."""
         first = len(self._traced.in_equations)
         expressions = self._traced.as_parameters(self._meant)
         return [
@@ -52,7 +52,7 @@ class EventExpressions:
     def values(
         self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray, end: np.ndarray
     ) -> np.ndarray:
-        """Their parameters, (2 * events, members).
+        """Parameters of the events, (2 * events, members).
 
         Args:
             initial: of the motion, (states, members); swept: (parameters, members); start, end: (members,),
@@ -75,7 +75,7 @@ class EventExpressions:
         return found
 
     def _evaluated(self, states: np.ndarray, swept: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """(events, members), in compact mode the same wherever a member stands."""
+        """Values (events, members), in compact mode, where they don't depend on a member's place."""
         inputs = np.ascontiguousarray(np.concatenate([states, swept]))
         options = {"time": np.ascontiguousarray(times)} if self._function.is_time_dependent else {}
         with np.errstate(all="ignore"):

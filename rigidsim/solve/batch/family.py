@@ -1,4 +1,4 @@
-"""Families: members that share their equations, and the numbers that each of them puts in."""
+"""Families: members that share their equations, and the numbers in which they differ."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.problem import prepare
 
 MOST_FAMILIES = 64
-"""Traced in all. Where members differ so much, the rest of them is run one by one."""
+"""Largest number of families that are traced; if members differ more, the rest is run one by one."""
 _HOPELESS = 8
-"""Members that could not be traced, after which no other is tried."""
+"""Members that could not be traced after which no other is tried."""
 _AT_ONCE = 4096  # members whose numbers are worked out together
 
 
 class Alone(Enum):
-    """Why a member can't run in a batch: it is run by itself. The value is for users."""
+    """Why a member can't run in a batch and is run by itself; the value is shown to users."""
 
     PRECISION = "batches compute in double precision only"
     CLOSED_FORM = "the closed form takes no steps"
@@ -51,7 +51,9 @@ class Alone(Enum):
 
 
 def reason_of_experiment(experiment: Experiment) -> Alone | None:
-    """Why no member of such an experiment can run in a batch, as far as the config says."""
+    """Why no member of such an experiment can run in a batch, as far as its config tells; None if some
+    may.
+    """
     config = experiment.config
     integrator = config.integrator
     asked = integrator.accuracy, integrator.accuracy_axis, integrator.accuracy_position
@@ -71,11 +73,11 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
 
 
 def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
-    """Why members of an experiment, with numbers that are swept, can't run in a batch; None where they can,
-    as far as it can be told before any member is looked at.
+    """Why members of an experiment with swept numbers can't run in a batch, as far as can be told before any
+    member is examined; None if they can.
 
     Args:
-        keys: of the swept numbers.
+        keys: keys of the swept numbers.
     """
     reason = reason_of_experiment(experiment)
     if reason is not None:
@@ -106,7 +108,7 @@ class Family:
     """Members that share the equations of one traced system.
 
     Attributes:
-        kind: what else they share, see ``Members.kinds``.
+        kind: what else its members share, see ``Members.kinds``.
     """
 
     traced: TracedSystem
@@ -114,19 +116,19 @@ class Family:
 
     @cached_property
     def guards(self) -> list[Guard]:
-        """Decisions that its members share, those that separate most first."""
+        """Decisions that its members share, the most selective first."""
         return list(self.traced.graph.guards)
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """What members of a family put in, float64.
+    """Numbers of a family's members, float64.
 
     Attributes:
-        members: which they are.
+        members: indices of the members.
         initial: (states, members), internal units.
         parameters: (parameters of the traced system, members).
-        replay: for what else follows from their numbers.
+        replay: evaluates anything else that follows from their numbers.
     """
 
     members: np.ndarray
@@ -135,13 +137,13 @@ class Numbers:
     replay: Replay
 
     def doubles(self, value: Any) -> np.ndarray:
-        """A number of the scene, rounded once, (members,)."""
+        """A number of the scene for each member, rounded once, (members,)."""
         if isinstance(value, Traced):
             return self.replay.doubles(value.node)
         return np.full(len(self.members), float(value))
 
     def whole_numbers(self, value: Any) -> np.ndarray:
-        """A whole number of the model, (members,)."""
+        """A whole number of the model for each member, (members,)."""
         if isinstance(value, TracedWhole):
             return self.replay.whole_numbers(value.node)
         return np.full(len(self.members), int(value))
@@ -149,12 +151,12 @@ class Numbers:
 
 @dataclass
 class Sorted:
-    """Members put into families.
+    """Members sorted into families.
 
     Attributes:
         groups: each family with its members' numbers.
         alone: members that run by themselves, with the reason.
-        refused: members that no run accepts, with what a run of each alone says.
+        refused: members that no run accepts, with the error of a single run.
     """
 
     groups: list[tuple[Family, Numbers]] = field(default_factory=list)
@@ -163,11 +165,11 @@ class Sorted:
 
 
 class Families:
-    """Puts members into families, which are traced where they are first met.
+    """Sorts members into families, each traced when its first member is met.
 
     Args:
-        members: all of the sweep.
-        most_refused: members that no run accepts, after which the rest is left unsorted; all by default.
+        members: all members of the sweep.
+        most_refused: number of refused members after which the rest stays unsorted; no limit by default.
     """
 
     def __init__(self, members: Members, most_refused: int | None = None) -> None:
@@ -179,10 +181,10 @@ class Families:
         self._failures = 0
 
     def sort(self, which: Sequence[int] | np.ndarray | None = None) -> Sorted:
-        """Put members into families.
+        """Sort members into families.
 
         Args:
-            which: of the sweep's members; all by default.
+            which: indices of the members; all by default.
         """
         result = Sorted()
         chosen = np.arange(self._members.count) if which is None else np.asarray(which, dtype=np.int64)
@@ -220,10 +222,10 @@ class Families:
 
     @cached_property
     def _drive(self) -> Drive | None:
-        """As the base experiment's build estimates it.
+        """The load estimate as the base experiment's build makes it.
 
         Raises:
-            Untraceable: it can't be built.
+            Untraceable: the base experiment can't be built.
         """
         try:
             return prepare(self._members.base).system.scaling.drive
@@ -245,7 +247,7 @@ class Families:
         return _reason_of_system(traced) or Family(traced, self._members.kind(member))
 
     def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
-        """Put the members of a family into the result; those that are left."""
+        """Put the waiting members of a family into the result; returns those that are left."""
         candidates = waiting
         if self._members.kinds is not None:
             candidates = waiting[self._members.kinds[waiting] == family.kind]

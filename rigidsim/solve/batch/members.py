@@ -1,4 +1,4 @@
-"""The members of a sweep as the batch engine sees them: arrays of which value of each axis they have."""
+"""Members of a sweep as the batch engine sees them: arrays that tell which value of each axis they have."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigidsim.solve.batch.tracing import TRACED_TABLES
 
 
 class AxisNumbers:
-    """The values of a sweep's axes, each worked out once, however many members have it."""
+    """Values of a sweep's axes, each worked out once, however many members share it."""
 
     def __init__(self, sweep: Sweep) -> None:
         self._sweep = sweep
@@ -24,15 +24,15 @@ class AxisNumbers:
         self._words: dict[int, dict[str, int]] = {}
 
     def traced(self, place: int) -> bool:
-        """Whether an axis has numbers that may become parameters."""
+        """Whether an axis has numbers that can become parameters."""
         axis = self._sweep.axes[place]
         return axis.numeric and key_steps(axis.key, "axes")[0] in TRACED_TABLES
 
     def columns(self, place: int, which: np.ndarray) -> list[Swept]:
-        """The numbers of an axis that members have, one for each of its columns.
+        """The numbers of an axis that members have, one column for each key.
 
         Args:
-            which: of its values each member has, (members,).
+            which: index of the axis value that each member has, (members,).
         """
         axis = self._sweep.axes[place]
         if place not in self._whole and axis.values.count <= len(which):
@@ -48,7 +48,7 @@ class AxisNumbers:
         return [Distinct([entry[i] for entry in entries]) for i in range(len(axis.columns))]
 
     def codes(self, place: int, which: np.ndarray) -> np.ndarray:
-        """The same number for members whose value of an axis reads the same, below the axis's length."""
+        """Codes below the axis's length, equal for members whose axis values have the same text."""
         text = self._sweep.axes[place].values.text
         known = self._words.setdefault(place, {})
         needed, index = np.unique(which, return_inverse=True)
@@ -58,15 +58,15 @@ class AxisNumbers:
 
 @dataclass(frozen=True)
 class Members:
-    """The members of a sweep, as the batch engine sees them.
+    """Members of a sweep as the batch engine sees them.
 
     Attributes:
-        base: the experiment that they are variations of.
+        base: the experiment that they vary.
         keys: dotted keys of the numbers that become parameters, such as ``initial.angular_velocity[2]``.
         numbers: for each key the members' exact numbers, SI.
-        experiment: from a member to its own experiment.
-        kinds: a number for what else differs between members, such as a formulation or a time, (members,):
-            members of different kinds are of different families; None where nothing does.
+        experiment: function from a member to its own experiment.
+        kinds: code of everything else that differs, such as a formulation or a time, (members,):
+            members of different kinds belong to different families; None if nothing else differs.
     """
 
     base: Experiment
@@ -80,10 +80,10 @@ class Members:
     def of(
         cls, sweep: Sweep, members: Sequence[int] | None = None, axes: AxisNumbers | None = None
     ) -> Members:
-        """Members of a ``[sweep]``, all by default; they are counted from 0 here, in the order given.
+        """Members of a ``[sweep]``, all by default, renumbered from 0 in the order given.
 
         Args:
-            axes: of the sweep, as far as they are worked out already.
+            axes: the sweep's axes, as far as they are worked out already.
         """
         chosen = np.arange(sweep.count) if members is None else np.asarray(members, dtype=np.int64)
         axes = AxisNumbers(sweep) if axes is None else axes
@@ -105,5 +105,5 @@ class Members:
         return cls(sweep.base, keys, numbers, experiment, len(chosen), kinds)
 
     def kind(self, member: int) -> Any:
-        """What a member's family has to share beside its equations."""
+        """What a member's family must share besides its equations."""
         return None if self.kinds is None else int(self.kinds[member])

@@ -1,6 +1,6 @@
-"""Members' motions, and beside them their tangent vectors, which move no bit of them.
+"""Members' motions and their tangent vectors, which change no bit of the motions.
 
-The motion's numbers are always those of an integrator without tangent vectors. Compiled along with them its
+The motion's numbers are always those of an integrator without tangent vectors. Compiled with them, its
 equations may be rounded otherwise; where a system is small they aren't, and one integrator does for both:
 some lanes of each block are taken by both, and where these differ in any bit, or a vector has grown so far
 that steps would know of it, the motion is taken from the integrator without.
@@ -20,16 +20,16 @@ from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
 
 UNFELT = float(np.exp(LARGEST - SMALL * np.log(2.0)))
-"""Of a vector's components, up to which no step knows of it."""
+"""Largest component of a tangent vector that no step control notices."""
 
 
 class BatchMotion:
-    """The integrators of a traced system.
+    """Integrators of a traced system.
 
     Args:
-        crossings: its events.
+        crossings: the system's events.
         width: lanes of the integrators.
-        unfelt: largest component of tangent vectors of which one integrator serves both.
+        unfelt: largest component of tangent vectors up to which one integrator serves both.
     """
 
     def __init__(
@@ -108,10 +108,10 @@ class BatchMotion:
 
 
 def _same_bits(some: LaneResults, whole: LaneResults, which: np.ndarray) -> bool:
-    """Whether members fared the same in both.
+    """Whether members came out the same in both results.
 
     Args:
-        which: of the whole, in the order of the others.
+        which: their places in the whole, in the order of ``some``.
     """
     there = np.ascontiguousarray(whole.states[:, :, which])
     return np.ascontiguousarray(some.states).tobytes() == there.tobytes() and bool(

@@ -1,4 +1,4 @@
-"""What carries the neighbours of a family's members, and tells how far apart they are."""
+"""Lanes that carry the neighbours of a family's members, and distances between them."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ _GROUPS = {
     "velocity": ("vx", "vy", "vz"),
 }
 _APART = ("pace", "work", "stride")
-"""States that nothing feels."""
+"""States that nothing depends on."""
 
 
 class NeighbourLanes:
-    """Of the motion alone: what its tangent vectors and events are doesn't matter.
+    """Integrators and functions for the motion alone, without its tangent vectors and events.
 
     Args:
         width: lanes of the integrators.
-        tolerance: of their steps; None for epsilon.
+        tolerance: tolerance of their steps; None for epsilon.
 
     Attributes:
-        places: of the states that a quantity has ("rates", "attitude", "position", "velocity").
-        felt: which states anything depends on, (states,).
-        groups: (groups, states), states that are measured together by 1.
-        carried: whether there is an attitude.
+        places: indices of the states of each quantity ("rates", "attitude", "position", "velocity").
+        felt: mask of the states that anything depends on, (states,).
+        groups: (groups, states), 1 for states that are measured together.
+        carried: whether an attitude is carried.
     """
 
     def __init__(self, traced: TracedSystem, width: int, tolerance: float | None) -> None:
@@ -76,7 +76,9 @@ class NeighbourLanes:
         return self._function(self._attitude.quaternion)
 
     def _function(self, expressions: Sequence[Any]) -> Callable[..., np.ndarray]:
-        """Of states (states, n), the traced system's parameters (parameters, n) and times (n,)."""
+        """Compiled function of states (states, n), the traced system's parameters (parameters, n) and times
+        (n,).
+        """
         variables = [*self._traced.system.variables[: self._moving], *self._traced.parameters.variables]
         compiled: Any = compiled_function(expressions, variables, compact_mode=True, fp_type=float)
 
@@ -100,7 +102,7 @@ class NeighbourLanes:
         return self._slopes(states, parameters, times)
 
     def angles(self, states: np.ndarray, apart: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Between the attitudes of states (states, n) and of those apart from them by little, rad, (n,).
+        """Angles (n,), rad, between the attitudes of states (states, n) and of nearby states.
 
         A quaternion's chord is half the angle; nine direction cosines differ by its sqrt(2)-fold; a planar
         motion has the angle itself.
@@ -112,7 +114,7 @@ class NeighbourLanes:
         if attitude.orbital is None and attitude.kind in factors:
             chords = np.sqrt((apart[self.places["attitude"]] ** 2).sum(axis=0))
             return np.asarray(factors[attitude.kind] * chords)
-        # at one time for all: a frame that turns with time doesn't change how far they are apart
+        # all at one time: a frame that turns with time doesn't change their distances
         nothing = np.zeros(states.shape[1])
         here, there = (self._quaternion(x, parameters, nothing) for x in (states, states + apart))
         return np.asarray(2.0 * np.sqrt(((there - here) ** 2).sum(axis=0)))
@@ -120,7 +122,7 @@ class NeighbourLanes:
     # --- what they do ---------------------------------------------------------------------------------------
 
     def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Bounds of steps of motions (n,), from their starts."""
+        """Bounds of the steps of motions from their starts, (n,)."""
         return self._lanes.longest(initial, parameters[self._traced.in_equations], start)
 
     def onward(
@@ -132,11 +134,11 @@ class NeighbourLanes:
         longest: np.ndarray,
         most: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """States (states, n) and times (n,) of lanes, so many steps later or at their ends.
+        """States (states, n) and times (n,) of lanes after so many steps, or at their ends.
 
         Args:
             longest: bounds of steps, (n,).
-            most: steps of each, (n,).
+            most: largest number of steps of each, (n,).
         """
         found, times = np.empty_like(states), np.empty_like(begin)
         read = parameters[self._traced.in_equations]
@@ -154,18 +156,18 @@ class NeighbourLanes:
                 some = alike[first : first + self._width]
                 group(some, steps)
                 if len(some) > 1 and not np.isfinite(found[:, some]).all():
-                    for lane in some.tolist():  # heyoka stops all lanes with one whose state is lost
+                    for lane in some.tolist():  # heyoka stops all lanes if the state of one is lost
                         group(np.array([lane]), steps)
         return found, times
 
     def again(
         self, initial: np.ndarray, parameters: np.ndarray, begin: np.ndarray, times: np.ndarray, most: int
     ) -> np.ndarray:
-        """States (samples, states, n) of motions at their samples, nan from where one ended.
+        """States (samples, states, n) of motions at their samples, nan from where a motion ended.
 
         Args:
             initial: (states, n); begin: (n,), times: (samples, n), internal units.
-            most: steps of each.
+            most: largest number of steps of each.
         """
         read = parameters[self._traced.in_equations]
         return self._lanes.run(initial, read, begin, times, most).states

@@ -1,9 +1,9 @@
-"""Neighbours of the motions of many members, pushed at random as rounding does.
+"""Neighbours of many members' motions, pushed at random as rounding does.
 
 The simulation of ``rigidsim.solve.neighbours.pushed``, for members side by side: each is followed at a loose
 tolerance by four lanes, itself and three neighbours. Between pushes lies a stretch of so many steps, after
-which lanes stand at slightly different times; how far they are apart is brought to one time by the equations.
-Draws are the same for every member, so that what is found of one depends on nobody beside it.
+which lanes stand at slightly different times; their distances are brought to one time by the equations.
+The random draws are the same for every member, so that results don't depend on the company.
 """
 
 from __future__ import annotations
@@ -18,19 +18,21 @@ from rigidsim.solve.neighbours.pushed import Pushes
 
 _STRETCHES, _SHORTEST = 12, 4
 """Of a run, about, and steps of one at least. Half of a stretch's pushes come before it and half after, so
-that few stretches do for errors that grow as time makes them; where they grow faster these become shorter."""
+that few stretches do for errors that grow as time makes them; where they grow faster these become shorter.
+"""
 _FIRST = 2.0**-40
-"""Distance that stands for one epsilon, at first."""
+"""Initial distance that stands for one epsilon."""
 _LARGEST, _DRAWN_IN, _SATURATED, _NEARER = 2.0**-24, 2.0**-26, 2.0**-14, 2.0**-8
 """Distance from which neighbours are drawn in, and to where; one that isn't small any more, so that the
-stretch is gone through once more; and by how much nearer where it can't be shorter."""
+stretch is gone through once more; and by how much nearer where it can't be shorter.
+"""
 _CALM, _WILD = 8.0, 64.0
-"""Growth over a stretch below which stretches may be longer, and above which they are to be shorter."""
-_EARLY = 0.25  # of the time
+"""Growth over a stretch below which stretches may become longer, and above which they become shorter."""
+_EARLY = 0.25  # fraction of the time
 _EPSILON = float(np.finfo(float).eps)
 _MOST_ROUNDS = 20_000
 _HOPELESS_STEPS = 32_768
-"""More than were expected: the motion comes to no end."""
+"""Steps beyond the expected number after which a motion is given up."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,10 @@ class Starts:
     """Members to be followed.
 
     Attributes:
-        initial: of the motion, (states, members); parameters: of the traced system, (parameters, members).
-        begin, end: internal units of each, (members,).
-        steps: that each took, (members,).
-        rate_units: what brings the body rates to a common unit, (3, members).
+        initial, parameters: initial states (states, members), and the traced system's (parameters, members).
+        begin, end: times in each member's internal units, (members,).
+        steps: steps that each took, (members,).
+        rate_units: factors that bring the body rates to a common unit, (3, members).
     """
 
     initial: np.ndarray
@@ -52,20 +54,20 @@ class Starts:
     rate_units: np.ndarray
 
     def of(self, which: np.ndarray) -> Starts:
-        """Some of them."""
+        """The starts of some members."""
         return Starts(*(getattr(self, field.name)[..., which] for field in fields(self)))
 
 
 @dataclass(frozen=True)
 class Spreads:
-    """How far errors of one epsilon at each step came at most, (members,).
+    """Largest effect of errors of one epsilon per step, (members,).
 
     Attributes:
         rates, attitude, position, velocity: root mean square over the neighbours, in epsilons of internal
-            units; attitude as an angle, rates relative to their size; zeros where the motion has none.
+            units; attitude as an angle, rates relative to their size; zeros if the motion has none.
         extent, fastest: largest distance from the origin and speed, internal units.
-        early: of the leading one (see ``leading``) after a quarter of the time.
-        whole: False where the motion could not be followed to its end.
+        early: the leading spread (see ``leading``) after a quarter of the time.
+        whole: False if the motion could not be followed to its end.
     """
 
     rates: np.ndarray
@@ -79,12 +81,12 @@ class Spreads:
 
     @classmethod
     def none(cls, members: int) -> Spreads:
-        """Before anything was seen."""
+        """Spreads before anything was followed."""
         a, b, c, d, e, f, g = np.zeros((7, members))
         return cls(a, b, c, d, e, f, g, np.ones(members, dtype=bool))
 
     def put(self, places: np.ndarray, others: Spreads) -> None:
-        """What was found of some, in place of what was known of them."""
+        """Replace the spreads of some members."""
         for field in fields(self):
             getattr(self, field.name)[places] = getattr(others, field.name)
 
@@ -93,7 +95,7 @@ def follow(lanes: NeighbourLanes, starts: Starts, pushes: Pushes, lost: float) -
     """Follow members to their ends.
 
     Args:
-        lost: spread of the attitude (or the rates) past which nothing more is to be learnt.
+        lost: spread of the attitude (or the rates) past which nothing more can be learnt.
     """
     following = _Following(lanes, starts, pushes, lost)
     for number in range(_MOST_ROUNDS):
@@ -107,10 +109,10 @@ def follow(lanes: NeighbourLanes, starts: Starts, pushes: Pushes, lost: float) -
 
 
 class _Following:
-    """Members on their way.
+    """Members being followed.
 
     Attributes:
-        going: which are, (members,).
+        going: mask of members still being followed, (members,).
     """
 
     def __init__(self, lanes: NeighbourLanes, starts: Starts, pushes: Pushes, lost: float) -> None:
@@ -132,13 +134,13 @@ class _Following:
         self.going = starts.end > starts.begin
         normal = np.random.default_rng(_MOST_ROUNDS).standard_normal((states, 1, NEIGHBOURS))
         slopes = lanes.slopes(self._state, starts.parameters, self._time)
-        self._sizes[slopes == 0] = 0.0  # what stands still isn't rounded
+        self._sizes[slopes == 0] = 0.0  # constant states aren't rounded
         everybody = np.arange(members)
         self._add(everybody, pushes.first * np.abs(starts.initial)[:, :, None] * normal)
         self._note(everybody)
 
     def go(self, going: np.ndarray, random: np.random.Generator) -> None:
-        """One stretch of some of them."""
+        """Follow some members through one stretch."""
         states, starts = len(self._state), self._starts
         before, clock, after = (random.standard_normal((states, 1, NEIGHBOURS)) for _ in range(3))
         stride = self._stride[going]
@@ -190,7 +192,7 @@ class _Following:
     # --- parts of a stretch ---------------------------------------------------------------------------------
 
     def _again(self, going: np.ndarray, saturated: np.ndarray, kept: np.ndarray) -> None:
-        """Stretches that are to be gone through once more: shorter, or from nearer."""
+        """Set up stretches that have to be repeated: shorter, or from nearer."""
         which = going[saturated]
         self._apart[:, which] = kept[:, saturated]
         short = self._stride[which] <= _SHORTEST
@@ -226,7 +228,7 @@ class _Following:
         self.going[which] = (time < self._starts.end[which]) & ~tired
 
     def _push(self, which: np.ndarray, steps: np.ndarray, normal: np.ndarray) -> None:
-        """Errors of so many steps (members,)."""
+        """Add errors of so many steps (members,)."""
         sizes = self._pushes.own * np.sqrt(steps)[:, None] * self._sizes[:, which, None]
         self._add(which, sizes * normal)
 
@@ -235,15 +237,15 @@ class _Following:
         self._apart[:, which] += self._factor[which][:, None] * felt
 
     def _draw_in(self, which: np.ndarray) -> None:
-        """Neighbours that have become too far, in the same directions."""
+        """Move neighbours that are too far nearer, in the same directions."""
         far = self._distances(which, self._apart[:, which])
         nearer = np.where(far > _LARGEST, _DRAWN_IN / np.maximum(far, _LARGEST), 1.0)
         self._apart[:, which] *= nearer[:, None]
         self._factor[which] *= nearer
 
     def _distances(self, which: np.ndarray, apart: np.ndarray) -> np.ndarray:
-        """Of the farthest neighbour, relative to the size of what is apart, (members,); states that never
-        moved are none to be near to.
+        """Distance of the farthest neighbour, relative to the size of the respective states, (members,);
+        states that never moved don't count.
         """
         groups = self._lanes.groups
         squares = np.einsum("gs,smn->gmn", groups, apart * apart)
@@ -275,12 +277,12 @@ def note(
     apart: np.ndarray,
     starts: Starts,
 ) -> None:
-    """Take down how far some members are from others, where that is more than before.
+    """Record the distances of some members' neighbours if they are larger than before.
 
     Args:
-        which: of those that spreads are of.
+        which: places of the members in the spreads.
         state: (states, n); apart: (states, n, others).
-        starts: of the same n.
+        starts: starts of the same n.
     """
     places, wrong = lanes.places, np.sqrt((apart**2).mean(axis=2))
 

@@ -1,4 +1,4 @@
-"""What is recorded of members' states: for many of them at once, by functions that are compiled once."""
+"""Evaluation of what is recorded for many members at once, by functions compiled once."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ Values = dict[str, np.ndarray]
 class BatchOutputs:
     """Recorded variables and drifts of a traced system.
 
-    How a tangent vector grew has a function of its own, of states that the motion is without: beside it,
-    code of the others would be compiled in another way.
+    The growth of tangent vectors has a function of its own, of states that the motion alone lacks; together
+    with it
+    the code of the others would be compiled differently.
     """
 
     def __init__(self, traced: TracedSystem) -> None:
@@ -33,7 +34,9 @@ class BatchOutputs:
         self._growth = {r.first for r in self._system.recorded if r.name == GROWTH}
 
     def _compiled(self, expressions: list[Any], states: int) -> tuple[Any, list[int]]:
-        """A function of states, and which of these, and of the parameters after them, it takes."""
+        """A compiled function of states, and the indices of the states, and of the parameters after them,
+        that it takes.
+        """
         variables = [*self._system.variables[:states], *self._traced.parameters.variables]
         names = set(hy.get_variables([hy.expression(x) for x in expressions]))
         read = [n for n, variable in enumerate(variables) if str(variable) in names] or [0]
@@ -43,7 +46,9 @@ class BatchOutputs:
 
     @cached_property
     def _parts(self) -> tuple[list[int], list[Any], list[Any]]:
-        """Which of the outputs are of the motion, these, and the growth."""
+        """Indices of the outputs that depend on the motion alone, their expressions, and that of the
+        growth.
+        """
         outputs = list(enumerate(self._system.outputs))
         of_motion = [(row, x) for row, x in outputs if row not in self._growth]
         growth = [x for row, x in outputs if row in self._growth]
@@ -53,7 +58,7 @@ class BatchOutputs:
         """Initial values of the invariants' components, (components, m).
 
         Args:
-            initial: (states of the motion, m).
+            initial: initial states of the motion, (states, m).
         """
         components = [x for invariant in self._system.invariants for x in invariant.expressions]
         return self._evaluated(components, initial[None], swept, start[None])[:, 0]
@@ -69,8 +74,8 @@ class BatchOutputs:
         """All outputs, (outputs, samples, m).
 
         Args:
-            states: of the motion, (samples, states, m); times: (samples, m), internal units.
-            along: the same with tangent vectors; where there are none, their growth isn't known.
+            states, times: motion (samples, states, m) and times (samples, m), internal units.
+            along: the states with tangent vectors; without them their growth is unknown.
         """
         rows, of_motion, growth = self._parts
         found = self._evaluated(of_motion, states, swept, times, begun)
@@ -83,7 +88,7 @@ class BatchOutputs:
         return table
 
     def named(self, found: np.ndarray, numbers: Numbers, part: np.ndarray) -> tuple[Values, Values]:
-        """Outputs at samples as recorded variables (samples, m, components), SI; drifts by invariants."""
+        """Outputs at samples as recorded variables (samples, m, components), SI, and drifts by invariant."""
         values: Values = {}
         for variable in self._system.recorded:
             columns = [
@@ -99,10 +104,10 @@ class BatchOutputs:
         return values, drifts
 
     def named_at_events(self, found: np.ndarray, numbers: Numbers, members: np.ndarray) -> Values:
-        """Outputs at crossings, (outputs, 1, n), as recorded variables, (n, components), SI.
+        """Outputs at crossings, (outputs, 1, n), as recorded variables (n, components), SI.
 
         Args:
-            members: places of those that cross.
+            members: places of the members that cross.
         """
         return {
             variable.name: _at_events(variable, found, numbers, members) for variable in self._system.recorded
@@ -142,7 +147,7 @@ class BatchOutputs:
         padded = -(-columns // _GROUP) * _GROUP
 
         def spread(rows: Sequence[np.ndarray]) -> np.ndarray:
-            """Rows, each (samples, m) or (m,) for all samples alike, as (rows, padded)."""
+            """Rows, each (samples, m) or (m,) for all samples alike, as one array (rows, padded)."""
             table = np.empty((len(rows), padded))
             for line, row in zip(table, rows, strict=True):
                 line[:columns].reshape(samples, m)[:] = row

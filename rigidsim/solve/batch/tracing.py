@@ -1,4 +1,4 @@
-"""A system whose swept numbers are parameters: traced once, for all members that share its equations."""
+"""Tracing a system with its swept numbers as parameters, once for all members that share its equations."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
 TRACED_TABLES = ("body", "initial", "loads", "parameters")
-"""Of the config, whose numbers may become parameters."""
+"""Config tables whose numbers may become parameters."""
 _PARAMETER = "swept_"
 
 
 @dataclass
 class Parameters:
-    """The coefficients that depend on swept numbers, each a variable of the expressions that it stands in.
+    """Coefficients that depend on swept numbers, each a variable of the expressions that contain it.
 
     Attributes:
-        nodes: of the graph.
+        nodes: their nodes in the graph.
     """
 
     nodes: list[int] = field(default_factory=list)
     _names: dict[int, Any] = field(default_factory=dict)
 
     def number(self, value: Any) -> Any:
-        """A coefficient: a double, rounded once, or a parameter."""
+        """A coefficient as a double, rounded once, or as a parameter."""
         if isinstance(value, TracedWhole):
             raise Untraceable("a whole number as a coefficient")
         if not isinstance(value, Traced):
@@ -56,18 +56,18 @@ class Parameters:
 
     @property
     def variables(self) -> list[Any]:
-        """One for each node."""
+        """One variable for each node."""
         return list(self._names.values())
 
 
 @dataclass(frozen=True)
 class TracedSystem:
-    """What all members of a family share.
+    """The system that all members of a family share.
 
     Attributes:
-        prepared: the representative's own problem, in plain numbers.
+        prepared: the representative member's own problem, in plain numbers.
         system: the same, whose coefficients are expressions of ``parameters``.
-        graph: how numbers follow from the swept ones; its guards say who belongs here.
+        graph: how numbers follow from the swept ones; its guards decide which members belong here.
     """
 
     prepared: InitialValueProblem
@@ -77,19 +77,19 @@ class TracedSystem:
 
     @cached_property
     def moving(self) -> int:
-        """How many of the states are the motion's: those of a tangent vector come after them."""
+        """Number of states of the motion; those of a tangent vector follow."""
         return sum(not name.startswith(TANGENT) for name in self.system.states)
 
     @cached_property
     def in_equations(self) -> list[int]:
-        """Which of the parameters the motion's equations, and events, read."""
+        """Indices of the parameters that the motion's equations and events read."""
         expressions = [right for _, right in self.system.equations[: self.moving]]
         expressions += [crossing.expression for crossing in self.system.crossings]
         read = {name for x in expressions for name in hy.get_variables(hy.expression(x))}
         return [k for k, v in enumerate(self.parameters.variables) if str(v) in read]
 
     def as_parameters(self, expressions: Sequence[Any]) -> list[Any]:
-        """Expressions of ``hy.par``, numbered as ``in_equations``."""
+        """Expressions with the parameters as ``hy.par``, numbered as in ``in_equations``."""
         variables = self.parameters.variables
         table = {variables[k]: hy.par[n] for n, k in enumerate(self.in_equations)}
         found = [hy.expression(x) for x in expressions]
@@ -105,17 +105,17 @@ def trace(
     numbers: Sequence[ExactNumber],
     drive: Callable[[], Drive | None] = lambda: None,
 ) -> TracedSystem:
-    """Work out the system of a member, with its swept numbers as parameters.
+    """Build the system of a member with its swept numbers as parameters.
 
     Args:
         representative: the member.
-        keys: of its numbers that differ between members, such as ``initial.angular_velocity[2]``.
+        keys: keys of its numbers that differ between members, such as ``initial.angular_velocity[2]``.
         numbers: what it has there.
-        drive: what loads of unknown size are estimated to add, where there are any: a power of two in the
+        drive: estimated effect of loads of unknown size, if there are any: a power of two in the
             units, which has to be the same whoever is the representative.
 
     Raises:
-        ConfigError: it is refused: as a run of it alone would be.
+        ConfigError: the member is refused, as a single run of it would be.
         Untraceable: something in it can't be traced.
     """
     prepared = prepare(representative)

@@ -1,4 +1,4 @@
-"""Solutions in closed form, at a cost that doesn't depend on the time asked for."""
+"""Closed-form solutions, whose cost doesn't depend on the time requested."""
 
 from rigidsim.solve.closed_form.motion import NoClosedForm, WhyNot
 from rigidsim.solve.closed_form.solution import ClosedForm, closed_form_of, find_closed_form

@@ -11,14 +11,14 @@ from typing import Any, Protocol
 import numpy as np
 
 Pair = tuple[Any, Any]
-"""Real and imaginary part, or high and low part."""
+"""Real and imaginary part, or high and low part, of a number."""
 
 
 class Arithmetic(Protocol):
-    """What formulas need.
+    """Operations that the formulas need.
 
     Attributes:
-        bits: of the significand of results.
+        bits: bits of the results' significand.
     """
 
     bits: int
@@ -39,23 +39,25 @@ class Arithmetic(Protocol):
         """Square root."""
 
     def floor(self, x: Any) -> Any:
-        """Largest whole number that isn't above."""
+        """Largest whole number that doesn't exceed the argument."""
 
     def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
-        """c sinh(k z) exp(-abs(z)) from grown, shrunk = c exp(+-k abs(z) - abs(z)), next to zero as well."""
+        """c sinh(k z) exp(-abs(z)) from grown, shrunk = c exp(+-k abs(z) - abs(z)), accurate near zero
+        too.
+        """
 
     def elapsed(self, time: Any) -> Any:
         """A time as a plain number."""
 
     def reduced(self, time: Any, rate: Any, offset: Any) -> Pair:
-        """Nearest whole number to ``rate * time + offset`` (constants in mpf) and what is left of it."""
+        """Whole number nearest to ``rate * time + offset`` (constants in mpf), and the remainder."""
 
     def angle(self, time: Any, rate: Any, count: Any, step: Any, offset: Any) -> Any:
         """``rate * time + step * count + offset`` in radians, up to whole turns; constants in mpf, rad."""
 
 
 class Digits:
-    """mpmath in a context of its own; times are mpf."""
+    """Arithmetic in mpmath, in a context of its own; times are mpf."""
 
     def __init__(self, context: Any) -> None:
         self._context = context
@@ -68,7 +70,7 @@ class Digits:
         return self._context.mpf(value)
 
     def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
-        """From the exponentials, with as many guard bits as they cancel."""
+        """See ``Arithmetic``; from the exponentials, with as many guard bits as cancel."""
         context = self._context
         size = abs(k * z)
         if size >= 1 or size == 0:
@@ -91,7 +93,7 @@ class Digits:
 
 
 class Doubles:
-    """Arrays of float64; times are pairs hi + lo of arrays (Dekker 1971 for their products)."""
+    """Arithmetic in arrays of float64; times are pairs hi + lo of arrays (Dekker 1971 for their products)."""
 
     bits = 53
     exp, cos, sin, sqrt, floor = np.exp, np.cos, np.sin, np.sqrt, np.floor
@@ -101,7 +103,7 @@ class Doubles:
         return float(value)
 
     def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
-        """tanh is accurate next to zero."""
+        """See ``Arithmetic``; tanh is accurate near zero."""
         return np.tanh(k * z) * (grown + shrunk) / 2
 
     def elapsed(self, time: Pair) -> Any:
@@ -117,7 +119,7 @@ class Doubles:
         return count + more, (high - more) + low
 
     def angle(self, time: Pair, rate: Any, count: Any, step: Any, offset: Any) -> Any:
-        """See ``Arithmetic``; in turns until the last moment, where whole ones are dropped exactly."""
+        """See ``Arithmetic``; computed in turns until the end, so that whole ones are dropped exactly."""
         turn = 2 * rate.context.pi
         turns = sum_of(product_of(_pair(rate / turn), time), _pair(offset / turn))
         turns = sum_of(turns, product_of(_pair(step / turn), (count, np.zeros_like(count))))
@@ -147,7 +149,7 @@ def product_of(a: Pair, b: Pair) -> Pair:
 
 
 def _split(a: Any) -> Pair:
-    """Two halves of 26 bits."""
+    """Split into two halves of 26 bits."""
     big = 134217729.0 * a  # 2^27 + 1
     high = big - (big - a)
     return high, a - high

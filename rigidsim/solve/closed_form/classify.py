@@ -1,4 +1,4 @@
-"""Which closed form a scene has, in internal units, or why it has none."""
+"""Selection of a scene's closed form, in internal units, or the reason why it has none."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot
 
 
 def choose_motion(context: mpmath.MPContext, scene: Scene, scaling: Scaling) -> Motion:
-    """The rotation of a scene on which no load acts, or uniform gravity alone.
+    """Closed-form rotation of a scene without loads, or with uniform gravity alone.
 
     Args:
         context: mpmath context to work in, with at least twice the scene's digits.
         scaling: units of time and inertia that the motion is given in.
 
     Raises:
-        NoClosedForm: it is no motion of those known in closed form.
+        NoClosedForm: no closed form is known for the motion.
     """
 
     def wide(vector: Vector, exponent: int = 0) -> Vector:
@@ -31,7 +31,7 @@ def choose_motion(context: mpmath.MPContext, scene: Scene, scaling: Scaling) -> 
     moments = wide(body.principal_moments, -scaling.inertia)
     axes = [wide(axis) for axis in body.principal_axes]
     rates = wide(scene.angular_velocity, scaling.time)
-    # what is left of a zero after the scene's own rounding
+    # residue of a zero after the scene's own rounding
     tiny = context.mpf(negligible(scene.context))
     if scene.torque_arm is None:
         return free_motion(context, moments, axes, rates, tiny)
@@ -60,7 +60,7 @@ def choose_motion(context: mpmath.MPContext, scene: Scene, scaling: Scaling) -> 
 def _top_frame(
     context: mpmath.MPContext, moments: Vector, axes: Matrix, arm: Vector, tiny: mpmath.mpf
 ) -> tuple[Matrix, mpmath.mpf, mpmath.mpf] | None:
-    """Axes with the third along the arm, and the moments across and along it; None where the body isn't
+    """Axes with the third along the arm, and the moments across and along it; None if the body isn't
     symmetric about the arm.
     """
     length = norm(context, arm)

@@ -6,7 +6,7 @@ L3/L and the sum s of precession and spin obeys
 
     s' = (2 E + L w3) / (L + L3).
 
-Nothing in it vanishes or cancels, wherever the motion goes: abs(alpha) >= sqrt(1/2). The rates are Jacobi's
+No term vanishes or cancels anywhere along the motion: abs(alpha) >= sqrt(1/2). The rates are Jacobi's
 (Whittaker, Analytical Dynamics, section 69; Landau & Lifshitz, Mechanics, section 37), and the integral of
 the third kind in s is, up to a term linear in time, the phase of a theta function with twice the imaginary
 period, theta_4(v - i omega | q^2), whose zeros stay away from the line of motion (compare van Zon & Schofield
@@ -28,14 +28,14 @@ from rigidsim.solve.closed_form.theta_quotients import Argument, phase_slope, tu
 
 @dataclass(frozen=True)
 class SymmetricFree(Motion):
-    """Two equal moments (a sphere, a rod), or any body that turns about a principal axis.
+    """Free motion with two equal moments (a sphere, a rod), or of any body that turns about a principal axis.
 
     Attributes:
-        tilt_cosine, tilt_sine: of half the angle between axis 3 and L.
+        tilt_cosine, tilt_sine: cosine and sine of half the angle between axis 3 and L.
         transverse: rate across axis 3.
         axial: w3.
         sum_rate: s'.
-        spin_rate, spin: rate and start of the angle of the transverse rate: w2 + i w1 ~ exp(i angle).
+        spin_rate, spin: rate and initial value of the transverse rate's angle: w2 + i w1 ~ exp(i angle).
     """
 
     tilt_cosine: Any
@@ -66,12 +66,12 @@ class SymmetricFree(Motion):
 
 @dataclass(frozen=True)
 class AsymmetricFree(Motion):
-    """Three different moments: w = (W1 cn, W2 sn, W3 dn)(u), L circling axis 3.
+    """Free motion with three different moments: w = (W1 cn, W2 sn, W3 dn)(u), L circling axis 3.
 
     Attributes:
-        argument: u.
+        argument: the argument u.
         amplitudes: W1, W2, W3.
-        leans: amplitudes of L1 / 2L and L2 / 2L, and of L3 / L.
+        leans: amplitudes of L1 / 2L, L2 / 2L and L3 / L.
         functions: cn, sn, dn.
         phase: theta function whose phase is that of alpha; it has a variable of its own.
         rate, step: mean rate of s/2 and its change per half period, as in ``Strand``.
@@ -93,18 +93,21 @@ class AsymmetricFree(Motion):
 
     @property
     def lattice(self) -> Lattice:
-        """Of the elliptic functions."""
+        """Lattice of the elliptic functions."""
         return self.argument.lattice
 
     @property
     def period(self) -> Any:
-        """Of the body rates: 4 K / p; infinite on the separatrix."""
+        """Period of the body rates, 4 K / p; infinite on the separatrix."""
         return 4 * self.lattice.quarter / self.argument.speed
 
     @property
     def precession(self) -> Any:
-        """Mean rate of axis 3 about L. Precession and spin add up to s, and the spin of L about axis 3
-        makes one turn a period: backwards where I3 is the largest.
+        """Mean rate of axis 3 about L.
+
+        Precession and spin add up to s, and the spin of L about axis 3 makes one turn per period: backwards
+        where I3 is
+        the largest.
         """
         sense = 1 if self.moments[2] > self.moments[0] else -1
         return 2 * self.rate + (2 * self.step + sense * self.lattice.context.pi) * self.argument.turn_rate
@@ -139,9 +142,9 @@ def free_motion(context: Any, moments: Vector, axes: Matrix, rates: Vector, tiny
     """The free motion of a body.
 
     Args:
-        context: mpmath context to work in, with at least twice the digits that are wanted.
+        context: mpmath context to work in, with at least twice the digits wanted.
         moments: principal moments; one may be zero (a rod's), whose axis then keeps its rate.
-        axes: the matching unit axes, body axes.
+        axes: the principal unit axes, in body axes.
         rates: initial angular velocity, body axes.
         tiny: relative size below which a difference of moments, or a component of L, is rounding.
 
@@ -200,7 +203,7 @@ def _asymmetric(context: Any, moments: Vector, axes: Matrix, rates: Vector, tiny
     low, middle, high = (moments[i] for i in order)
     # L^2 - 2 E I2, without the term that cancels: positive where L circles the axis of the largest moment
     beyond, other = squares[2] * (1 - middle / high), squares[0] * (middle / low - 1)
-    # the separatrix itself, where nothing but the rounding of the scene's numbers is left
+    # on the separatrix itself, up to the rounding of the scene's numbers
     beyond = beyond - other if abs(beyond - other) > tiny * beyond else context.zero
     if beyond < 0:
         order.reverse()

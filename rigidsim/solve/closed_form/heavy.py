@@ -28,7 +28,7 @@ class HeavyTop(Motion):
     """A top that nutates, precesses regularly, swings as a pendulum, or any mixture.
 
     Attributes:
-        argument: u of the elliptic functions; half a period 2K is one nutation.
+        argument: argument of the elliptic functions; half a period 2K is one nutation.
         roots: u1 <= u2 <= 1 <= u3 of the cubic.
         alpha, beta: spinor of the attitude (axis 3 along the top's axis, space Z against gravity).
         across: w1 + i w2.
@@ -51,7 +51,7 @@ class HeavyTop(Motion):
 
     @property
     def precession(self) -> Any:
-        """Mean rate of the azimuth phi (through the vertical it jumps by half a turn, either way)."""
+        """Mean rate of the azimuth phi (which jumps by half a turn, either way, through the vertical)."""
         a, b = self.alpha, self.beta
         if not self.argument.lattice.periodic:
             return a.rate + b.rate
@@ -67,7 +67,7 @@ class HeavyTop(Motion):
 
 @dataclass(frozen=True)
 class _Cubic:
-    """What the three strands share."""
+    """Quantities shared by the three strands."""
 
     argument: Argument
     a: Any
@@ -91,7 +91,7 @@ def heavy_motion(
     """The motion of a heavy symmetric top that isn't at rest on the vertical.
 
     Args:
-        context: mpmath context to work in, with twice the digits that are wanted (double roots take half).
+        context: mpmath context to work in, with twice the digits wanted (double roots lose half).
         axes: right-handed, body axes; the third from the fixed point to the centre of mass.
         moments: across and along the axis, about the fixed point; the second may be zero, and axis 3 then
             keeps its rate.
@@ -115,7 +115,7 @@ def heavy_motion(
     )
     one = context.one
     u1, u2, u3 = max(u1, -one), min(max(u2, -one), one), max(u3, one)
-    # the start lies on the motion: rounding must not put it outside
+    # the start is on the motion: rounding must not put it outside
     u1, u2 = min(u1, u), max(u2, u)
     grid = lattice(context, (u2 - u1) / (u3 - u1), (u3 - u2) / (u3 - u1))
     speed = context.sqrt(pull * (u3 - u1) / (2 * a))
@@ -125,7 +125,7 @@ def heavy_motion(
     if g1 * w2 - g2 * w1 < 0:
         start = -start
     cubic = _Cubic(Argument(grid, speed, start), a, u1, u2, u3)
-    excess = (w3 - axial / a) / 2  # of the spin over that of a sphere
+    excess = (w3 - axial / a) / 2  # excess of the spin over that of a sphere
     alpha = _rising(cubic, excess, upright + axial)
     beta = _falling(cubic, one, one / 2, -excess, upright - axial)
     turning = -2 * excess - axial / (2 * a)
@@ -145,7 +145,7 @@ def _roots(context: Any, b: Any, c: Any, d: Any) -> list[Any]:
 
 
 def _strand(cubic: _Cubic, above: Theta, step: Any, match: tuple[Any, Any], *, at_top: bool) -> Strand:
-    """With modulus and rate of phase matched where u = u1, or u = u2 (``at_top``)."""
+    """A strand with modulus and rate of phase matched where u = u1, or u = u2 (``at_top``)."""
     modulus, phase_rate = match
     grid = cubic.lattice
     context = grid.context
@@ -165,12 +165,12 @@ def _line(
     near: tuple[Any, Any, Any],
     far: tuple[Any, Any, Any],
 ) -> tuple[Theta, Any]:
-    """The numerator and its step per half period, from where it vanishes.
+    """The numerator and its phase step per half period, from where it vanishes.
 
     Args:
-        kinds: of the theta function with its zero next to the line, next to the other edge of the strip, and
+        kinds: kinds of theta function with a zero next to the line, next to the other edge of the strip, and
             in the complementary nome.
-        sign: of the imaginary part of the zero.
+        sign: sign of the zero's imaginary part.
         near, far: sin^2, cos^2 and delta^2 of the amplitude of the zero's distance from the line, and of its
             distance from the edge i K'; the first is needed unless u1 = u2, the second unless u2 = u3.
     """
@@ -187,7 +187,9 @@ def _line(
 
 
 def _rising(cubic: _Cubic, constant: Any, strength: Any) -> Strand:
-    """abs(f)^2 = (1 + u) / 2, arg(f)' = constant + strength / (2 A (1 + u)): the spinor's alpha."""
+    """Strand with abs(f)^2 = (1 + u) / 2, arg(f)' = constant + strength / (2 A (1 + u)): the spinor's
+    alpha.
+    """
     context, u1, u2, u3 = cubic.lattice.context, cubic.u1, cubic.u2, cubic.u3
     near = ((1 + u1) / (1 + u2), (u2 - u1) / (1 + u2), (u2 - u1) * (1 + u3) / ((u3 - u1) * (1 + u2)))
     far = ((u3 - u1) / (1 + u3), (1 + u1) / (1 + u3), (1 + u2) / (1 + u3))
@@ -197,11 +199,13 @@ def _rising(cubic: _Cubic, constant: Any, strength: Any) -> Strand:
 
 
 def _falling(cubic: _Cubic, zero: Any, weight: Any, constant: Any, strength: Any) -> Strand:
-    """abs(f)^2 = weight (zero - u), arg(f)' = constant + strength / (2 A (zero - u)), zero in [u2, u3]."""
+    """Strand with abs(f)^2 = weight (zero - u), arg(f)' = constant + strength / (2 A (zero - u)), zero in
+    [u2, u3].
+    """
     context, u1, u2, u3 = cubic.lattice.context, cubic.u1, cubic.u2, cubic.u3
     zero = min(max(zero, u2), u3)
     gap = u3 - u2
-    # on the separatrix zero = u2 = u3: the function decays alike for any place of its zero
+    # on the separatrix zero = u2 = u3: the function decays alike wherever its zero is
     rise, fall = ((zero - u2) / gap, (u3 - zero) / gap) if gap != 0 else (context.zero, context.one)
     near = (
         rise * (u3 - u1) / (zero - u1),
@@ -227,8 +231,8 @@ def _joined(context: Any, cubic: _Cubic, alpha: Strand, beta: Strand, across: St
 
 
 def _placed(context: Any, top: HeavyTop, rates: tuple[Any, Any], level: tuple[Any, Any]) -> HeavyTop:
-    """Turned about its own axis so that it starts with the given transverse rates, or the given direction of
-    the vertical, whichever is larger: one of them may vanish.
+    """The top turned about its own axis so that it starts with the given transverse rates, or the given
+    direction of the vertical, whichever is larger, as one may vanish.
     """
     rest = top.argument.start * top.argument.turn_rate / top.argument.speed
     a, b, w = (

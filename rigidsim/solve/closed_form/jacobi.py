@@ -12,7 +12,7 @@ from rigidsim.solve.closed_form.theta_quotients import Quotient
 
 @dataclass(frozen=True)
 class Jacobi:
-    """The three functions of a lattice.
+    """Jacobi's three functions on a lattice.
 
     Attributes:
         cn, sn, dn: within half a period 2K; cn and dn are the real part of theirs, sn the imaginary one.
@@ -23,7 +23,7 @@ class Jacobi:
     dn: Quotient
 
     def at(self, arithmetic: Arithmetic, count: Any, rest: Any) -> tuple[Any, Any, Any]:
-        """cn, sn and dn where ``count`` half periods are over (see ``Argument.reduced``)."""
+        """cn, sn and dn after ``count`` half periods (see ``Argument.reduced``)."""
         z = arithmetic.number(self.cn.above.per_turn) * rest
         cn, sn, dn = (f.at(arithmetic, z) for f in (self.cn, self.sn, self.dn))
         sign = 1 - 2 * (count - 2 * arithmetic.floor(count / 2))  # each half period reverses cn and sn
@@ -31,7 +31,7 @@ class Jacobi:
 
 
 def jacobi(lattice: Lattice) -> Jacobi:
-    """Normalised by cn = dn = d sn/du = 1 at u = 0."""
+    """Jacobi's functions, normalised by cn = dn = d sn/du = 1 at u = 0."""
     zero = lattice.context.zero
     kinds, below = ((2, 1, 3), 4) if lattice.circular else ((4, 1, 3), 2)
     denominator = theta(lattice, below, zero)

@@ -1,4 +1,4 @@
-"""What every closed form of a rotation yields, and the frame that it is written in."""
+"""Interface of closed-form rotations, and the frame in which they are written."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class WhyNot(Enum):
 
 
 class NoClosedForm(ValueError):
-    """A scene has no closed form here; the message says why, as the rest of a sentence.
+    """Raised if a scene has no closed form here; the message says why, as the rest of a sentence.
 
     Attributes:
         why: the kind of reason.
@@ -36,8 +36,8 @@ class Motion:
     """A rotation in closed form, in the units of time and inertia of the numbers that it was made from.
 
     Attributes:
-        axes: rows are the axes of the frame that the motion is written in (right-handed, body axes).
-        title: what it is, for plans and summaries.
+        axes: rows are the axes of the frame in which the motion is written (right-handed, body axes).
+        title: name of the motion, for plans and summaries.
     """
 
     axes: Matrix
@@ -51,7 +51,7 @@ class Motion:
 
 
 def right_handed(axes: Matrix, flip: int = 1) -> Matrix:
-    """The axes, with number ``flip`` reversed where they are left-handed."""
+    """The axes, with number ``flip`` reversed if they are left-handed."""
     if dot(cross(axes[0], axes[1]), axes[2]) > 0:
         return axes
     return [[-x for x in axis] if i == flip else axis for i, axis in enumerate(axes)]

@@ -20,11 +20,11 @@ class ClosedFormSampler:
     """Evaluates a closed form at the samples (a ``Sampler``).
 
     Attributes:
-        progress: how far it is; it takes no steps.
+        progress: the run's progress, without steps.
 
     Args:
-        begin: the integration's start: the way to a sample leads over no other boundary.
-        start: where to go on; None begins.
+        begin: the integration's start, the only step boundary.
+        start: where to continue; None starts at the beginning.
     """
 
     def __init__(
@@ -50,11 +50,11 @@ class ClosedFormSampler:
         self.progress = Progress(clock.count, 0 if start is None else start.next_sample)
 
     def position(self) -> Position:
-        """The next sample is all that has to be known."""
+        """Position to resume from, which is just the next sample."""
         return Position(self._begin, self.progress.next_sample)
 
     def run(self) -> Progress:
-        """Go on until the last sample is recorded or something ends the run."""
+        """Continue until the last sample is recorded or something ends the run."""
         progress, clock = self.progress, self._clock
         started: float | None = None
         while progress.next_sample < clock.count:
@@ -71,7 +71,7 @@ class ClosedFormSampler:
             progress.integration_seconds += time.perf_counter() - started
             try:
                 self._receiver.take(SampleBlock.of(first, times, states, self._begin.angles))
-            except KeyboardInterrupt:  # while what counts turns was compiled
+            except KeyboardInterrupt:  # while the code that counts turns was being compiled
                 stop = self._check(progress)
                 if stop is None:
                     raise

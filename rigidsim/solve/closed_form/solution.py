@@ -1,4 +1,4 @@
-"""A scene's solution in closed form, and the states that it gives at any time.
+"""A scene's closed-form solution, and the states that it gives at any time.
 
 The cost of a state doesn't depend on its time, and nor does its accuracy: frequencies are known to three
 times the scene's digits and turns are counted exactly, so that a run is right to rounding at any horizon.
@@ -23,16 +23,16 @@ from rigidsim.solve.closed_form.classify import choose_motion
 from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot
 from rigidsim.solve.precision import Precision, Scalar
 
-_GUARD_BITS = 40  # of an evaluation beyond double, for its own rounding
+_GUARD_BITS = 40  # guard bits of an evaluation beyond double, for its own rounding
 
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """The solution of a scene, from its start on (or back).
+    """Closed-form solution of a scene, forwards or backwards from its start.
 
     Attributes:
-        motion: of the body about its reference point, internal units of time.
-        scaling: those units.
+        motion: rotation of the body about its reference point, internal units of time.
+        scaling: the internal units.
         before, after: quaternions from the motion's fixed frame to space, and from the body axes to the
             motion's own.
     """
@@ -45,17 +45,17 @@ class ClosedForm:
 
     @property
     def title(self) -> str:
-        """What it is, for plans and summaries."""
+        """Name of the solution, for plans and summaries."""
         return self.motion.title + ("; parabola of the centre of mass" if self.scene.free_flight else "")
 
     def states(self, system: System, precision: Precision, times: np.ndarray, start: Scalar) -> np.ndarray:
         """States of a system at given times.
 
         Args:
-            system: of this scene, in the formulation "quaternion" or "rates".
-            precision: of the run.
+            system: a system of this scene, in the formulation "quaternion" or "rates".
+            precision: the run's precision.
             times: (n,) in internal units, in the precision (``SampleClock.internal``).
-            start: when the motion begins, a scalar of the precision, internal units.
+            start: time at which the motion begins, a scalar of the precision, internal units.
 
         Returns:
             (n, states), internal units, in the precision. Double and single are evaluated in arrays of
@@ -84,7 +84,7 @@ class ClosedForm:
         """Angular velocity (n, 3), body axes, rad/s, and quaternion (n, 4), body to space, as doubles.
 
         Args:
-            seconds: (n,) after the start.
+            seconds: (n,), times after the start, s.
         """
         high = np.ldexp(np.asarray(seconds, dtype=np.float64), -self.scaling.time)
         rates, quaternion = self._turned(Doubles(), (high, np.zeros_like(high)))
@@ -94,8 +94,8 @@ class ClosedForm:
         """Angular velocity and quaternion at one time, in mpmath.
 
         Args:
-            seconds: after the start, mpf.
-            digits: to be right, relative to the largest rate.
+            seconds: time after the start, s (mpf).
+            digits: number of correct digits, relative to the largest rate.
         """
         elapsed = mpmath.ldexp(seconds, -self.scaling.time)
         arithmetic = Digits(self._context(math.ceil(digits * math.log2(10)), elapsed))
@@ -103,13 +103,15 @@ class ClosedForm:
         return [mpmath.ldexp(w, -self.scaling.time) for w in rates], quaternion
 
     def _context(self, bits: int, late: mpmath.mpf) -> mpmath.MPContext:
-        """A phase costs as many bits as it has; internal units make it about the time itself."""
+        """Context with enough bits: a phase costs as many as it has, and in internal units it is about the
+        time itself.
+        """
         context = mpmath.MPContext()
         context.prec = bits + _GUARD_BITS + max(0, math.ceil(mpmath.log(1 + abs(late), 2)))
         return context
 
     def _turned(self, arithmetic: Arithmetic, time: Any) -> tuple[Vector, Vector]:
-        """Rates in body axes, and body to space, from the motion's own frame."""
+        """Rates in body axes, and the quaternion from body axes to space, from the motion's own frame."""
         number = arithmetic.number
         own, relative = self.motion.at(arithmetic, time)
         columns = zip(*self.motion.axes, strict=True)
@@ -145,7 +147,7 @@ class ClosedForm:
         return [values[name] for name in system.states]
 
     def _flight(self, arithmetic: Arithmetic, time: Any) -> dict[str, Any]:
-        """Free fall in a uniform field, or straight on; units of length and speed."""
+        """Free fall in a uniform field, or straight motion; internal units of length and speed."""
         scene, scaling, number = self.scene, self.scaling, arithmetic.number
         assert scene.position is not None
         assert scene.velocity is not None
@@ -166,10 +168,10 @@ def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
     """The closed form of a scene.
 
     Args:
-        driven: whether loads act of which the scene knows nothing.
+        driven: whether loads unknown to the scene act.
 
     Raises:
-        NoClosedForm: it has none.
+        NoClosedForm: the scene has none.
     """
     if driven:
         raise NoClosedForm(WhyNot.PYTHON_LOAD, "a load given from Python has no closed form")
@@ -189,7 +191,7 @@ def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
 
 
 def find_closed_form(scene: Scene, *, driven: bool = False) -> ClosedForm | None:
-    """As ``closed_form_of``; None where there is none."""
+    """Like ``closed_form_of``, but None if there is none."""
     try:
         return closed_form_of(scene, driven=driven)
     except NoClosedForm:

@@ -39,12 +39,12 @@ class Lattice:
 
     @property
     def periodic(self) -> bool:
-        """False on the separatrix."""
+        """Whether the functions are periodic, which they aren't on the separatrix."""
         return bool(self.complement != 0)
 
     @property
     def nome(self) -> Any:
-        """q, or q' where the series are hyperbolic."""
+        """Nome q, or q' if the series are hyperbolic."""
         if self.circular:
             return self.context.exp(-self.context.pi * self.other / self.quarter)
         return self.context.exp(-self.context.pi * self.quarter / self.other)
@@ -96,11 +96,11 @@ class Theta:
     sizes: tuple[float, ...]
 
     def terms(self, bits: int) -> int:
-        """How many terms there are above 2^-bits."""
+        """Number of terms above 2^-bits."""
         return max(1, sum(size > -bits for size in self.sizes))
 
     def at(self, arithmetic: Arithmetic, z: Any) -> Pair:
-        """Value at z, times exp(-abs(z)) where hyperbolic."""
+        """Value at z, times exp(-abs(z)) if hyperbolic."""
         number, real, imaginary = arithmetic.number, None, None
         size = abs(z)
         for n in range(self.terms(arithmetic.bits + 8)):
@@ -134,11 +134,13 @@ class Theta:
 
 
 def theta(lattice: Lattice, kind: int, shift: Any, *, tau_factor: int = 1) -> Theta:
-    """theta_kind(v + i shift | q), or where the lattice's series are hyperbolic theta_kind(shift + i y | q').
+    """theta_kind(v + i shift
+    q), or if the lattice's series are hyperbolic, theta_kind(shift + i y
+    q').
 
     Args:
         shift: constant part of the argument, within half a period of the lattice.
-        tau_factor: 2 for the lattice with the same real period and twice the imaginary one (q^2, q'^(1/2)).
+        tau_factor: 2 for a lattice with the same real period and twice the imaginary one (q^2, q'^(1/2)).
     """
     context = lattice.context
     hyperbolic = not lattice.circular
@@ -176,7 +178,7 @@ def theta(lattice: Lattice, kind: int, shift: Any, *, tau_factor: int = 1) -> Th
 
 
 def _weights(context: Any, kind: int, k: int, shift: Any, *, hyperbolic: bool) -> tuple[Any, Any]:
-    """Of C(k z) in the real part and S(k z) in the imaginary one."""
+    """Weights of C(k z) in the real part and of S(k z) in the imaginary part."""
     if hyperbolic:  # sine or cosine of k (shift + i y)
         if kind == 1:
             return context.sin(k * shift), context.cos(k * shift)

@@ -1,8 +1,8 @@
 """Strands: functions ``C exp(i rate t) theta_j(z + shift) / theta(z)``, of which motions are woven.
 
 The components of the attitude's spinor and the transverse rate of a heavy top are such functions (Whittaker,
-Analytical Dynamics, section 71), entire in the numerator: passing through a pole of the Euler angles is
-nothing special to them. Per half period 2K of the elliptic functions the phase makes one step.
+Analytical Dynamics, section 71), entire in the numerator: a passage through a pole of the Euler angles is
+not special for them. Per half period 2K of the elliptic functions the phase makes one step.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Argument:
 
     Attributes:
         speed: per unit of time.
-        start: at t = 0, with abs(start) at most 2K.
+        start: value at t = 0, with abs(start) at most 2K.
     """
 
     lattice: Lattice
@@ -34,7 +34,7 @@ class Argument:
         return self.speed / (2 * self.lattice.quarter) if self.lattice.periodic else self.speed
 
     def reduced(self, arithmetic: Arithmetic, time: Any) -> Pair:
-        """How many half periods 2K are over, and the rest in units of 2K, within +-1/2 (on the separatrix
+        """Number of half periods 2K elapsed, and the rest in units of 2K, within +-1/2 (on the separatrix
         zero, and u itself).
         """
         if self.lattice.periodic:
@@ -46,7 +46,9 @@ class Argument:
 
 @dataclass(frozen=True)
 class Quotient:
-    """``amplitude * above / below``, the latter real on the line of motion; they share the variable."""
+    """Quotient ``amplitude * above / below``, the latter real on the line of motion; they share the
+    variable.
+    """
 
     above: Theta
     below: Theta
@@ -68,11 +70,11 @@ class Quotient:
 
 @dataclass(frozen=True)
 class Strand:
-    """A quotient that turns: times ``exp(i (rate t + step n + offset))`` after n half periods.
+    """A quotient with a growing phase: times ``exp(i (rate t + step n + offset))`` after n half periods.
 
     Attributes:
-        rate: of the phase, in radians per unit of time.
-        step: of the phase per half period, rad.
+        rate: rate of the phase, rad per unit of time.
+        step: step of the phase per half period, rad.
         offset: phase at t = 0 apart from the quotient's own, rad.
     """
 
@@ -94,7 +96,7 @@ class Strand:
         return value, change * per_turn * argument.turn_rate + turning
 
     def shifted(self, angle: Any) -> Strand:
-        """With a constant added to the phase."""
+        """The strand with a constant added to its phase."""
         return replace(self, offset=self.offset + angle)
 
 
