@@ -136,16 +136,17 @@ def page(rows: list[list[str]]) -> str:
     """docs/gallery.md."""
     parts = [
         "<!-- blocks: slow -->\n# Gallery",
-        "Every config of `configs/`, as it is run and drawn by two commands (`python -m docs.gallery` makes "
-        "this page):",
+        "Every config in `configs/`, run and drawn by two commands (`python -m docs.gallery` generates this "
+        "page):",
         "```sh\nrigidsim run configs/heavy_top_nutating.toml\nrigidsim plot runs/heavy_top_nutating\n```",
-        "Of each its timeline comes first, stopped on its way (`rigidsim view runs/heavy_top_nutating --png "
-        "timeline.png`; all of them by `python -m docs.gallery --timelines`), and then what `plot` draws.",
-        "## Their numbers",
-        "Announced error of the attitude at the end (of an averaged model that of its axes, beside which its "
-        "integration's is nothing), and the largest drift of any invariant over what rounding explains "
-        "(50 tolerance sqrt(steps)). A large error with a tiny drift is a motion that "
-        "amplifies errors: it flips, or falls.",
+        "For each config the page shows the timeline, stopped at one moment (`rigidsim view "
+        "runs/heavy_top_nutating --png timeline.png`; `python -m docs.gallery --timelines` draws them all), "
+        "and the figure drawn by `plot`.",
+        "## Numbers",
+        "The table gives the announced error of the attitude at the end, the largest drift of any invariant, "
+        "and that drift relative to what rounding explains (50 tolerance sqrt(steps)). For an averaged model "
+        "the error is that of its axes; the error of the integration is negligible in comparison. A large "
+        "error with a tiny drift means that the motion amplifies errors: the body flips, or falls.",
         "<!-- slow output: python -m docs.gallery --table -->\n" + table(rows),
     ]
     for config in CONFIGS:
@@ -155,7 +156,7 @@ def page(rows: list[list[str]]) -> str:
         parts.append(f"*{description}.* [{config.name}](../{path})")
         parts.append(look)
         parts.append(f"![Its timeline](figures/gallery/{config.stem}_timeline.png)")
-        parts.append(f"![What rigidsim plot draws of it](figures/gallery/{config.stem}.png)")
+        parts.append(f"![Figure drawn by rigidsim plot](figures/gallery/{config.stem}.png)")
     parts.append("## Sweeps")
     for config in sorted((ROOT / "configs" / "sweeps").glob("*.toml")):
         description, _ = told(config)
@@ -163,10 +164,10 @@ def page(rows: list[list[str]]) -> str:
             f"*{description}.* [{config.name}](../configs/sweeps/{config.name}), by `rigidsim sweep`."
         )
         drawn_by = "its study" if config.stem in SWEPT_STUDIES else "rigidsim plot"
-        parts.append(f"![What {drawn_by} draws of it](figures/{config.stem}.png)")
+        parts.append(f"![Figure drawn by {drawn_by}](figures/{config.stem}.png)")
     parts.append("## Studies")
     parts.append(
-        "Questions with an answer, each one command, `python -m experiments.NAME`; "
+        "Each study answers a question with one command, `python -m experiments.NAME`; see "
         "[all of them with their tables](../experiments/README.md)."
     )
     for name, (figure, what) in STUDIES.items():
