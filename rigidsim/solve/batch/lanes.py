@@ -221,10 +221,8 @@ class BatchEngine:
     ) -> None:
         """Run members whose end alone is asked for: whoever arrives makes room for the next in its lane."""
         integrator, width, used = self._integrator, self.width, self._used
-        state, numbers = (
-            integrator.state,
-            integrator.pars,
-        )  # one lane at a time: indices by lists cost ten times
+        state, numbers = integrator.state, integrator.pars
+        # one lane at a time below: indices by lists cost ten times
         waiting = deque(range(initial.shape[1]))
         inside, taken = [IDLE] * width, [0] * width
         target, bounds, begun = np.zeros(width), np.empty(width), [0.0] * width
@@ -313,10 +311,7 @@ class BatchEngine:
         """
         integrator = self._integrator
         self._log.clear()
-        integrator.set_time(start)
-        integrator.state[:] = initial
-        if self._used:
-            integrator.pars[:] = parameters[: self._used]
+        self._set(initial, parameters, start)
         count = len(members)
         consecutive = members[-1] - members[0] == count - 1
         places: Any = slice(members[0], members[-1] + 1) if consecutive else members
