@@ -21,6 +21,7 @@ from experiments import closed_forms, common, measure  # noqa: E402
 from experiments.common import Check  # noqa: E402
 
 GUIDE = ROOT / "experiments" / "README.md"
+CHECKS = ROOT / "experiments" / "checks.md"
 SLOW = {  # about how many seconds they take
     "apophis_flyby": 15,
     "averaged_motions": 100,
@@ -58,16 +59,16 @@ def test_study_passes_and_draws_and_the_guide_shows_its_rows(name: str, tmp_path
     assert pixels.shape[0] >= 500
     assert pixels.shape[1] >= 1000
     assert 0.01 < inked < 0.9
-    head, rows = shown_in_the_guide()
+    head, rows = shown_checks()
     shown = [row for row in rows if row.startswith(f"| {name}: ")]
     made = [line for line in common.table(checks).splitlines() if line.startswith("|")]
     found = differences("\n".join([*head, *shown]), "\n".join(made))
-    assert not found, "\n".join(["experiments/README.md, the table of all studies", *found])
+    assert not found, "\n".join(["experiments/checks.md", *found])
 
 
-def shown_in_the_guide() -> tuple[list[str], list[str]]:
+def shown_checks() -> tuple[list[str], list[str]]:
     """The table of all studies: its two lines of head, and its rows."""
-    (shown,) = (shown for shown in shown_in(GUIDE) if shown.stage == "studies")
+    (shown,) = (shown for shown in shown_in(CHECKS) if shown.stage == "studies")
     lines = shown.text.splitlines()
     return lines[:2], lines[2:]
 
@@ -75,9 +76,7 @@ def shown_in_the_guide() -> tuple[list[str], list[str]]:
 def test_every_study_of_the_folder_is_in_the_list_and_in_the_guide() -> None:
     found = {path.stem for path in (ROOT / "experiments").glob("*.py") if "\ndef study(" in path.read_text()}
     assert found == set(everything.STUDIES)
-    assert list(dict.fromkeys(row[2:].split(":")[0] for row in shown_in_the_guide()[1])) == [
-        *everything.STUDIES
-    ]
+    assert list(dict.fromkeys(row[2:].split(":")[0] for row in shown_checks()[1])) == [*everything.STUDIES]
 
 
 def test_every_command_of_the_folder_is_in_the_guides_table() -> None:
