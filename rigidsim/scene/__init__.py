@@ -1,1 +1,1 @@
-"""What the user described: typed config, units, bodies, loads, times, as exact numbers."""
+"""The user's description of a scene: typed config, units, bodies, loads, times, as exact numbers."""

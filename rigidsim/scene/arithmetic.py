@@ -1,4 +1,4 @@
-"""The arithmetic in which a scene is worked out: mpmath, well past the run's own precision.
+"""The arithmetic in which a scene is worked out: mpmath, with far more digits than the run's own precision.
 
 Everything derived from the config (principal axes, normalised quaternions, pi, coefficients) is computed
 here and rounded once, to the working precision, where it enters the equations.
@@ -16,8 +16,10 @@ WORKING_BITS = {"single": 24, "double": 53, "extended": 64, "quadruple": 113}
 GUARD_BITS = 128
 
 _LOST_BITS = 24
-"""Of the scene's precision, which a derived constant may have lost on its way: what is smaller than that
-beside its own terms is what rounding left of a zero. Far fewer than the guard bits: nothing real is lost."""
+"""Bits of the scene's precision that a derived constant may have lost on its way: whatever is smaller
+relative to its own terms is the rounding of a zero. Far fewer than the guard bits, so that nothing real is
+lost.
+"""
 
 Vector = list[Any]
 Matrix = list[list[Any]]
@@ -31,11 +33,13 @@ def working_bits(precision: str | int) -> int:
 
 
 class _Context(mpmath.MPContext):
-    """A context with the functions that mpmath's own has: each one made would wrap all of them again."""
+    """An mpmath context that inherits its special functions; each new plain context would wrap all of them
+    again.
+    """
 
     @classmethod
     def _wrap_specfun(cls, *_: Any) -> None:
-        """They are inherited as they were wrapped for ``mpmath.mp``."""
+        """Wrap the special functions once; contexts inherit them as wrapped for ``mpmath.mp``."""
 
 
 def context_for(precision: str | int) -> Any:
@@ -46,22 +50,22 @@ def context_for(precision: str | int) -> Any:
 
 
 def negligible(context: Any) -> Any:
-    """The part of a quantity's size below which a difference of it is nothing but rounding."""
+    """Relative size below which a difference of a quantity is just rounding."""
     return context.mpf(2) ** (_LOST_BITS - context.prec)
 
 
 def dot(a: Vector, b: Vector) -> Any:
-    """Sum of products."""
+    """Scalar product."""
     return sum((x * y for x, y in zip(a, b, strict=True)), a[0] * 0)
 
 
 def norm(context: Any, a: Vector) -> Any:
-    """Euclidean length."""
+    """Euclidean norm."""
     return context.sqrt(dot(a, a))
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
+    """Cross product."""
     return [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -80,7 +84,7 @@ def apply(matrix: Matrix, a: Vector) -> Vector:
 
 
 def transpose(matrix: Matrix) -> Matrix:
-    """Rows become columns."""
+    """Transposed matrix."""
     return [list(column) for column in zip(*matrix, strict=True)]
 
 
@@ -91,7 +95,7 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 
 def diagonal(entries: Vector) -> Matrix:
-    """The 3x3 matrix with these on its diagonal."""
+    """Diagonal 3x3 matrix with these entries."""
     zero = entries[0] * 0
     return [[entries[i] if i == j else zero for j in range(3)] for i in range(3)]
 

@@ -1,6 +1,6 @@
-"""Attitudes as numbers of mpmath: ``rigidsim.scene.rotations`` in the precision of a context.
+"""Attitudes in mpmath numbers: ``rigidsim.scene.rotations`` in the precision of a context.
 
-What rounding leaves of a zero (the cosine of 90 degrees, a difference of equal products) is zero: single
+The residue of a zero (the cosine of 90 degrees, a difference of equal products) is set to zero: single
 precision can't hold it, and an unstable equilibrium must not be left because of it.
 """
 
@@ -40,7 +40,7 @@ def _within(context: Any) -> Rotations:
 
 
 def _beside(value: Any, terms: Sequence[Any]) -> Any:
-    """A value, or zero where it is nothing but the rounding of what it was made of.
+    """The value, or zero if it is just the rounding of the terms it was made of.
 
     Numbers without guard bits (floats, arrays) have no digits to spare and are left as they are.
     """
@@ -61,7 +61,7 @@ def product(p: Sequence[Any], q: Sequence[Any]) -> Vector:
 
 
 def rotation_matrix(q: Vector) -> Matrix:
-    """R of a unit quaternion."""
+    """Rotation matrix R, body to space axes, of a unit quaternion."""
     w, x, y, z = q
     pairs = {(0, 1): (x * y, w * z), (0, 2): (x * z, w * y), (1, 2): (y * z, w * x)}
     return [

@@ -1,4 +1,4 @@
-"""From TOML text to a validated config, with every digit as it was written."""
+"""From TOML text to a validated config that keeps every digit as written."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Experiment:
     """A config as given, and its meaning; made by ``load``, ``parse`` or ``from_dict``.
 
     Attributes:
-        text: the TOML text of what is run: each key has one value, where it stands in plain sight.
+        text: TOML text of what is run: each key has one visible value.
         config: the validated tables.
-        source: where it came from, for messages.
+        source: origin of the config, for messages.
         given: the TOML text as it was given, before any value was replaced.
-        settings: the ``KEY=VALUE`` texts given beside it, in order.
+        settings: the ``KEY=VALUE`` texts given with it, in order.
     """
 
     text: str
@@ -49,11 +49,11 @@ class Experiment:
 
     @property
     def sha256(self) -> str:
-        """Of the TOML text of what is run."""
+        """SHA-256 of the TOML text of what is run."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     def having(self, overrides: Sequence[str]) -> Experiment:
-        """The same with values replaced by the program, not by who gave it; see ``parse``.
+        """The experiment with values replaced by the program rather than the user; see ``parse``.
 
         Raises:
             ConfigError: with every problem found.
@@ -82,10 +82,11 @@ class Experiment:
         return parse_toml(self.text, self.source)
 
     def replace(self, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> Experiment:
-        """The same with other values, such as ``replace({"time.end": 10})`` or ``replace(time={"end": 10})``.
+        """The experiment with other values, such as ``replace({"time.end": 10})`` or ``replace(time={"end":
+        10})``.
 
         Args:
-            changes: dotted keys with optional [index], ``"initial.angular_velocity[0]"``, to values as of
+            changes: dotted keys with optional [index], ``"initial.angular_velocity[0]"``, to values as in
                 ``from_dict``.
             tables: tables with the keys to change, or ``name`` and ``description``.
 
@@ -114,7 +115,7 @@ def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Ex
     Args:
         text: the config.
         source: its name in messages.
-        overrides: ``KEY=VALUE`` texts that replace values, in order; or a dictionary as of
+        overrides: ``KEY=VALUE`` texts that replace values, in order; or a dictionary as for
             ``Experiment.replace``.
 
     Raises:
@@ -144,7 +145,7 @@ def validated(table: dict[str, Any], source: str) -> Config:
         raise ConfigError(problems, source)
     if not table:
         problems.append(Problem("config", f"it is empty; {NEW}"))
-    model = config_model() if "loads" in table else Config  # kinds of loads take time to become known
+    model = config_model() if "loads" in table else Config  # kinds of loads take time to import
     try:
         config = model.model_validate(table)
     except ValidationError as error:
@@ -157,10 +158,10 @@ def validated(table: dict[str, Any], source: str) -> Config:
 
 
 def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
-    """Read a config file, and with it the files of tables that it names; see ``parse``.
+    """Read a config file together with the table files that it names; see ``parse``.
 
     Raises:
-        ConfigError: no such file, not text, too large, or a bad config.
+        ConfigError: the file is missing, not text, too large, or a bad config.
     """
     path = Path(path)
     if path.is_dir() and (path / "config.toml").is_file():
@@ -185,7 +186,7 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
 
 
 def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
-    """The same with the texts of the tables that it names, so that it depends on no other file."""
+    """The experiment with the texts of the tables that it names, so that it depends on no other file."""
     try:
         added = table_sections(experiment.config, folder)
     except ConfigError as error:
@@ -198,7 +199,7 @@ def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
 
 
 def parse_earlier(text: str, *, source: str, overrides: Overrides = ()) -> Experiment:
-    """Read a text that the first version wrote into a run's files; see ``parse``.
+    """Read a text that the first version of rigidsim wrote into a run's files; see ``parse``.
 
     Those kept what ``--set`` had replaced in ``#:set KEY=VALUE`` comments at the end. Anywhere else, and in
     every other text, such a line is a comment like any other.
@@ -213,7 +214,7 @@ def parse_earlier(text: str, *, source: str, overrides: Overrides = ()) -> Exper
 
 
 def has_earlier_settings(text: str) -> bool:
-    """Whether a text ends as those that ``parse_earlier`` is for."""
+    """Whether a text ends in the comments for which ``parse_earlier`` exists."""
     return bool(_split_earlier(text)[1])
 
 

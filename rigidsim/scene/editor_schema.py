@@ -1,4 +1,4 @@
-"""The config's JSON schema as editors read it: what ``rigidsim schema`` prints, and the reference of keys.
+"""The config's JSON schema in the form that editors use: ``rigidsim schema``, and the reference of keys.
 
 pydantic's own schema describes a Python object: keys that are left out are null there, defaults are exact
 numbers, and every key has a title. A TOML file has no null, and an editor shows descriptions, so the schema
@@ -27,7 +27,7 @@ def editor_schema(model: type[Config] | None = None) -> dict[str, Any]:
     """The JSON schema of a config, for editors and other tools.
 
     Args:
-        model: by default ``config_model()``, with every kind of load that is registered.
+        model: by default ``config_model()``, with every registered kind of load.
 
     Returns:
         A schema of draft 7. Each key has a ``description`` that ends with its unit in square brackets, which
@@ -44,10 +44,10 @@ def python_schema(model: type[Config]) -> dict[str, Any]:
 
 
 class _WithTables(GenerateJsonSchema):
-    """Looks into tables whose validators are built later (see ``rigidsim.scene.fields.Later``)."""
+    """Follows tables whose validators are built later (see ``rigidsim.scene.fields.Later``)."""
 
     def generate_inner(self, schema: Any) -> dict[str, Any]:
-        """As of the table itself, which is a definition under its name."""
+        """Schema of a table built later, as a definition under its name."""
         table = schema.get("metadata", {}).get(BUILT_LATER)
         if table is not None:
             name = f"{table.__module__}.{table.__qualname__}:{id(table)}"
@@ -85,13 +85,13 @@ def _key(node: Mapping[str, Any]) -> dict[str, Any]:
     _bounded(key)
     if "default" in key:
         key["default"] = as_written(key["default"])
-    if "$ref" in key and len(key) > 1:  # draft 7 reads nothing beside a reference
+    if "$ref" in key and len(key) > 1:  # draft 7 ignores anything beside a reference
         key["allOf"] = [{"$ref": key.pop("$ref")}]
     return key
 
 
 def _without_null(key: dict[str, Any]) -> dict[str, Any]:
-    """A key that may be left out needn't be null."""
+    """The key without null: a key that may be left out needn't be null."""
     if key.get("default", ...) is None:
         del key["default"]
     kinds = key.get("anyOf")
@@ -103,7 +103,7 @@ def _without_null(key: dict[str, Any]) -> dict[str, Any]:
 
 
 def _units(node: Any) -> set[str]:
-    """Units of all numbers of a key that aren't in a table of their own."""
+    """Units of all numbers of a key, except those in tables of their own."""
     if isinstance(node, Mapping):
         own = {node["x-unit"]} if "x-unit" in node else set()
         inner = (value for name, value in node.items() if name not in ("default", "examples"))
@@ -112,7 +112,7 @@ def _units(node: Any) -> set[str]:
 
 
 def _bounded(key: dict[str, Any]) -> None:
-    """Limits hold for numbers; those that are written as strings are left to rigidsim."""
+    """Restrict limits to numbers; numbers written as strings are checked by rigidsim."""
     limits = {_LIMITS[name]: key.pop(name) for name in list(key) if name in _LIMITS}
     if limits:
         for kind in _kinds(key):
@@ -121,13 +121,15 @@ def _bounded(key: dict[str, Any]) -> None:
 
 
 def _kinds(node: dict[str, Any]) -> list[dict[str, Any]]:
-    """The alternatives of a key, those of its alternatives among them."""
+    """The alternatives of a key, nested ones included."""
     inner = [found for kind in node.get("anyOf", []) for found in _kinds(kind)]
     return inner or [node]
 
 
 def as_written(value: Any) -> Any:
-    """A default in TOML's terms: an exact number, which pydantic takes apart, as one would write it."""
+    """A default in TOML's terms: an exact number, which pydantic would take apart, as a user would
+    write it.
+    """
     if isinstance(value, list):
         return [as_written(item) for item in value]
     if not (isinstance(value, Mapping) and "rational" in value):

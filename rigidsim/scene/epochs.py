@@ -1,4 +1,4 @@
-"""Instants that a scene's time zero can stand for: calendar dates in TDB, TT and UTC, exactly.
+"""Dates of a scene's time zero: calendar dates in TDB, TT and UTC, exactly.
 
 Days of TT and TDB have 86,400 s. Seconds of UTC are those of TAI, and some of its days have one more: the
 table of leap seconds is IANA's (the package tzdata), made from the IERS's, and says until when it is known.
@@ -18,7 +18,7 @@ from importlib.resources import files
 from rigidsim.scene.records import dataclass
 
 DIGITS = 14
-"""Decimals of a second that an instant has."""
+"""Decimals of a second that an instant resolves."""
 SCALES = ("TDB", "TT", "UTC")
 _SECOND = 10**DIGITS  # in ticks
 _DAY = 86400 * _SECOND
@@ -33,12 +33,12 @@ _FIRST_OFFSET = 10  # TAI - UTC on 1972-01-01, before which seconds of UTC had o
 
 @dataclass(frozen=True)
 class Epoch:
-    """An instant.
+    """An instant in a time scale.
 
     Attributes:
         scale: one of ``SCALES``.
-        day: proleptic Gregorian ordinal, as of ``datetime.date``.
-        ticks: of the day, 1e-14 s each; 86,400 s and more within a leap second.
+        day: proleptic Gregorian ordinal, as in ``datetime.date``.
+        ticks: time of day in 1e-14 s; 86,400 s or more within a leap second.
     """
 
     scale: str
@@ -60,7 +60,7 @@ class Epoch:
         """The instant some seconds later, to 1e-14 s, in the same scale.
 
         Raises:
-            ValueError: it isn't between the years 1 and 9999, or UTC isn't known there.
+            ValueError: the result isn't between the years 1 and 9999, or UTC isn't known there.
         """
         ticks = int(_WIDE.scaleb(seconds, DIGITS).to_integral_value(context=_WIDE))
         uniform = self._uniform() + ticks
@@ -77,7 +77,7 @@ class Epoch:
         return _dated(self.scale, day, rest)
 
     def uniform(self) -> Epoch:
-        """The same instant in a scale whose days all have 86,400 s: its own, for UTC that is TT."""
+        """The same instant in a scale whose days all have 86,400 s: TT for UTC, otherwise its own."""
         if self.scale != "UTC":
             return self
         return Epoch("TT", *divmod(self._uniform() + int(_TT_MINUS_TAI * _SECOND), _DAY))
@@ -92,12 +92,12 @@ class Epoch:
         elapsed = Fraction(self._uniform() - J2000._uniform(), _SECOND)
         if self.scale == "TDB":
             return elapsed
-        if self.scale == "UTC":  # that count was of TAI
+        if self.scale == "UTC":  # the count was in TAI
             elapsed += _TT_MINUS_TAI
         return elapsed + Fraction(tdb_minus_tt(float(elapsed))).limit_denominator(10**9)
 
     def _uniform(self) -> int:
-        """Ticks of a scale without leap seconds: its own, for UTC that of TAI."""
+        """Ticks of a scale without leap seconds: TAI for UTC, otherwise its own."""
         total = self.day * _DAY + self.ticks
         if self.scale != "UTC":
             return total
@@ -112,14 +112,14 @@ def _dated(scale: str, day: int, ticks: int) -> Epoch:
 
 
 J2000 = Epoch("TDB", date(2000, 1, 1).toordinal(), 43200 * _SECOND)
-"""What ``"J2000"`` stands for: 2000 January 1, 12 h, in the time that ephemerides count in."""
+"""The instant ``"J2000"``: 2000 January 1, 12 h TDB."""
 
 
 def parse_epoch(text: str) -> Epoch:
-    """An instant as it is written in a config: ``2029-04-13T21:46:00 TDB``, or ``J2000``.
+    """Read an instant as written in a config: ``2029-04-13T21:46:00 TDB``, or ``J2000``.
 
     Raises:
-        ValueError: it is none, or in UTC outside the table of leap seconds; says what is allowed.
+        ValueError: the text is no instant, or in UTC outside the table of leap seconds; says what is allowed.
     """
     if text.strip() == "J2000":
         return J2000
@@ -158,8 +158,8 @@ def _unknown() -> str:
 
 @lru_cache(maxsize=1)
 def leap_seconds() -> tuple[list[int], list[int], int]:
-    """Days (ordinals) from which TAI - UTC has a new value, the values in seconds, and the day that they are
-    known to.
+    """Days (ordinals) from which TAI - UTC has a new value, the values in seconds, and the day until which
+    they are known.
     """
     text = (files("tzdata") / "zoneinfo" / "leapseconds").read_text(encoding="ascii")
     days, offsets = [date(1972, 1, 1).toordinal()], [_FIRST_OFFSET]
@@ -173,7 +173,7 @@ def leap_seconds() -> tuple[list[int], list[int], int]:
 
 
 def tdb_minus_tt(seconds: float) -> float:
-    """TDB - TT, s, at some seconds of TT since J2000, at the centre of the Earth.
+    """TDB - TT at the centre of the Earth, s, for ``seconds`` of TT since J2000.
 
     Kaplan 2005, USNO Circular 179, eq. 2.6; within 1e-5 s of the full series (ERFA's ``dtdb``) from 1600 to
     2200.

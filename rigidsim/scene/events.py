@@ -18,10 +18,10 @@ from rigidsim.scene.schema import Config
 
 @dataclass(frozen=True)
 class Event:
-    """One event.
+    """One event of a scene.
 
     Attributes:
-        direction: "any", "up" or "down", of the crossing.
+        direction: direction of the crossing: "any", "up" or "down".
         stop: whether the run ends there.
     """
 

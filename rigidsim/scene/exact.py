@@ -1,4 +1,4 @@
-"""Numbers exactly as they were written: a rational times a power of pi, rounded only when a run asks.
+"""Exact numbers as written: a rational times a power of pi, rounded only when a run asks for it.
 
 A config's ``0.1`` is one tenth until the moment that it becomes a coefficient or an initial value at the
 working precision; binary floating point never stands in between.
@@ -23,12 +23,12 @@ _LARGEST_DECIMAL_EXPONENT = 5000
 _LONGEST_TEXT = 5000
 _TOO_LONG = f"digits and exponent of a number may make at most {_LARGEST_DECIMAL_EXPONENT}"
 
-_LONGEST_DECIMAL = 150  # places of a decimal that is written out
+_LONGEST_DECIMAL = 150  # digits of a decimal that is written out
 _PLAIN_DIGITS = 18
 
 _MOST_FACTORS = 20
 _LARGEST_POWER_OF_PI = 64
-_LARGEST_BITS = 150_000  # of a product, which a single power may have
+_LARGEST_BITS = 150_000  # of a product; a single power may have as many
 
 _DECIMAL = r"[+-]?(?:\d+(?:_\d+)*(?:\.(?:\d+(?:_\d+)*)?)?|\.\d+)(?:[eE][+-]?\d+)?"
 _PI = r"[+-]?(?:pi(?![\w])|π)"
@@ -48,7 +48,7 @@ class ExactNumber:
     """``rational * pi**pi_power``, in SI units (angles in radians).
 
     Attributes:
-        assumed: the unit that it was taken in where none was written; empty otherwise.
+        assumed: the unit assumed if none was written; empty otherwise.
     """
 
     rational: Fraction
@@ -66,7 +66,7 @@ class ExactNumber:
         return value * context.pi**self.pi_power if self.pi_power else value
 
     def fraction(self, context: Any) -> Fraction:
-        """The value itself; of a multiple of pi the nearest number of the context."""
+        """The value itself; for a multiple of pi, the nearest number of the context."""
         return self.rational if self.pi_power == 0 else fraction_of(self.at(context))
 
     def __float__(self) -> float:
@@ -74,18 +74,20 @@ class ExactNumber:
 
     @property
     def alone(self) -> ExactNumber:
-        """The number without what is known of its unit."""
+        """The number without information on its unit."""
         return ExactNumber(self.rational, self.pi_power)
 
     @property
     def sign(self) -> int:
-        """-1, 0 or 1."""
+        """Sign: -1, 0 or 1."""
         return (self.rational > 0) - (self.rational < 0)
 
 
 @cache
 def _for_doubles() -> Any:
-    """The context in which numbers are rounded to doubles: making one takes longer than reading a config."""
+    """Context in which numbers are rounded to doubles, made once: making one takes longer than reading a
+    config.
+    """
     import mpmath
 
     context = mpmath.MPContext()
@@ -95,7 +97,7 @@ def _for_doubles() -> Any:
 
 @dataclass(frozen=True)
 class Quantity(ExactNumber):
-    """A number, in SI, with the unit that was written behind it."""
+    """A number in SI with the unit that was written after it."""
 
     unit: str = ""
 
@@ -109,7 +111,7 @@ def rounded(value: Fraction, context: Any) -> Any:
 
 
 def fraction_of(value: Any) -> Fraction:
-    """A finite mpf of any context, exactly."""
+    """The exact value of a finite mpf of any context."""
     sign, mantissa, exponent, _ = value._mpf_
     whole = -int(mantissa) if sign else int(mantissa)
     return Fraction(whole << exponent) if exponent >= 0 else Fraction(whole, 1 << -exponent)
@@ -140,7 +142,7 @@ def _power(base: Fraction, exponent: Fraction) -> Fraction:
 
 
 def _product(text: str) -> tuple[Fraction, int]:
-    """The number of a text of factors, quotients and powers, as a rational times a power of pi."""
+    """The value of a text of factors, quotients and powers, as a rational times a power of pi."""
     rational, pi_power, begin, count = Fraction(1), 0, 0, 0
     while begin < len(text):
         step = _STEP.match(text, begin)
@@ -189,7 +191,7 @@ def _from_text(text: str, unit: str) -> ExactNumber:
 
 
 def parse_quantity(value: Any) -> ExactNumber:
-    """A TOML value as a number in SI: a ``Quantity`` where it has a unit, whatever that is.
+    """Read a TOML value as a number in SI: a ``Quantity`` if it has a unit, of whatever dimension.
 
     Raises:
         ValueError: see ``parse_number``.
@@ -202,7 +204,8 @@ def parse_quantity(value: Any) -> ExactNumber:
 
 
 def in_its_unit(value: Any) -> tuple[ExactNumber, str]:
-    """A TOML value as a number of the unit that is written behind it, and that unit; empty where none is.
+    """Read a TOML value as a number and the unit written after it (empty if there is none), without
+    conversion.
 
     Raises:
         ValueError: see ``parse_number``; the unit isn't looked at.
@@ -215,8 +218,8 @@ def in_its_unit(value: Any) -> tuple[ExactNumber, str]:
 
 
 def decimal_text(value: Fraction) -> str:
-    """A number as TOML has it: a decimal where it is one of some hundred digits, else ``p/q``, which has to
-    stand in quotes.
+    """A number as TOML text: a decimal if it has at most some hundred digits, otherwise ``p/q``, which needs
+    quotes.
     """
     rest, powers = value.denominator, {2: 0, 5: 0}
     for prime in powers:
@@ -244,7 +247,7 @@ def with_unit(number: ExactNumber, unit: str, text: str) -> Quantity:
     """A number of some unit, in SI.
 
     Args:
-        text: as it was written, for messages.
+        text: the text as written, for messages.
 
     Raises:
         ValueError: no such unit.
@@ -261,7 +264,7 @@ def _assumed(unit: str) -> str:
 
 
 def example(unit: str) -> str:
-    """An example of a number with a unit, for messages."""
+    """An example of a number with this unit, for messages."""
     return {
         "1": '"1/3"',
         "rad": '"23.44 deg"',
@@ -274,7 +277,7 @@ def example(unit: str) -> str:
 
 
 def parse_number(value: Any, unit: str) -> ExactNumber:
-    """A TOML value as an exact number in the SI unit ``unit``.
+    """Read a TOML value as an exact number in the SI unit ``unit``.
 
     Args:
         value: an int, a Decimal (as the TOML reader yields), a float (taken as the exact binary number

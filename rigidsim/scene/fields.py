@@ -23,16 +23,16 @@ from rigidsim.scene.units import UnitError, time_unit
 from rigidsim.scene.validation_messages import shown
 
 _NUMBER_TEXT = r"^\s*[-+]?(\d|\.\d|pi)"
-"""How every text of a number begins; the unit behind it is left to ``parse_number``."""
+"""Beginning of any text of a number; the unit after it is left to ``parse_number``."""
 
 
 def refuse(text: str) -> PydanticCustomError:
-    """The error by which a validator refuses a value; the text is shown as it is."""
+    """The error with which a validator refuses a value; the text is shown as it is."""
     return PydanticCustomError("rigidsim", "{text}", {"text": text})
 
 
 def quantity(unit: str) -> Any:
-    """The annotated type of a number in the SI unit ``unit`` (see ``parse_number``)."""
+    """Annotated type of a number in the SI unit ``unit`` (see ``parse_number``)."""
 
     def validate(value: Any) -> ExactNumber:
         try:
@@ -44,7 +44,7 @@ def quantity(unit: str) -> Any:
 
 
 def number_schema(unit: str) -> dict[str, Any]:
-    """What the JSON schema says of a number in the SI unit ``unit``, "" for any unit."""
+    """JSON schema of a number in the SI unit ``unit``, "" for any unit."""
     text = {"type": "string", "pattern": _NUMBER_TEXT}
     return {"anyOf": [{"type": "number"}, text], "x-unit": unit}
 
@@ -61,9 +61,9 @@ def _exactly(count: int) -> BeforeValidator:
 
 T = TypeVar("T")
 Triple = Annotated[list[T], Field(min_length=3, max_length=3), _exactly(3)]
-"""A vector of three."""
+"""A vector of three components."""
 Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
-"""A quaternion."""
+"""A quaternion's four components."""
 
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ AnyQuantity = Annotated[
     PlainValidator(_any_quantity),
     WithJsonSchema(number_schema("")),
 ]
-"""A number with whatever unit is written behind it."""
+"""A number with any unit written after it."""
 
 
 def _instant(value: Any) -> Epoch:
@@ -133,7 +133,7 @@ def _time_unit(value: Any) -> str:
 
 
 TimeUnitName = Annotated[str, PlainValidator(_time_unit), WithJsonSchema({"type": "string"})]
-"""A unit of time, by its name."""
+"""The name of a unit of time."""
 
 
 class ConfigTable(BaseModel):
@@ -147,8 +147,8 @@ if TYPE_CHECKING:
 else:
 
     class Later:
-        """A table inside another whose validator is built when the first such table is read, not with the
-        outer one's: most configs give few of the tables that there are.
+        """Defers building the validator of a nested table until the first such table is read, since most
+        configs use few of the possible tables.
         """
 
         def __class_getitem__(cls, table: type[ConfigTable]) -> Any:
@@ -156,7 +156,7 @@ else:
 
 
 BUILT_LATER = "rigidsim_table"
-"""Where a core schema tells which table it stands for."""
+"""Key in a core schema that tells which table it stands for."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ class _BuiltLater:
     table: type[ConfigTable]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Instead of the table's own."""
+        """Schema that builds the table's own validator when needed."""
         read = self.table.model_validate
         return core_schema.no_info_plain_validator_function(read, metadata={BUILT_LATER: self.table})
 

@@ -1,4 +1,4 @@
-"""What obliquity, wobble and polar motion speak of: the body's figure axis and the plane they count from."""
+"""The body's figure axis, and the plane from which obliquity and longitudes count."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ SPACE = "space"
 
 @dataclass(frozen=True)
 class Figure:
-    """The figure axis of a body, with two of its equator; right-handed unit vectors, body axes (mpf).
+    """Figure axis of a body and two axes of its equator; right-handed unit vectors, body axes (mpf).
 
     Attributes:
-        first: from which angles within the equator count (the prime meridian).
+        first: direction from which angles within the equator count (the prime meridian).
         pole: the figure axis.
-        described: which axis it is, for readers.
+        described: description of the axis, for readers.
     """
 
     first: Vector
@@ -32,8 +32,8 @@ class Figure:
 
 
 def figure_of(config: schema.Config, body: RigidBody, context: Any) -> Figure:
-    """The figure axis that ``[frame] figure_axis`` chooses: by default a symmetric body's axis of symmetry,
-    and another's principal axis of largest moment.
+    """The figure axis that ``[frame] figure_axis`` chooses: by default the symmetry axis of a symmetric body,
+    and the principal axis of largest moment of any other.
 
     The axis of symmetry of a body with its centre of mass on it points there; other principal axes have a
     positive largest component. The prime meridian is the body axis that follows (x after z, y after x, z
@@ -41,7 +41,7 @@ def figure_of(config: schema.Config, body: RigidBody, context: Any) -> Figure:
     the figure axis is one.
 
     Raises:
-        ConfigError: the axis of symmetry, or of largest moment, of a body that has no such single axis.
+        ConfigError: the body has no unique axis of symmetry, or of largest moment, as requested.
     """
     asked = config.frame.figure_axis
     one, zero = context.one, context.zero
@@ -68,8 +68,8 @@ def figure_of(config: schema.Config, body: RigidBody, context: Any) -> Figure:
 
 
 def largest_axis(body: RigidBody, context: Any) -> Vector | None:
-    """Unit principal axis of largest moment, body axes (mpf), its largest component positive; None where
-    there is no single one.
+    """Unit principal axis of largest moment, body axes (mpf), its largest component positive; None if it
+    isn't unique.
     """
     moments = body.principal_moments
     order = sorted(range(3), key=lambda i: moments[i])
@@ -79,7 +79,7 @@ def largest_axis(body: RigidBody, context: Any) -> Vector | None:
 
 
 def smallest_axis(body: RigidBody, context: Any) -> Vector | None:
-    """The same of smallest moment: the long axis."""
+    """The same for the smallest moment: the long axis."""
     moments = body.principal_moments
     order = sorted(range(3), key=lambda i: moments[i])
     if moments[order[1]] - moments[order[0]] <= moments[order[2]] * negligible(context):
@@ -88,10 +88,10 @@ def smallest_axis(body: RigidBody, context: Any) -> Vector | None:
 
 
 def reference_normal(config: schema.Config, context: Any) -> Vector | None:
-    """Unit normal (mpf, space axes) of the plane that ``[frame] reference`` names; None for a moving one.
+    """Unit normal (mpf, space axes) of the plane named by ``[frame] reference``; None for a moving plane.
 
     Raises:
-        ConfigError: the zero vector.
+        ConfigError: the given normal is the zero vector.
     """
     asked = config.frame.reference
     if asked == ORBIT:
@@ -110,7 +110,7 @@ def _fault(key: str, text: str) -> ConfigError:
 
 
 def _symmetry(body: RigidBody, context: Any) -> Vector | None:
-    """Unit axis of a body with two equal moments and another third; None of others."""
+    """Unit symmetry axis of a body with two equal moments and a different third; None for others."""
     moments = body.principal_moments
     tiny = largest_of(moments) * negligible(context)
     for i in range(3):
@@ -123,7 +123,7 @@ def _symmetry(body: RigidBody, context: Any) -> Vector | None:
 
 
 def _upright(axis: Vector) -> Vector:
-    """With a positive largest component."""
+    """The axis or its opposite, so that the largest component is positive."""
     return axis if max(axis, key=abs) > 0 else [-x for x in axis]
 
 

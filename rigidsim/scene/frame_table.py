@@ -1,4 +1,4 @@
-"""``[frame]``: the keys that say what axes and planes a scene's angles count from."""
+"""``[frame]``: the keys that define the axes and planes from which a scene's angles count."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""A scene's expressions at its start: one without a finite value there is refused before anything runs."""
+"""Evaluation of a scene's expressions at its start, which refuses those without a finite value before
+anything runs.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ from rigidsim.scene.scene import Scene
 
 
 def start_values(scene: Scene) -> dict[str, Any]:
-    """Values (mpf, SI) at the start of all names that expressions may use."""
+    """Values (mpf, SI) at the start of all names that expressions may read."""
     sequence = scene.config.integrator.euler_sequence
     angles = scene.euler_angles
     if angles is None:
@@ -37,7 +39,7 @@ def check_start(scene: Scene) -> None:
     """Evaluate the components of loads and the events once.
 
     Raises:
-        ConfigError: some have no finite value; all of them are named. Or they read Euler angles of which the
+        ConfigError: some have no finite value (all of them are named), or read Euler angles of which the
             start has the other triple.
     """
     values = start_values(scene)
@@ -53,8 +55,11 @@ def check_start(scene: Scene) -> None:
 
 
 def _check_branch(scene: Scene) -> list[Problem]:
-    """Every attitude has two triples of Euler angles; expressions mean the one whose middle angle is in its
-    range, which other formulations find as well.
+    """Refuse expressions that read Euler angles if the start is given by the other triple.
+
+    Every attitude has two triples of Euler angles; expressions use the one whose middle angle is in its
+    range, which
+    other formulations find as well.
     """
     expressions = [e for load in scene.loads for _, e in load.formulas()]
     expressions += [event.expression for event in scene.events]

@@ -1,4 +1,4 @@
-"""``[integrator]`` of a config: how accurately the motion is integrated, and in which variables."""
+"""``[integrator]``: accuracy of the integration, and the variables it uses."""
 
 from __future__ import annotations
 

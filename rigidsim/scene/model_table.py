@@ -10,7 +10,7 @@ from rigidsim.scene.fields import ConfigTable
 
 FULL, SPIN_AVERAGED, ORBIT_AVERAGED, AUTO = "full", "spin_averaged", "orbit_averaged", "auto"
 REDUCED = (SPIN_AVERAGED, ORBIT_AVERAGED)
-"""Levels that carry the momentum's direction alone, the more averaged the later."""
+"""Levels that carry only the momentum's direction; later ones average more."""
 
 
 class Model(ConfigTable):
@@ -30,5 +30,5 @@ class Model(ConfigTable):
 
     @property
     def reduced(self) -> bool:
-        """Whether anything is averaged."""
+        """Whether the model averages anything."""
         return self.level in REDUCED

@@ -1,4 +1,4 @@
-"""Kepler orbits that a config prescribes: their keys, and the elements worked out."""
+"""Prescribed Kepler orbits: their config keys, and the elements worked out."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class Orbit(ConfigTable):
 
 @dataclass(frozen=True)
 class KeplerOrbit:
-    """Where an attracting body is, as elements at time zero (radians, m, rad/s) with secular rates.
+    """Orbit of an attracting body by elements at time zero (radians, m, rad/s) with secular rates.
 
-    A circle has no periapsis: what is given of it and of its motion is part of the anomaly and of the mean
-    motion here, and so is the node where the orbit lies in the plane from which inclinations count.
+    A circle has no periapsis: its given angle and rate are added to the anomaly and to the mean
+    motion here, and so are the node's if the orbit lies in the plane from which inclinations count.
 
     Attributes:
         mean_motion: rad/s, from Kepler's third law or from the period that was given.
@@ -64,7 +64,7 @@ class KeplerOrbit:
     mean_motion: Any
 
     def eccentric_anomaly(self, context: Any, time: Any) -> Any:
-        """Solution of Kepler's equation M = E - e sin E at a time, to the context's precision."""
+        """Solution E of Kepler's equation M = E - e sin E at a time, to the context's precision."""
         return eccentric_anomaly(context, self.mean_anomaly + self.mean_motion * time, self.eccentricity)
 
     @property
@@ -78,7 +78,7 @@ class KeplerOrbit:
         return bool(self.node_rate == 0 and self.periapsis_rate == 0)
 
     def normal(self, context: Any) -> list[Any]:
-        """Unit vector at time zero about which the body goes in the direct sense, space axes."""
+        """Unit normal at time zero about which the motion is direct, space axes."""
         tilt, node = self.inclination, self.ascending_node
         across = context.sin(tilt)
         return [across * context.sin(node), -across * context.cos(node), context.cos(tilt)]
@@ -95,10 +95,10 @@ class KeplerOrbit:
 
 
 def attracting_body(orbit: Orbit, around: Surroundings) -> int:
-    """Number of the point mass that an orbit names.
+    """Index of the point mass that an orbit names.
 
     Raises:
-        ConfigError: there is none of that name, or it is this body itself.
+        ConfigError: there is no such body, or it is this body itself.
     """
     more = sorted(orbit.model_fields_set - {"body"})
     if more:
@@ -116,13 +116,13 @@ def attracting_body(orbit: Orbit, around: Surroundings) -> int:
 
 
 def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> KeplerOrbit:
-    """Work out the elements.
+    """Work out the orbit's elements.
 
     Args:
-        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None where none is known.
+        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
 
     Raises:
-        ConfigError: no such orbit.
+        ConfigError: the elements describe no orbit.
     """
     context = around.context
     if table.semi_major_axis is None:

@@ -1,4 +1,4 @@
-"""``--set KEY=VALUE``: values replaced in a config's tables, and where they stand in its text."""
+"""``--set KEY=VALUE``: values replaced in a config's tables, and in place in its text."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from rigidsim.scene.toml_text import DEEP_KEY, DEEPEST_KEY, decimal, parse_toml
 
 _MOST_OVERRIDES = 1000
 FLAG = "--set"
-"""What overrides are called where they come from the command line."""
+"""Name of overrides from the command line."""
 
 
 def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str = FLAG) -> None:
     """Replace values of a config's tables, in order.
 
     Args:
-        overrides: each a dotted key with optional [index], an equals sign and a TOML value (what is none,
+        overrides: each a dotted key with optional [index], an equals sign and a TOML value (anything else,
             such as a bare word or a number with its unit, is a string).
-        what: they are called in messages.
+        what: what the overrides are called in messages.
 
     Raises:
-        ConfigError: one can't be applied.
+        ConfigError: an override can't be applied.
     """
     if len(overrides) > _MOST_OVERRIDES:
         many = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
@@ -41,14 +41,14 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str =
 
 
 def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str, what: str = FLAG) -> str:
-    """A config's text with values replaced where they stand, in the digits given; comments and order stay.
+    """A config's text with values replaced in place, in the digits given; comments and order stay.
 
     Args:
         meant: the tables that the result must have.
-        what: the values are called in messages.
+        what: what the values are called in messages.
 
     Raises:
-        ConfigError: it can't be written so.
+        ConfigError: the text can't be written like that.
     """
     import tomlkit  # 25 ms that only configs with something to replace pay for
     from tomlkit.exceptions import TOMLKitError
@@ -73,7 +73,9 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
 
 
 def assignments(text: str, keys: Sequence[str]) -> list[str]:
-    """``KEY=VALUE`` texts of those of some keys (``table.key``) that a config has, in its own digits."""
+    """``KEY=VALUE`` texts, in the config's own digits, for those of the given keys (``table.key``) that it
+    has.
+    """
     import tomlkit
 
     document = tomlkit.parse(text)
@@ -98,10 +100,10 @@ _KEY_PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d
 
 
 def key_steps(key: str, where: str) -> list[str | int]:
-    """The parts of a dotted key and its indices, counted from 0; a part with points in it stands in quotes.
+    """The parts of a dotted key and its indices, counted from 0; a part that contains dots is quoted.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: the text is no key.
     """
     steps: list[str | int] = []
     begin = 0

@@ -1,4 +1,4 @@
-"""Point masses under mutual gravity: what ``[[bodies]]`` describes, with every number worked out."""
+"""Point masses under mutual gravity: ``[[bodies]]`` with every number worked out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ GRAVITATIONAL_CONSTANT = "6.67430e-11"
 """m^3/(kg s^2), CODATA 2018 and 2022: for masses in kg where only gravitational parameters are known."""
 _SAME_MASS = 0.01
 """Relative difference up to which a mass and a gravitational parameter mean the same body: G is uncertain by
-2e-5, and published masses of asteroids by per cents."""
+2e-5, and published masses of asteroids by per cents.
+"""
 _MOST = 64
 _CLOSEST = 1000
 """A scale of distance is at least this part of the initial one: it must not vanish for a plunging orbit."""
@@ -25,13 +26,13 @@ _CLOSEST = 1000
 
 @dataclass(frozen=True)
 class PointMasses:
-    """At the start of a run; numbers are mpf, SI, space axes.
+    """Point masses at the start of a run; numbers are mpf, SI, space axes.
 
     Attributes:
         strengths: gravitational parameters, m^3/s^2.
         positions, velocities: one vector for each.
-        host: number of the one that the rigid body is; None where it is none of them.
-        full: whether they feel the rigid body's torques and the forces of its shape.
+        host: index of the one that the rigid body is; None if it is none of them.
+        full: whether they feel the reaction to the rigid body's torques and the forces of its shape.
     """
 
     names: tuple[str, ...]
@@ -42,20 +43,22 @@ class PointMasses:
     full: bool
 
     def constant(self, context: Any, mass: Any | None) -> Any:
-        """G, by which masses in kg follow: that of the host's own mass (kg) where it is known and reacts."""
+        """The constant G that gives masses in kg: chosen so that the host has its own mass (kg), if that is
+        known and reacts.
+        """
         if self.full and self.host is not None and mass is not None:
             return self.strengths[self.host] / mass
         return context.mpf(GRAVITATIONAL_CONSTANT)
 
     def encounter(self, context: Any, one: int, other: int) -> tuple[Any, Any]:
-        """As of ``closest``, of two of them."""
+        """See ``closest``, for two of the masses."""
         place = [a - b for a, b in zip(self.positions[one], self.positions[other], strict=True)]
         moving = [a - b for a, b in zip(self.velocities[one], self.velocities[other], strict=True)]
         return closest(context, place, moving, self.strengths[one] + self.strengths[other])
 
 
 def closest(context: Any, place: Vector, moving: Vector, strength: Any) -> tuple[Any, Any]:
-    """Least distance (m) of two masses left to themselves, and the angular rate there (rad/s).
+    """Least distance (m) of two masses left to themselves, and their angular rate there (rad/s).
 
     Args:
         place, moving: relative position and velocity.
@@ -87,11 +90,11 @@ def resolve_point_masses(
     *,
     free_flight: bool,
 ) -> PointMasses | None:
-    """Work out where they start; None without any.
+    """Work out the initial states of ``[[bodies]]``; None if there are none.
 
     Args:
-        host, coupling: of ``[body]``.
-        mass: of the rigid body, kg (mpf).
+        host, coupling: the keys of ``[body]``.
+        mass: mass of the rigid body, kg (mpf).
         free_flight: whether the rigid body has a position of its own.
 
     Raises:
@@ -173,7 +176,7 @@ def _place(
     places: dict[int, tuple[Vector, Vector]],
     asking: tuple[int, ...],
 ) -> tuple[Vector, Vector]:
-    """Position and velocity of one, and of those that it goes about."""
+    """Position and velocity of one mass, and of those about which it orbits."""
     if number in places:
         return places[number]
     table, zero = tables[number], [context.zero] * 3
@@ -203,7 +206,9 @@ def _place(
 
 
 def _of_elements(number: int, orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vector, Vector]:
-    """Relative position and velocity of osculating elements (Murray & Dermott 1999, sections 2.4 and 2.8)."""
+    """Relative position and velocity from osculating elements (Murray & Dermott 1999, sections 2.4 and
+    2.8).
+    """
     a, e = orbit.semi_major_axis.at(context), orbit.eccentricity.at(context)
     if not a > 0:
         raise _fault(

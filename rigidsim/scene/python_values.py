@@ -1,4 +1,4 @@
-"""Python values as TOML text: what a config says where it is written in code instead of a file."""
+"""Python values as TOML text, for configs written in code."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _ALLOWED = (
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """A config of nested dictionaries as the text of a TOML file.
+    """The TOML text of a config given as nested dictionaries.
 
     Args:
-        tables: as a TOML file has them. Floats, numpy's too, count as the shortest decimal that denotes them,
+        tables: as in a TOML file. Floats, numpy's too, count as the shortest decimal that denotes them,
             which is how they print: ``0.1`` is one tenth. Decimals, fractions and mpmath's numbers count
             exactly. A value that is None counts as not given.
 
@@ -40,10 +40,10 @@ def toml_text(tables: Mapping[str, Any]) -> str:
 
 
 def assignments_of(changes: Mapping[str, Any]) -> list[str]:
-    """``KEY=VALUE`` texts of values to replace.
+    """Values to replace as ``KEY=VALUE`` texts.
 
     Args:
-        changes: dotted keys with optional [index] to values as of ``toml_text``; a dictionary as a value
+        changes: dotted keys with optional [index] to values as in ``toml_text``; a dictionary as a value
             changes those keys in its table that it has.
 
     Raises:
@@ -59,7 +59,7 @@ def assignments_of(changes: Mapping[str, Any]) -> list[str]:
 
 
 def _item(value: Any, where: str) -> Any:
-    """A tomlkit item: tables and lists of tables in blocks, everything else on its line."""
+    """A tomlkit item: tables and lists of tables as blocks, everything else on one line."""
     import tomlkit
 
     if isinstance(value, Mapping):
@@ -100,7 +100,7 @@ def _inline(value: Any, where: str, depth: int = 0) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """A value of Python's own, or one of its kin, as bool, int, Decimal, str, list or mapping."""
+    """A value of Python's own, or of a related type, as bool, int, Decimal, str, list or mapping."""
     if isinstance(value, bool | str | int | Decimal | Mapping):
         return value
     kind = value.dtype.kind if hasattr(value, "dtype") else ""
@@ -129,13 +129,13 @@ def _is_finite(value: Any) -> bool:
 
 
 def _shortest(value: Any) -> str:
-    """The shortest decimal that denotes a number, without what numpy prints around it."""
+    """The shortest decimal that denotes a number, without numpy's wrapping."""
     text = str(value)
     return text[text.find("(") + 1 : text.find(")")].strip("'") if "(" in text else text
 
 
 def _terminating(value: Fraction) -> Decimal:
-    """A fraction of a power of two, exactly."""
+    """A fraction with a power of two as denominator, exactly."""
     power = value.denominator.bit_length() - 1
     return Decimal(f"{value.numerator * 5**power}e{-power}")
 
@@ -160,7 +160,7 @@ def _key(key: Any) -> str:
 
 
 def inline_text(value: Any) -> str:
-    """A value of a TOML file as it is written on one line.
+    """A TOML value as written on one line.
 
     Raises:
         ConfigError: something that a config can't hold.

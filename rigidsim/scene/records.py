@@ -1,4 +1,4 @@
-"""``dataclass`` as of the standard library, whose methods aren't compiled until they are called.
+"""A ``dataclass`` like the standard library's, whose methods aren't compiled until they are called.
 
 The standard one writes and compiles the source of each method of each class when that is defined: up to a
 millisecond a class, and a run imports two hundred of them before it has taken its first step. Here all
@@ -18,10 +18,10 @@ if TYPE_CHECKING:  # what type checkers and editors are to see
 else:
 
     def dataclass(cls: type | None = None, /, *, frozen: bool = False, repr: bool = True) -> Any:
-        """As ``dataclasses.dataclass`` with the same options, of which there are fewer.
+        """Like ``dataclasses.dataclass`` with the same options, of which there are fewer.
 
-        ``fields``, ``replace`` and ``asdict`` of the standard library work as ever. Fields are arguments of
-        ``__init__``, all of them.
+        ``fields``, ``replace`` and ``asdict`` of the standard library work as usual. All fields are arguments
+        of ``__init__``.
 
         Raises:
             TypeError: the class has a ``__post_init__``, which wouldn't be called, or a field that is no
@@ -57,7 +57,7 @@ def _refuse_what_is_missing(cls: Any) -> None:
 
 
 def _first_init(cls: type) -> Callable[..., None]:
-    """An ``__init__`` that puts the compiled one in its place."""
+    """An ``__init__`` that replaces itself by the compiled one."""
 
     def __init__(self: Any, *args: Any, **kwargs: Any) -> None:
         cls.__init__ = init = _compiled_init(cls)  # type: ignore[misc]
@@ -67,7 +67,7 @@ def _first_init(cls: type) -> Callable[..., None]:
 
 
 def _compiled_init(cls: Any) -> Callable[..., None]:
-    """The ``__init__`` that takes the fields in order and sets them, also of what is frozen."""
+    """The ``__init__`` that takes the fields in order and sets them, in frozen classes too."""
     scope: dict[str, Any] = {"_set": object.__setattr__, "_missing": MISSING}
     given, lines = [], []
     for field in dataclasses.fields(cls):
@@ -122,7 +122,9 @@ def _refuse_change(self: Any, name: str, value: object = None) -> None:
 
 
 class _Signature:
-    """The arguments of a class, for ``help`` and notebooks, which would find those of all classes."""
+    """The signature of a class, for ``help`` and notebooks, which would otherwise find that of all
+    classes.
+    """
 
     def __get__(self, instance: object, owner: type) -> Any:
         if instance is not None:

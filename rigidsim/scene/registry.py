@@ -1,7 +1,7 @@
-"""What can be named in a config beyond the schema itself: kinds of loads and observables.
+"""Registries of what a config can name beyond the schema: kinds of loads, and observables.
 
-Both registries are empty here. The files of ``rigidsim.model`` that define a load or an observable enter it,
-so that a config, a schema or a message never needs a second list of names.
+Both are empty here. The files of ``rigidsim.model`` that define a load or an observable register it, so
+that a config, a schema or a message never needs a second list of names.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ class Surroundings:
 
     Attributes:
         number: place of the load in the config, counted from 0.
-        context: arithmetic of the scene.
-        parameters: named constants of expressions.
+        context: the scene's arithmetic.
+        parameters: named constants for expressions.
         center_of_mass: of the body, from its reference point, body axes, m (mpf).
         free_flight: whether the body has a position.
-        axes: what the space axes are, where the config says it.
-        epoch: time 0 of the scene, where the config says it.
+        axes: what the space axes are, if the config says so.
+        epoch: date of the scene's time 0, if the config says so.
         tables: texts of the tables that belong to the config, by name.
         span: start and end of the run, s (mpf).
-        bodies: point masses that move beside the body.
+        bodies: point masses besides the body.
     """
 
     number: int
@@ -54,7 +54,7 @@ class Surroundings:
 
     @property
     def carried_bodies(self) -> PointMasses:
-        """The point masses, where there are any."""
+        """The point masses, which the caller knows to exist."""
         assert self.bodies is not None
         return self.bodies
 
@@ -64,15 +64,15 @@ class Surroundings:
 
 
 class SceneLoad:
-    """What a scene knows of a load; ``rigidsim.model.load.Load`` adds the mechanics.
+    """A load as the scene knows it; ``rigidsim.model.load.Load`` adds the mechanics.
 
     Attributes:
         Fields: its keys in a config; None for a load that only Python gives.
-        described: with an article, for sentences.
+        described: description with an article, for sentences.
         uniform_field: acceleration (mpf, m/s^2, space axes) of a field that is the same everywhere; such
             loads add up to the scene's gravity. None for all others.
-        axes: what the space axes are in its own equations; None where these hold in any.
-        epoch: time 0 of the scene in its own equations; None where they have none.
+        axes: what the space axes are in its own equations; None if these hold in any axes.
+        epoch: date of time 0 in its own equations; None if these have none.
     """
 
     Fields: ClassVar[type[LoadFields] | None] = None
@@ -94,35 +94,37 @@ class SceneLoad:
         raise NotImplementedError
 
     def acts(self) -> bool:
-        """False for a load that is zero whatever happens."""
+        """False for a load that is always zero."""
         return True
 
     def check(self, number: int, position: Vector | None) -> None:
-        """Refuse a load that this scene can't have.
+        """Refuse the load if this scene can't have it.
 
         Args:
             number: its place in the config, counted from 0.
-            position: of the body's centre of mass; None where it has none.
+            position: position of the body's centre of mass; None if it has none.
 
         Raises:
             ConfigError: says what to do instead.
         """
 
     def pictured(self) -> dict[str, Any] | None:
-        """What a picture shows of it, as plain JSON values (see ``rigidsim.look.surroundings``)."""
+        """The load's depiction as plain JSON values (see ``rigidsim.look.surroundings``); None if it isn't
+        drawn.
+        """
         return None
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
-        """Where its expressions stand in the config, and the expressions, to be tried at the start."""
+        """Its expressions with their places in the config, to be tried at the start."""
         yield from ()
 
 
 class Named(Protocol):
-    """An observable, as far as a config needs to know it."""
+    """An observable as far as a config needs to know it."""
 
     @property
     def name(self) -> str:
-        """By which a config asks for it."""
+        """Name by which a config asks for the observable."""
 
 
 LOAD_KINDS: dict[str, type[SceneLoad]] = {}
@@ -133,10 +135,10 @@ OBSERVABLES: dict[str, Any] = {}
 
 
 def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
-    """Enter a kind of load, so that ``[[loads]] kind = "..."`` finds it (usable as a class decorator).
+    """Register a kind of load, so that ``[[loads]] kind = "..."`` finds it (usable as a class decorator).
 
     Raises:
-        ValueError: it has no ``Fields``, or its name is taken.
+        ValueError: the kind has no ``Fields``, or its name is taken.
     """
     if kind.Fields is None:
         raise ValueError(f"{kind.__name__} has no Fields; a load of a config declares its keys there")
@@ -149,7 +151,7 @@ def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
 
 
 def register_observable(observable: Named) -> None:
-    """Enter an observable, so that ``[output] record`` finds it.
+    """Register an observable, so that ``[output] record`` finds it.
 
     Raises:
         ValueError: its name is taken.

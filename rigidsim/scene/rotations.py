@@ -1,4 +1,4 @@
-"""Rotations over any arithmetic: numbers of mpmath, numpy arrays, expressions of heyoka.
+"""Rotations over any arithmetic: mpmath numbers, numpy arrays, heyoka expressions.
 
 Conventions: quaternions [w, x, y, z] and matrices R (lists of rows) rotate body axes to space axes; intrinsic
 Euler angles (a, b, c) of the sequence ijk mean R = R_i(a) R_j(b) R_k(c). No sequence is written out
@@ -21,7 +21,7 @@ Sum = Callable[[Sequence[Scalar]], Scalar]
 
 
 def from_left(terms: Sequence[Scalar]) -> Scalar:
-    """Sum, one term after the other."""
+    """Sum of the terms in order."""
     return reduce(add, terms)
 
 
@@ -43,7 +43,7 @@ def product(p: Sequence[Scalar], q: Sequence[Scalar], total: Sum = from_left) ->
 
 
 def rotation_matrix(q: Sequence[Scalar]) -> Matrix:
-    """R of a unit quaternion."""
+    """Rotation matrix R, body to space axes, of a unit quaternion."""
     w, x, y, z = q
     ww, xx, yy, zz = w * w, x * x, y * y, z * z
     return [
@@ -71,13 +71,13 @@ def shepperd(r: Matrix) -> tuple[Vector, dict[tuple[int, int], Scalar]]:
 
 @dataclass(frozen=True)
 class Rotations:
-    """Rotations in one arithmetic, which is known by its functions.
+    """Rotations in one arithmetic, which is given by its functions.
 
     Attributes:
-        hypot: length of a vector of two.
-        constant: a small whole number.
-        negligible: whether a ``hypot`` of components of unit vectors is but rounding.
-        total: sum of some terms.
+        hypot: length of a vector of two components.
+        constant: makes a small whole number.
+        negligible: whether a ``hypot`` of components of unit vectors is pure rounding.
+        total: sums terms.
     """
 
     sin: Callable[[Scalar], Scalar]
@@ -110,7 +110,7 @@ class Rotations:
         return matrix
 
     def euler_matrix(self, sequence: str, angles: Vector) -> Matrix:
-        """R of intrinsic Euler angles (radians), body to space."""
+        """Rotation matrix R of intrinsic Euler angles (radians), body to space."""
         axes = map(AXES.index, sequence)
         return reduce(self.multiply, [self.elementary(*turn) for turn in zip(axes, angles, strict=True)])
 

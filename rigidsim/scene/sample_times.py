@@ -1,4 +1,4 @@
-"""Where a scene's samples lie: a grid or a list of times, kept as exactly as they were written."""
+"""Sample times of a scene: a grid or a list, kept exactly as written."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _MOST_SAMPLES = 10**12
 
 @dataclass(frozen=True)
 class SampleTimes:
-    """Where samples lie, seconds, as exactly as they were written: ``begin + i * step``, or a list.
+    """Sample times in seconds, exactly as written: ``begin + i * step``, or a list.
 
     Attributes:
-        begin: of the motion.
-        step: from one sample of a grid to the next; zero for a list.
+        begin: start of the motion.
+        step: spacing of a grid; zero for a list.
         times: the list, or None.
         count: number of samples.
-        context: of the scene.
+        context: the scene's context.
     """
 
     begin: Fraction
@@ -37,7 +37,7 @@ class SampleTimes:
 
     @classmethod
     def listed(cls, begin: Fraction, times: Sequence[Fraction], context: Any) -> SampleTimes:
-        """A list."""
+        """Sample times given as a list."""
         return cls(begin, Fraction(0), tuple(times), len(times), context)
 
     @property
@@ -47,7 +47,7 @@ class SampleTimes:
 
     @property
     def start(self) -> Any:
-        """Of the motion (mpf)."""
+        """Start of the motion (mpf), s."""
         return rounded(self.begin, self.context)
 
     @property
@@ -64,7 +64,7 @@ class SampleTimes:
 
 
 def sample_times(table: schema.Time, context: Any) -> tuple[Any, Any, SampleTimes]:
-    """Start and end of the motion (s, mpf), and the samples, of a config's ``[time]``.
+    """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``.
 
     Raises:
         ConfigError: a contradiction or a value out of range.

@@ -1,4 +1,4 @@
-"""The scene: a config with every number worked out and every physical contradiction refused."""
+"""Scenes: a config with every number worked out and every physical contradiction refused."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Scene:
-    """All that the equations of motion depend on; numbers are mpf of ``context`` in SI units.
+    """Everything that the equations of motion depend on; numbers are mpf of ``context`` in SI units.
 
     Attributes:
-        angular_velocity: initial, body axes, rad/s.
-        quaternion: initial, unit, body to space.
-        euler_angles: as given in ``euler_sequence`` (radians), or None where another attitude was given.
+        angular_velocity: initial angular velocity, body axes, rad/s.
+        quaternion: initial unit quaternion, body to space.
+        euler_angles: as given in ``euler_sequence`` (radians), or None if given otherwise.
         position, velocity: of the centre of mass, space axes; None unless the body moves freely.
         gravity: sum of all uniform fields, space axes, m/s^2; None without such a load.
-        loads: the others, without those that are zero whatever happens.
+        loads: the others, without those that are always zero.
         events: crossings that are recorded, or end the run.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
-        axes, epoch: what the space axes and time 0 are, where the config says it or a load implies it.
+        axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
         figure: the body's figure axis, see ``[frame] figure_axis``.
-        bodies: point masses that move beside the body; None without any.
+        bodies: point masses besides the body; None if there are none.
         reference: unit normal (space axes) of the plane that obliquity and longitudes count from; None for
-            the source's own, moving plane.
+            a source's own, moving plane.
     """
 
     name: str
@@ -66,12 +66,14 @@ class Scene:
 
     @property
     def free_flight(self) -> bool:
-        """True in six degrees of freedom, False about a fixed point or in free rotation."""
+        """Whether the body moves with six degrees of freedom, rather than about a fixed point or in free
+        rotation.
+        """
         return self.position is not None
 
     @property
     def torque_arm(self) -> Vector | None:
-        """Mass times centre of mass (kg m, body axes) on which gravity pulls; None without a torque."""
+        """Mass times centre of mass (kg m, body axes) on which gravity acts; None without a torque."""
         if self.gravity is None or self.free_flight or self.body.mass is None:
             return None
         if all(x == 0 for x in self.body.center_of_mass) or all(g == 0 for g in self.gravity):
@@ -83,10 +85,10 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     """Work out the scene of a config.
 
     Args:
-        context: in which its numbers are worked out; by default the one of the config's precision.
+        context: arithmetic for its numbers; by default that of the config's precision.
 
     Raises:
-        ConfigError: something in it contradicts mechanics or another key; names the file.
+        ConfigError: a value contradicts mechanics or another key; names the file.
     """
     config = experiment.config
     context = context or context_for(config.integrator.precision)

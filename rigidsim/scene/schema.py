@@ -291,10 +291,10 @@ class Config(ConfigTable):
 
 
 def config_model() -> type[Config]:
-    """The schema with every kind of load that is registered: what texts are validated with, and shown by.
+    """The schema with every registered kind of load, with which texts are validated and described.
 
     Raises:
-        RuntimeError: none is; ``rigidsim.model.loads`` enters rigidsim's own.
+        RuntimeError: none is registered; importing ``rigidsim.model.loads`` registers rigidsim's own.
     """
     if not LOAD_KINDS:
         raise RuntimeError("no kinds of loads are registered; import rigidsim.model.loads first")

@@ -1,4 +1,4 @@
-"""Names of space axes, and how those that other tools don't know are turned into those that they do."""
+"""Names of space axes, and the rotation between those that other tools know and those that they don't."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Switching surfaces of a scene: where the argument of a ``sign`` in one of its expressions passes zero.
+"""Switching surfaces of a scene, on which the argument of a ``sign`` in one of its expressions vanishes.
 
 Surfaces are the same whatever the formulation and the precision; arguments in a constant ratio share one.
 """
@@ -25,19 +25,19 @@ from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
-_STATES = 4  # at which expressions are compared; two that agree at all of them are the same
-_TRIALS = 32  # some expressions have no value everywhere
+_STATES = 4  # states at which expressions are compared; two that agree at all of them count as equal
+_TRIALS = 32  # attempts: some expressions have no value everywhere
 _BITS = 60  # of agreement, far fewer than the scene's arithmetic has
 _OUTER = ("phi", "psi")  # of the Euler angles, those that turn without end
 
 
 @dataclass(frozen=True)
 class Surface:
-    """One surface, where ``expression`` is zero.
+    """A switching surface, where ``expression`` is zero.
 
     Attributes:
-        text: the function with the kink or jump, as it was written.
-        where: it stands in the config.
+        text: the function with the kink or jump, as written.
+        where: its place in the config.
     """
 
     expression: Expression
@@ -50,10 +50,10 @@ class Surfaces:
     """All surfaces of a scene.
 
     Attributes:
-        found: in the order in which they stand in the config.
-        places: for each argument of a sign the index of its surface, and 1 or -1: the ratio's sign.
+        found: the surfaces in the order of the config.
+        places: for each argument of a sign, the index of its surface, and the sign (1 or -1) of their ratio.
         turning: Euler angles whose full turns matter to some expression.
-        signed: whether the sign of the quaternion matters to one.
+        signed: whether the sign of the quaternion matters to some expression.
     """
 
     found: tuple[Surface, ...] = ()
@@ -105,7 +105,7 @@ def surfaces_of(scene: Scene) -> Surfaces:
 
 
 def random_states(scene: Scene) -> list[dict[str, Any]]:
-    """Values (mpf, SI) of all names at states like the start, the same each time."""
+    """Values (mpf, SI) of all names at random states similar to the start, always the same ones."""
     context, generator = scene.context, random.Random(0)
     start = start_values(scene)
     rates = max((abs(w) for w in scene.angular_velocity), default=context.zero) or context.one
@@ -129,10 +129,10 @@ def random_states(scene: Scene) -> list[dict[str, Any]]:
 def changes(
     expression: Expression, states: Sequence[Mapping[str, Any]], moved: Mapping[str, Any], context: Any
 ) -> bool:
-    """Whether an expression changes where names are moved.
+    """Whether an expression changes when the values of names are changed.
 
     Args:
-        moved: functions of a value, by name.
+        moved: functions that change a value, by name.
     """
     if not names_used(expression) & set(moved):
         return False
@@ -174,7 +174,7 @@ def _value(expression: Expression, state: Mapping[str, Any], context: Any) -> An
 
 
 def _ratio(values: Sequence[Any], others: Sequence[Any], context: Any) -> int:
-    """The sign of the constant ratio of two rows of values; 0 where it isn't constant."""
+    """Sign of the constant ratio of two rows of values; 0 if the ratio isn't constant."""
     pairs = [(a, b) for a, b in zip(values, others, strict=True) if a is not None and b is not None]
     pairs = pairs[:_STATES]
     if len(pairs) < _STATES or any(b == 0 or a == 0 for a, b in pairs):

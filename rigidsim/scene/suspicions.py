@@ -1,4 +1,4 @@
-"""Numbers of a config that are allowed, but are likely to mean something else."""
+"""Config values that are allowed, but probably mean something else."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Path = tuple[str | int, ...]
 def suspicious_angles(config: Config) -> list[Problem]:
     """Angles beyond a full turn that were given without a unit: taken as radians, meant as degrees?
 
-    A multiple of pi is meant in radians, and so is whatever has its unit.
+    A multiple of pi is meant in radians, and a value with a unit is unambiguous.
     """
     found = []
     for path, numbers in _numbers((), config):
@@ -44,8 +44,8 @@ def suspicious_angles(config: Config) -> list[Problem]:
 
 
 def suspicious_end(config: Config) -> list[Problem]:
-    """A bare number, in seconds, as the end of a run whose times are to be shown in a unit that it is less
-    than: meant in that unit?
+    """A bare number, in seconds, as the end of a run whose times are shown in a unit longer than that: meant
+    in that unit?
     """
     end, unit = config.time.end, config.time.unit
     if end is None or unit is None or end.assumed != "s" or end.pi_power:
@@ -64,8 +64,8 @@ def suspicious_end(config: Config) -> list[Problem]:
 
 
 def unreachable_events(events: Sequence[Event]) -> list[Problem]:
-    """Events that can't happen, since the middle Euler angle, from 0 to pi or -pi/2 to pi/2, is compared with
-    a number beyond that: meant in degrees?
+    """Events that can't happen because the middle Euler angle, from 0 to pi or -pi/2 to pi/2, is compared
+    with a number beyond that range: meant in degrees?
     """
     found = []
     for number, event in enumerate(events):
@@ -84,7 +84,7 @@ def unreachable_events(events: Sequence[Event]) -> list[Problem]:
 
 
 def _numbers(path: Path, value: object) -> Iterator[tuple[Path, list[ExactNumber]]]:
-    """Where numbers stand in a config: single ones, and arrays of them."""
+    """Numbers in a config with their places: single ones, and arrays of them."""
     if isinstance(value, ExactNumber):
         yield path, [value]
     elif isinstance(value, BaseModel):

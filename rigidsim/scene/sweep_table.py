@@ -1,4 +1,4 @@
-"""``[sweep]`` as it stands in a config: which keys take which values, and what is kept of each member."""
+"""``[sweep]``: the keys for swept values, and for what is kept of each member."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ KEPT = (
     "frequencies",
     "series",
 )
-"""What can be kept of a member; drifts, steps and warnings always are."""
+"""Items that can be kept of a member; drifts, steps and warnings always are."""
 RANDOM = ("normal", "uniform", "sphere")
 WAYS = ("linspace", "logspace", "step", "values", *RANDOM)
-"""How an axis says its values."""
+"""Ways to give an axis's values."""
 LARGEST_AXIS = 10_000_000
 
 
@@ -92,7 +92,7 @@ class AxisTable(ConfigTable):
 
     @property
     def way(self) -> str:
-        """Which of the ways it is."""
+        """Which of the ways the axis uses."""
         return next(way for way in WAYS if getattr(self, way) is not None)
 
 

@@ -1,4 +1,4 @@
-"""Tables in files beside a config, taken into its text: a run depends on no other file afterwards."""
+"""Table files beside a config, taken into its text so that a run depends on no other file."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ _LARGEST_TABLE = 3_000_000  # bytes
 
 
 def table_sections(config: Config, folder: Path) -> str:
-    """The tables that loads name and that aren't part of the config, as TOML to be put at its end.
+    """TOML text, to be appended to the config, with the tables that loads name and the config doesn't
+    contain.
 
     Args:
-        folder: that relative names count from.
+        folder: folder to which relative names refer.
 
     Raises:
-        ConfigError: a file that can't be read, or be part of a TOML text.
+        ConfigError: a file can't be read, or can't be part of a TOML text.
     """
     found: dict[str, str] = {}
     for where, name in _named(config):
@@ -29,7 +30,7 @@ def table_sections(config: Config, folder: Path) -> str:
 
 
 def _named(config: Config) -> Iterator[tuple[str, str]]:
-    """Where a load names a table, and the name."""
+    """Tables that loads name, with the place of each name in the config."""
     for number, load in enumerate(config.loads, 1):
         name = getattr(getattr(load, "orbit", None), "table", None)
         if name is not None:

@@ -1,4 +1,4 @@
-"""Reading TOML with every digit as it was written, and within bounds of time and memory."""
+"""Reading TOML with every digit as written, within bounded time and memory."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
 
 
 def long_integers(table: dict[str, Any]) -> list[Problem]:
-    """Whole numbers too long to be shown; TOML has no limit for hexadecimal ones."""
+    """Problems of whole numbers too long to be shown; TOML sets no limit for hexadecimal ones."""
     problems = []
     waiting: list[tuple[tuple[str | int, ...], Any]] = [((), table)]
     while waiting:
@@ -72,7 +72,7 @@ _LONGEST_SHOWN = 60
 
 
 def _remedy(text: str, why: str) -> str:
-    """The line at fault, and what to do where a text or a unit stands without its quotes."""
+    """The line at fault, and a remedy if a text or a unit lacks its quotes."""
     place = _PLACE.search(why)
     lines = text.split("\n")
     if place is None or not 0 < int(place[1]) <= len(lines):
@@ -85,5 +85,5 @@ def _remedy(text: str, why: str) -> str:
 
 
 def _dotted(key: re.Match[str]) -> str:
-    """tomllib shows a key as a Python tuple; the user wrote a dotted key."""
+    """A dotted key as the user wrote it; tomllib shows it as a Python tuple."""
     return '"' + key[1].strip("'").replace("', '", ".") + '"'

@@ -1,10 +1,10 @@
-"""Where an expression may change all at once: the parts of it that a step must not pass over.
+"""Parts of an expression that may change abruptly, which a step must not pass over.
 
 A pulse such as ``exp(-((t-50)/0.01)^2)`` or a switch such as ``tanh((t-5)/0.001)`` is flat almost everywhere:
-its Taylor series say nothing of what comes, and a step chosen by them passes over it. What happens there
+its Taylor series tell nothing of what comes, and a step chosen by them passes over it. The change
 happens where the function's argument is of order one, and the argument itself isn't flat: see
-``rigidsim.model.step_limiter``. A root of what touches zero, such as a norm that vanishes for a moment, goes
-on smoothly along the wrong branch likewise.
+``rigidsim.model.step_limiter``. A root of something that touches zero, such as a vanishing norm, likewise
+continues smoothly along the wrong branch.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, Node, Operation, fold, operation
 
 WIDE = 4.0
-"""An argument that stays within this can't run through a function's whole transition."""
+"""Bound within which an argument can't run through a function's whole transition."""
 _FLAT = frozenset({"exp", "sinh", "cosh", "tanh", "erf", "sigmoid", "atan"})
-"""Functions with an end at which they hardly change."""
+"""Functions that become flat towards an end."""
 _STEEP_POWER = 8  # higher ones vanish to an order near that of the Taylor method
 _BOUNDED: Mapping[str, float] = {
     "sin": 1, "cos": 1, "sign": 1, "tanh": 1, "erf": 1, "sigmoid": 1,
@@ -30,7 +30,7 @@ _BOUNDED: Mapping[str, float] = {
 
 
 def _operations(expression: Expression) -> Iterator[Operation]:
-    """Every operation, those that hold others first."""
+    """Every operation, outer ones before inner ones."""
     waiting = [expression.root]
     while waiting:
         node = waiting.pop()
@@ -42,7 +42,7 @@ def _operations(expression: Expression) -> Iterator[Operation]:
 def narrow_parts(expression: Expression) -> list[Expression]:
     """Arguments of flat functions, denominators, and bases of negative or high powers, each once.
 
-    Left out are constants and what can't leave ``WIDE``, such as a sine.
+    Constants are left out, and anything that can't leave ``WIDE``, such as a sine.
     """
     found: dict[Node, None] = {}
     for node in _operations(expression):
@@ -64,9 +64,9 @@ def narrow_parts(expression: Expression) -> list[Expression]:
 
 
 def root_parts(expression: Expression) -> list[Expression]:
-    """What may touch zero under a root, each once: there the root has a kink, though no power shows it.
+    """Radicands that may touch zero, each once: there the root has a kink, though no power shows it.
 
-    Left out is what is a sum of squares and a positive number, or is positive by its form otherwise.
+    Sums of squares and a positive number, or anything else positive by its form, are left out.
     """
     found: dict[Node, None] = {}
     for node in _operations(expression):
@@ -89,7 +89,7 @@ def root_parts(expression: Expression) -> list[Expression]:
 
 
 def _least(expression: Expression) -> float:
-    """Lower bound of the value, -infinity where there is none."""
+    """Lower bound of the value; -infinity if there is none."""
 
     def combine(node: Node, operands: list[Any]) -> float:
         if isinstance(node, Constant):
@@ -116,7 +116,7 @@ def _constant(node: Node) -> bool:
 
 
 def _bound(expression: Expression, *, signed: bool = False) -> float:
-    """Upper bound of the absolute value, infinite where there is none; ``signed``: a number as it is."""
+    """Upper bound of the absolute value, or of the value itself if ``signed``; infinite if there is none."""
 
     def combine(node: Node, operands: list[Any]) -> float:
         if isinstance(node, Constant):

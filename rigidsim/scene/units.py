@@ -1,4 +1,4 @@
-"""The units that a config may use, as definitions for pint, with exact rational factors.
+"""Units that a config may use, as definitions for pint with exact rational factors.
 
 Pi is a unit of its own here ("pi"), not a number: a conversion from degrees yields a rational factor and
 a power of pi, and pi itself is filled in later at the run's own precision. Everything is defined from SI
@@ -76,7 +76,7 @@ _NUMBER = re.compile(r"(?<![\w.])\.?\d")
 
 
 class UnitError(ValueError):
-    """The unit is unknown, malformed, or of another dimension than the key asks for."""
+    """Raised if a unit is unknown, malformed, or of another dimension than the key requires."""
 
 
 @lru_cache(maxsize=1)
@@ -95,7 +95,7 @@ def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
 
     exponents = [int(digits) for digits in re.findall(r"\d+", text)]
     before = [text[: number.start()].rstrip(" (+-") for number in _NUMBER.finditer(text)]
-    factors = any(not start.endswith(("^", "**")) for start in before)  # a unit has numbers as exponents only
+    factors = any(not start.endswith(("^", "**")) for start in before)  # a unit has numbers only as exponents
     unusual = not _UNIT_TEXT.fullmatch(text) or _TOWER.search(text) or factors
     if unusual or any(e > _LARGEST_EXPONENT for e in exponents):
         raise UnitError(f"{shown(text)} is not a unit")
@@ -124,10 +124,10 @@ _FAMILIAR = ("N m", "N", "N m s", "N/m", "N s", "W", "T", "A m^2", "V", "C")
 
 
 def powers(text: str) -> Powers:
-    """The dimension of a unit; that of angles is empty.
+    """The dimension of a unit; empty for angles.
 
     Raises:
-        UnitError: it is none.
+        UnitError: there is no such unit.
     """
     return tuple(sorted(_to_si(text)[2].items()))
 
@@ -136,13 +136,13 @@ def to_si(text: str) -> tuple[Fraction, int]:
     """Exact factor from a unit to SI, as ``rational * pi**power``.
 
     Raises:
-        UnitError: it is none.
+        UnitError: there is no such unit.
     """
     return _to_si(text)[:2]
 
 
 def is_unit(text: str) -> bool:
-    """Whether it is one."""
+    """Whether a text is a unit."""
     try:
         _to_si(text)
     except UnitError:
@@ -151,7 +151,7 @@ def is_unit(text: str) -> bool:
 
 
 def unit_text(dimension: Powers) -> str:
-    """The SI unit of a dimension, as people write it: ``N m``, ``m/s``, ``kg m^2``."""
+    """SI unit of a dimension as people write it: ``N m``, ``m/s``, ``kg m^2``."""
     for name in _FAMILIAR:
         if powers(name) == dimension:
             return name
@@ -203,10 +203,10 @@ def conversion(text: str, expected: str) -> tuple[Fraction, int]:
 
 
 def time_unit(name: str) -> Fraction:
-    """Seconds in a unit of time that has a name, such as ``day``, ``yr`` or ``kyr``.
+    """Length in seconds of a named unit of time, such as ``day``, ``yr`` or ``kyr``.
 
     Raises:
-        UnitError: it is none.
+        UnitError: there is no such unit.
     """
     if not re.fullmatch(r"[^\W\d]+", name):
         raise UnitError(f'"{name[:40]}" is not the name of a unit of time')

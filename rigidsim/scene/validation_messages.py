@@ -1,4 +1,4 @@
-"""Turns what the schema validator reports into messages that name the key and what to do."""
+"""Messages for the schema validator's errors, which name the key and the remedy."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ _MEANT = {
     "stop": "end", "dt": "every", "step": "every", "dimensions": "size", "side": "size",
     "float": "single", "float32": "single", "float64": "double", "quad": "quadruple",
 }  # fmt: skip
-"""What people call things that have another name here."""
+"""Common names of things that have another name here."""
 _MOST_PROBLEMS = 200  # worth telling; a file of a million wrong keys has said enough by then
 _LONGEST_NAME = 60
 LONGEST_INTEGER = 10_000  # bits; Python refuses to write out integers not much longer
 
 
 def shown(value: Any) -> str:
-    """A value of a TOML file as the user would write it, shortened, for messages."""
+    """A TOML value as the user would write it, shortened, for messages."""
     if isinstance(value, Mapping):
         return "a table"
     if isinstance(value, list):
@@ -67,7 +67,7 @@ def shown(value: Any) -> str:
 
 
 def nearest(given: str, allowed: Iterable[str]) -> str:
-    """``; did you mean "x"?`` when something close is allowed, else an empty text."""
+    """``; did you mean "x"?`` if something similar is allowed, otherwise empty."""
     if len(given) > _LONGEST_NAME:  # comparing takes time, and nothing allowed is near
         return ""
     names = list(allowed)
@@ -78,7 +78,7 @@ def nearest(given: str, allowed: Iterable[str]) -> str:
 
 
 def key_path(location: Iterable[str | int]) -> str:
-    """A key's path as it is written in TOML: ``[body] principal_moments[1]``."""
+    """A key's path as written in TOML: ``[body] principal_moments[1]``."""
     parts = list(location)
     if not parts:
         return "config"
@@ -95,7 +95,7 @@ def key_path(location: Iterable[str | int]) -> str:
 
 
 def _key(key: str) -> str:
-    """A key as it is; one that is empty, long or can't be seen stands in quotes, shortened."""
+    """A key as it is, or quoted and shortened if it is empty, long or invisible."""
     return key if 0 < len(key) <= 60 and key.isprintable() and key.strip() else shown(key)
 
 
@@ -110,7 +110,7 @@ def _value_at(table: Any, path: tuple[str, ...]) -> Any:
 def _model_at(
     model: type[BaseModel], location: tuple[str | int, ...], alternatives: Collection[str]
 ) -> type[BaseModel] | None:
-    """The table that holds the last key of ``location``, in which alternatives go by their ``kind``."""
+    """The table that holds the last key of ``location``; alternatives are told apart by their ``kind``."""
     candidates = [model]
     for key in location[:-1]:
         if isinstance(key, int):
@@ -168,7 +168,7 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
 
 
 def _of_how_many(table: type[BaseModel] | None, location: tuple[str | int, ...]) -> str:
-    """`` of 3`` for an array of fixed length."""
+    """The text `` of 3`` for an array of fixed length."""
     names = [key for key in location if isinstance(key, str)]
     field = table.model_fields.get(names[-1]) if table and names else None
     waiting = [] if field is None or isinstance(location[-1], int) else [field.annotation, *field.metadata]
@@ -184,10 +184,10 @@ def _of_how_many(table: type[BaseModel] | None, location: tuple[str | int, ...])
 def config_error(
     model: type[BaseModel], error: ValidationError, alternatives: Collection[str]
 ) -> ConfigError:
-    """All that the validator found, one problem per key, in the words of ``Problem``.
+    """All problems that the validator found, one per key, in the words of ``Problem``.
 
     Args:
-        alternatives: names of unions' alternatives, which are no part of the user's key.
+        alternatives: names of unions' alternatives, which aren't part of the user's key.
     """
     problems: dict[str, Problem] = {}
     for item in islice(error.errors(include_url=False), _MOST_PROBLEMS):

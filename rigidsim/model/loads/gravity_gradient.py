@@ -32,7 +32,7 @@ from rigidsim.scene.space_axes import ECLIPTIC
 
 
 class GravityGradientFields(LoadFields):
-    """Config fields of the torque of a distant attracting body, to second degree (MacCullagh's formula)."""
+    """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]
     gravitational_parameter: GravitationalParameter | None = Field(

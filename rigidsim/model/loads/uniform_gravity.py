@@ -24,9 +24,7 @@ def _standard_gravity() -> list[ExactNumber]:
 
 
 class UniformGravityFields(LoadFields):
-    """Config fields of a uniform field: a torque about the fixed point, or free fall in a scene with a
-    position.
-    """
+    """A uniform field; a torque about the fixed point, or free fall in a scene with a position."""
 
     kind: Literal["uniform_gravity"]
     acceleration: Triple[Acceleration] = Field(

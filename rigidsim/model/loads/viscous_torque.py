@@ -16,7 +16,7 @@ from rigidsim.scene.scene import Scene
 
 
 class ViscousTorqueFields(LoadFields):
-    """Config fields of a torque -c_i w_i about each body axis."""
+    """A torque -c_i w_i about each body axis."""
 
     kind: Literal["viscous_torque"]
     coefficients: Triple[Damping] = Field(

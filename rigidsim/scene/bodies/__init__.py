@@ -1,1 +1,1 @@
-"""The rigid body of a scene: from ``[body]`` to mass, principal moments and axes."""
+"""The rigid body of a scene: from ``[body]`` to mass, principal moments and principal axes."""

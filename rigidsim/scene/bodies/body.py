@@ -1,4 +1,4 @@
-"""From ``[body]`` to mass, centre of mass, inertia tensor and principal axes about the reference point.
+"""Working out ``[body]``: mass, centre of mass, inertia tensor and principal axes about the reference point.
 
 The reference point is the one that the body turns about: the centre of mass, unless the config names
 another. Positions in the result are body axes, metres, from the reference point.
@@ -42,16 +42,16 @@ _ROUNDING_OF_INPUT = 1e-14
 
 @dataclass(frozen=True)
 class RigidBody:
-    """What mechanics needs of a body; numbers are mpf of the scene's context.
+    """The rigid body as mechanics needs it; numbers are mpf of the scene's context.
 
     Attributes:
-        mass: kg, or None where the config gives none.
+        mass: kg, or None if the config gives none.
         center_of_mass: body axes, from the reference point, m.
         inertia: 3x3 tensor about the reference point, body axes, kg m^2.
         principal_moments: its eigenvalues (a diagonal tensor keeps the order of its axes).
         principal_axes: the matching unit axes as rows, body axes, right-handed.
         drawing: solids for the pictures (see ``rigidsim.look.solids``), as plain JSON values.
-        source: which key the inertia came from, with the preset's reference where there is one.
+        source: key that the inertia came from, with the preset's reference if there is one.
     """
 
     mass: Any | None
@@ -67,7 +67,7 @@ def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> R
     """Work out the body that ``[body]`` describes, in the context's precision.
 
     Args:
-        sequence: of Euler angles of parts that name none.
+        sequence: sequence of Euler angles for parts that name none.
 
     Raises:
         ConfigError: not exactly one source of inertia, a dimension missing or foreign, a tensor that no
@@ -192,7 +192,7 @@ def _finish(
 def _equivalent_cuboid(
     context: Any, mass: Any, center: Vector, moments: Vector, axes: Matrix
 ) -> dict[str, Any]:
-    """The homogeneous cuboid that has these moments (of unit mass where none is known)."""
+    """The homogeneous cuboid with these moments (of unit mass if no mass is known)."""
     mass, center, moments = plain(mass), [plain(x) for x in center], [plain(m) for m in moments]
     axes = [[plain(x) for x in row] for row in axes]
     heavy = mass if mass else context.one
@@ -203,12 +203,14 @@ def _equivalent_cuboid(
     drawing = drawn("cuboid", {"size": visible}, center)
     q = attitude.quaternion_from_matrix(context, transpose(axes))
     drawing["quaternion"] = [float(x) for x in q]
-    drawing["equivalent"] = True  # its shape isn't known, only its moments
+    drawing["equivalent"] = True  # only its moments are known, not its shape
     return drawing
 
 
 def inverse_inertia(context: Any, body: RigidBody) -> Matrix:
-    """Inverse of the tensor; a rod's axis without inertia gets no angular acceleration (pseudo-inverse)."""
+    """Inverse of the tensor; an axis without inertia (a rod's) gets no angular acceleration
+    (pseudo-inverse).
+    """
     inverse = [context.zero if m == 0 else 1 / m for m in body.principal_moments]
     return multiply(multiply(transpose(body.principal_axes), diagonal(inverse)), body.principal_axes)
 

@@ -1,4 +1,4 @@
-"""What solids look like, as numbers for any drawing: boxes, ellipsoids, solids of revolution.
+"""Outlines of solids as numbers for any drawing: boxes, ellipsoids, solids of revolution.
 
 Lengths are metres, in the solid's own axes, from its centre of mass.
 """
@@ -11,7 +11,7 @@ from typing import TypeAlias
 from rigidsim.scene.records import dataclass
 
 THINNESS = 0.02
-"""Thickness that an ideally thin solid is drawn with, of its largest dimension."""
+"""Thickness with which an ideally thin solid is drawn, relative to its largest dimension."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """With these semi-axes along x, y, z."""
+    """An ellipsoid with these semi-axes along x, y, z."""
 
     x: float
     y: float

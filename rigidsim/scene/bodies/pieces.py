@@ -1,4 +1,4 @@
-"""The pieces that a body is made of: points, a shape, or placed and turned parts, each with its own tensor.
+"""The pieces of a body: points, a shape, or parts placed and rotated, each with its own tensor.
 
 Positions are in the coordinates in which the body is described (a shape's origin is its centre of mass).
 """
@@ -32,8 +32,8 @@ def pieces_of(table: body_table.Body, source: str, context: Any, sequence: str) 
     """The pieces of ``points``, ``shape`` or ``parts``.
 
     Args:
-        source: which of them is given.
-        sequence: of Euler angles of parts that name none.
+        source: which of the three is given.
+        sequence: sequence of Euler angles for parts that name none.
 
     Raises:
         ConfigError: a mass or dimension is missing, foreign or not positive; a part is given two attitudes.
@@ -56,7 +56,9 @@ def pieces_of(table: body_table.Body, source: str, context: Any, sequence: str) 
 
 
 def reference_point(table: body_table.Body, source: str, center: Vector, context: Any) -> Vector:
-    """In the coordinates in which the body is described (a shape's origin is its centre of mass)."""
+    """Reference point in the coordinates in which the body is described (a shape's origin is its centre of
+    mass).
+    """
     if table.reference is None or table.reference == "center_of_mass":
         return center
     if isinstance(table.reference, str):
@@ -135,7 +137,7 @@ def _solid(
 
 
 def _attitude_of(part: body_table.Part, sequence: str, place: str, context: Any) -> Vector | None:
-    """Unit quaternion from the part's own axes to the body's; None where it isn't turned."""
+    """Unit quaternion from the part's own axes to the body's; None if it isn't rotated."""
     if part.quaternion is not None and part.euler_angles is not None:
         what = "given beside quaternion; only one attitude is allowed: remove one of them"
         raise refusal(f"{place}euler_angles", what)
@@ -153,7 +155,7 @@ def _attitude_of(part: body_table.Part, sequence: str, place: str, context: Any)
 
 
 def drawn(solid: str, dimensions: dict[str, Any], position: Vector) -> dict[str, Any]:
-    """A solid of the pictures that isn't turned, as plain JSON values (see ``rigidsim.look.solids``)."""
+    """A solid for pictures, not rotated, as plain JSON values (see ``rigidsim.look.solids``)."""
     return {
         "solid": solid,
         "dimensions": dimensions,
@@ -166,7 +168,7 @@ def positive(number: ExactNumber | None, key: str, what: str, context: Any) -> A
     """A mass or length of the config as mpf.
 
     Raises:
-        ConfigError: it is missing, zero or negative.
+        ConfigError: the number is missing, zero or negative.
     """
     if number is None:
         raise refusal(key, f"missing; this body needs a {what}, a positive number")
@@ -176,7 +178,7 @@ def positive(number: ExactNumber | None, key: str, what: str, context: Any) -> A
 
 
 def refuse_dimensions(table: body_table.Solid, allowed: tuple[str, ...], why: str, place: str) -> None:
-    """Raise ``ConfigError`` where a dimension is given that isn't among the allowed ones."""
+    """Raise ``ConfigError`` if a dimension is given that isn't among the allowed ones."""
     for key in DIMENSIONS:
         if getattr(table, key) is not None and key not in allowed:
             suffix = f"; allowed: {', '.join(allowed)}" if allowed else ""

@@ -1,4 +1,4 @@
-"""Published bodies. Every value names its source; ``docs/presets.md`` says more, and what is uncertain."""
+"""Published bodies. Every value names its source; ``docs/presets.md`` gives details and uncertainties."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class Preset:
-    """Principal moments along x, y, z (as ratios of ``largest_moment``), and what they come from.
+    """Principal moments along x, y, z (as ratios to ``largest_moment``), and their source.
 
     Attributes:
         ratios: I_x, I_y, I_z over the largest moment, as exact texts.
-        largest_moment: kg m^2, or the factor C/(M R^2) where ``radius`` is given.
+        largest_moment: kg m^2, or the factor C/(M R^2) if ``radius`` is given.
         mass: kg.
-        semi_axes: m, for the picture.
-        source: where the numbers are published.
+        semi_axes: semi-axes for pictures, m.
+        source: publication of the numbers.
         radius: R of the factor C/(M R^2), m.
-        rotation: the published rotation, rad/s about the body axes; empty where there is none that lasts.
-            A scene starts with what its ``[initial]`` says.
+        rotation: the published rotation, rad/s about the body axes; empty if there is no lasting one.
+            A scene itself starts as its ``[initial]`` says.
     """
 
     ratios: tuple[str, str, str]

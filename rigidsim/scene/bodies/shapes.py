@@ -1,4 +1,4 @@
-"""Homogeneous solids in their own axes: dimensions, principal moments, landmarks, and what they look like.
+"""Homogeneous solids in their own axes: dimensions, principal moments, landmarks and outlines.
 
 Formulas: Landau & Lifshitz, Mechanics, section 32, and standard tables; checked in the tests against
 numerical integration over the volume. All are evaluated in mpmath at the caller's precision.
@@ -23,10 +23,10 @@ class Shape:
     """A solid of uniform density.
 
     Attributes:
-        dimensions: names of the keys that size it, each with how many numbers it takes.
-        meaning: how it lies in its own axes, for readers of the table.
+        dimensions: names of the keys that size it, with the count of numbers that each takes.
+        meaning: its orientation in its own axes, for readers of the table.
         moments: (context, dimensions) -> principal moments per unit mass about the centre of mass, m^2.
-        outline: dimensions as float -> what it looks like.
+        outline: dimensions as float -> outline.
         landmarks: named points that a body can turn about, from the centre of mass, metres.
         at_most: two dimensions, the first of which is at most the second.
     """
@@ -192,11 +192,11 @@ SHAPES: dict[str, Shape] = {
         at_most=("minor_radius", "major_radius"),
     ),
 }
-"""The shapes that ``[body] shape`` and ``[[body.parts]] shape`` take; one more needs an entry here alone."""
+"""Shapes for ``[body] shape`` and ``[[body.parts]] shape``; a new one needs only an entry here."""
 
 DIMENSIONS = {
     key: max(other.dimensions.get(key, 0) for other in SHAPES.values())
     for shape in SHAPES.values()
     for key in shape.dimensions
 }
-"""Every key that sizes some shape, and how many numbers it takes at most."""
+"""Every key that sizes some shape, with the largest count of numbers that it takes."""

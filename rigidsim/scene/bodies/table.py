@@ -1,4 +1,4 @@
-"""``[body]``: the keys of which one source of inertia is made, and what loads need beside it."""
+"""``[body]``: the keys for one source of inertia, and for anything else that loads need."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Expressions of time, the state and parameters: how they are written, and what they mean."""
+"""Expressions of time, the state and parameters: syntax and meaning."""

@@ -1,4 +1,4 @@
-"""Dimensions of expressions: what can be checked where units are written in them.
+"""Dimensions of expressions, checked wherever units are written in them.
 
 A bare number, and a parameter without a unit, is in SI of whatever dimension fits, so that nothing is known
 of a product with it. Time and the state have their dimensions (angles have none). Sums are checked, arguments
@@ -29,18 +29,18 @@ class DimensionError(ValueError):
 
 @dataclass(frozen=True)
 class Measure:
-    """What is known of a value's dimension.
+    """Knowledge of a value's dimension.
 
     Attributes:
-        powers: of base units, sorted; empty for a number or an angle; None where any is possible.
-        written: whether a unit was written in it.
+        powers: powers of base units, sorted; empty for a number or an angle; None if any is possible.
+        written: whether a unit was written in the value.
     """
 
     powers: units.Powers | None
     written: bool = False
 
     def times(self, other: Measure, power: int = 1) -> Measure:
-        """The product with a power (1 or -1) of another."""
+        """Dimension of the product with a power (1 or -1) of another value."""
         written = self.written or other.written
         if self.powers is None or other.powers is None:
             return Measure(None, written)
@@ -50,7 +50,7 @@ class Measure:
         return Measure(_sorted(found), written)
 
     def power(self, exponent: ExactNumber | None) -> Measure:
-        """A power; an exponent that isn't rational leaves numbers alone known."""
+        """Dimension of a power; for an exponent that isn't rational, only that of a number stays known."""
         if not self.powers:
             return self
         if exponent is None or exponent.pi_power:
@@ -58,10 +58,10 @@ class Measure:
         return Measure(_sorted({base: p * exponent.rational for base, p in self.powers}), self.written)
 
     def with_other(self, other: Measure) -> Measure:
-        """Of a sum, or whatever takes values of one dimension.
+        """Dimension of a sum, or of anything else that takes values of one dimension.
 
         Raises:
-            DimensionError: they have different ones, and a unit is written in either.
+            DimensionError: the dimensions differ, and a unit is written in either value.
         """
         written = self.written or other.written
         if self.powers is None or other.powers is None or self.powers == other.powers:
@@ -83,26 +83,26 @@ _STATE |= dict(zip(FLIGHT_NAMES, ["m"] * 3 + ["m/s"] * 3, strict=True))
 
 
 def of_name(name: str) -> Measure:
-    """Of time or a component of the state."""
+    """Dimension of time or a component of the state."""
     unit = _STATE.get(name)
     return NUMBER if unit is None else Measure(_SI[unit])
 
 
 def of_number(number: ExactNumber) -> Measure:
-    """Of a constant: of its unit, where it has one."""
+    """Dimension of a constant: that of its unit, if it has one."""
     return of_unit(number.unit) if isinstance(number, Quantity) else ANY
 
 
 def of_unit(unit: str) -> Measure:
-    """Of what has this unit written behind it."""
+    """Dimension of a value with this unit written after it."""
     return Measure(units.powers(unit), written=True)
 
 
 def of_function(name: str, arguments: Sequence[Measure]) -> Measure:
-    """Of a function's value.
+    """Dimension of a function's value.
 
     Raises:
-        DimensionError: it can't have such arguments.
+        DimensionError: the function can't have such arguments.
     """
     common = arguments[0]
     for other in arguments[1:]:
@@ -120,25 +120,25 @@ def of_function(name: str, arguments: Sequence[Measure]) -> Measure:
 
 
 def check_unit(measure: Measure, needed: str) -> None:
-    """Whether a value can be what is needed.
+    """Check that a value can have the required dimension.
 
     Raises:
-        DimensionError: its dimension is another, and a unit is written in it.
+        DimensionError: its dimension differs, and a unit is written in it.
     """
     if measure.written and measure.powers is not None and measure.powers != units.powers(needed):
         raise DimensionError(f'the expression is {measure}, where "{needed}" is needed')
 
 
 def end_of_unit(text: str, position: int, names: Collection[str], parameters: Collection[str]) -> int:
-    """Where a unit ends that begins behind a position; the position itself where none does.
+    """Position at which a unit ends that begins after ``position``; ``position`` itself if there is none.
 
     Args:
-        names: of the state and of time, which are never units: t is no tonne.
+        names: names of the state and of time, which are never units: t is no tonne.
         parameters: these are units only within a text that can't be meant otherwise, as ``m`` in "9.81 m/s^2"
             and in "0.1 N m", since products have their sign.
 
     Raises:
-        DimensionError: it can be meant otherwise, as "5 N*m" where m is a parameter.
+        DimensionError: the text is ambiguous, like "5 N*m" if m is a parameter.
     """
     end, certain = position, False
     while (match := _WORD_OF_UNIT.match(text, end)) is not None:
@@ -165,4 +165,4 @@ _SI: dict[str, units.Powers] = {
     "m": (("meter", Fraction(1)),),
     "m/s": (("meter", Fraction(1)), ("second", Fraction(-1))),
 }
-"""Written out, so that expressions without units need no library of units."""
+"""Written out so that expressions without units don't load the units library."""

@@ -77,10 +77,10 @@ _CHECKING = context_for("quadruple")
 
 @dataclass(frozen=True)
 class _Parsed:
-    """What was read of an expression.
+    """A parsed expression.
 
     Attributes:
-        measure: its dimension, as far as it is known.
+        measure: its dimension, as far as known.
         bare: whether it is a number with a unit, without parentheses.
     """
 
@@ -97,14 +97,14 @@ def parse_expression(
     jumps: bool = True,
     unit: str | None = None,
 ) -> Expression:
-    """Read an expression.
+    """Parse an expression.
 
     Args:
         text: one line of at most ``LONGEST_TEXT`` characters (which bounds the tree as well).
-        names: of time and the state, as far as they are allowed here.
-        parameters: named constants; they enter as exact numbers.
-        jumps: whether functions that are constant but for jumps are allowed.
-        unit: in SI, of what the value is; None for any.
+        names: names of time and the state that are allowed here.
+        parameters: named constants, which enter as exact numbers.
+        jumps: whether piecewise constant functions are allowed.
+        unit: SI unit of the value; None for any.
 
     Raises:
         ExpressionError: with what was given, what is allowed, and a caret under the place. Constant parts
@@ -132,7 +132,7 @@ def parse_expression(
 
 
 class _Parser:
-    """Recursive descent over one token of lookahead: its ``kind``, ``token`` (text) and ``start``."""
+    """Recursive descent with one token of lookahead: its ``kind``, ``token`` (text) and ``start``."""
 
     def __init__(
         self, text: str, names: Collection[str], parameters: Mapping[str, ExactNumber], jumps: bool
@@ -178,14 +178,14 @@ class _Parser:
         return self.kind == "sign" and self.token in signs
 
     def measured(self, position: int, of: Callable[[], T]) -> T:
-        """What dimensions give; where they don't agree the error has its place."""
+        """Result of a dimension check; an error is given its place in the text."""
         try:
             return of()
         except DimensionError as error:
             self.fail(str(error), position)
 
     def deeper(self, weakest: int) -> _Parsed:
-        """An expression one level down."""
+        """Parse an expression one level down."""
         self.depth += 1
         if self.depth > DEEPEST_NESTING:
             self.fail(f"nested too deeply; at most {DEEPEST_NESTING} levels are allowed")
@@ -205,7 +205,7 @@ class _Parser:
         return root
 
     def about_units(self, name: str) -> str:
-        """Why a name that could be meant as a unit isn't one here."""
+        """Why a name that could be a unit isn't one here."""
         if name in self.known:
             return f' ("{name}" is no unit here, but a name of this scene)' if units.is_unit(name) else ""
         if units.is_unit(name):
@@ -213,7 +213,7 @@ class _Parser:
         return f'; no unit is called "{name}"'
 
     def binary(self, weakest: int) -> _Parsed:
-        """Operands and the signs that bind more strongly than ``weakest``."""
+        """Parse operands joined by operators that bind more strongly than ``weakest``."""
         start = self.start
         if self.at("+", "-"):
             sign, left = self.advance(), self.deeper(_SIGN_BINDS)
@@ -286,7 +286,7 @@ class _Parser:
         self.fail(f'unknown name "{name}"{near}; allowed: {", ".join(self.known)}', start)
 
     def quantity(self, start: int) -> _Parsed:
-        """A number, and the unit behind it."""
+        """Parse a number and the unit after it."""
         try:
             value = parse_number(self.token, "1")
         except ValueError as error:
@@ -323,7 +323,7 @@ class _Parser:
         return _Parsed(self.bounded(written_out(name, nodes, (start, self.end)), start), measure)
 
     def bounded(self, node: Node, start: int) -> Node:
-        """A node that isn't too large: arguments of piecewise functions are written out several times."""
+        """The node, unless it is too large: piecewise functions repeat their arguments."""
         waiting, count = [node], 0
         while waiting:
             inner = waiting.pop()
@@ -334,7 +334,7 @@ class _Parser:
         return node
 
     def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[_Parsed]:
-        """What stands in parentheses."""
+        """Parse the arguments in parentheses."""
         opened = self.start
         self.advance()
         found = [] if self.at(")") else [self.deeper(0)]

@@ -1,4 +1,4 @@
-"""Functions with kinks and jumps, written out in smooth ones and in signs.
+"""Functions with kinks and jumps, rewritten in smooth functions and signs.
 
 Every kink or jump lies where an argument u passes zero, and ``sign(u)`` is all that is piecewise about it:
 
@@ -24,14 +24,14 @@ Span = tuple[int, int]
 
 
 def written_out(name: str, operands: Sequence[Node], span: Span) -> Node:
-    """A function of the grammar in smooth functions and signs; smooth ones as they are."""
+    """A function of the grammar rewritten in smooth functions and signs; smooth ones are unchanged."""
     write = _WAYS.get(name)
     found = None if write is None else write(operands, span)
     return Operation(name, tuple(operands), span) if found is None else found
 
 
 def power(base: Node, exponent: Node, span: Span) -> Node:
-    """``base^exponent``; even roots of even powers as those of the absolute value."""
+    """``base^exponent``; even roots of even powers are taken of the absolute value."""
     whole = isinstance(exponent, Constant) and exponent.value.pi_power == 0
     if not whole or isinstance(base, Constant) or exponent.value.rational.denominator % 2:  # type: ignore
         return operation("power", (base, exponent), span)
@@ -47,7 +47,7 @@ def power(base: Node, exponent: Node, span: Span) -> Node:
 
 
 def _square_root(node: Node) -> Node | None:
-    """What the node is the square of, up to sign; None where it isn't one by its form."""
+    """The node whose square this one is by its form, up to sign; None if it isn't a square."""
     if isinstance(node, Constant):
         return Operation("sqrt", (node,), node.span) if node.value.sign >= 0 else None
     if not isinstance(node, Operation):
@@ -102,7 +102,7 @@ def _step(u: Node, span: Span) -> Node:
 
 
 def _less(a: Node, b: Node, span: Span) -> Node:
-    """a - b."""
+    """The difference a - b."""
     return operation("sum", (a, _negative(b, b.span)), span)
 
 
@@ -145,7 +145,7 @@ def _atan2(operands: Sequence[Node], span: Span) -> Node | None:
 
 
 def _inverse(operands: Sequence[Node], span: Span, *, sine: bool) -> Node | None:
-    """asin and acos of a sine or cosine: triangle waves."""
+    """asin or acos of a sine or cosine: a triangle wave; None for any other argument."""
     (inner,) = operands
     if not isinstance(inner, Operation) or inner.operator not in ("sin", "cos"):
         return None

@@ -1,6 +1,6 @@
-"""Expressions of time, the state and parameters as trees, and their values.
+"""Expression trees of time, the state and parameters, and their values.
 
-Numbers, parameters and what sums, products, quotients and whole powers make of them stay exact.
+Numbers and parameters stay exact in sums, products, quotients and whole powers.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ LARGEST_POWER = 64
 
 _ONE_ARGUMENT = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt erf sigmoid"
 FUNCTIONS = {**dict.fromkeys(_ONE_ARGUMENT.split(), 1), "atan2": 2}
-"""Every smooth function and the number of its arguments."""
+"""Every smooth function, with its number of arguments."""
 PIECEWISE = {"abs": 1, "sign": 1, "min": 2, "max": 2, "step": 1, "pulse": 3, "wrap": 1}
-"""Those with kinks and jumps; ``rigidsim.scene.expressions.piecewise`` writes them out."""
+"""Functions with kinks and jumps; ``rigidsim.scene.expressions.piecewise`` rewrites them."""
 RESERVED = frozenset({*FUNCTIONS, *PIECEWISE, "pi", "e"})
 """Names that no parameter may have."""
 ONE = ExactNumber(Fraction(1))
@@ -31,14 +31,14 @@ ONE = ExactNumber(Fraction(1))
 RATE_NAMES = ("wx", "wy", "wz")
 ATTITUDE_NAMES = ("qw", "qx", "qy", "qz", "phi", "theta", "psi")
 FLIGHT_NAMES = ("x", "y", "z", "vx", "vy", "vz")
-"""Names of the state in expressions, beside t."""
+"""Names of the flight's states in expressions."""
 
 
 class ExpressionError(ValueError):
     """An expression that can't be read or has no value; the text shows the place.
 
     Attributes:
-        column: of the place, counted from 1; None where the error has no place in the text.
+        column: column of the place, from 1; None if the error has no place in the text.
     """
 
     def __init__(self, what: str, text: str = "", position: int | None = None) -> None:
@@ -68,8 +68,8 @@ class Name:
 
 @dataclass(frozen=True)
 class Operation:
-    """sum or product (of two or more operands), quotient, power, negative, or a function: a smooth one or
-    ``sign``.
+    """An operation: sum or product (of two or more operands), quotient, power, negative, or a smooth function
+    or ``sign``.
     """
 
     operator: str
@@ -82,20 +82,20 @@ Node = Constant | Name | Operation
 
 @dataclass(frozen=True)
 class Expression:
-    """An expression as written and as understood."""
+    """An expression as written and as parsed."""
 
     text: str
     root: Node
 
     def error(self, what: str, node: Node) -> ExpressionError:
-        """An error about a part of the expression, which it names."""
+        """An error about a part of the expression, whose place it shows."""
         part = self.text[slice(*node.span)]
         part = part if len(part) <= 60 else part[:57] + "..."
         return ExpressionError(f'{what} in "{part}"', self.text, node.span[0])
 
 
 def _exact(operator: str, numbers: list[ExactNumber]) -> ExactNumber | None:
-    """The exact result; None where it isn't a rational times a power of pi, or is too long."""
+    """The exact result; None if it isn't a rational times a power of pi, or is too long."""
     if any(number.swept for number in numbers):
         from rigidsim.scene.tracing.exact import exactly
 
@@ -123,7 +123,7 @@ def _bits(x: Fraction) -> int:
 
 
 def operation(operator: str, operands: tuple[Node, ...], span: tuple[int, int]) -> Node:
-    """The operation, or the number that it exactly is; chains are one sum, or one product after a number."""
+    """The operation, or its exact value as a number; chains become one sum, or one product after a number."""
     numbers = [operand.value for operand in operands if isinstance(operand, Constant)]
     exact = _exact(operator, numbers) if len(numbers) == len(operands) else None
     if exact is not None:
@@ -148,7 +148,9 @@ def _chain(operator: str, node: Node) -> tuple[Node, ...]:
 
 
 def fold(expression: Expression, combine: Callable[[Node, list[Any]], Any]) -> Any:
-    """``combine(node, its operands' results)`` at the root; operands go first, nothing recurses."""
+    """Fold the tree: ``combine(node, results of its operands)`` from the leaves to the root, without
+    recursion.
+    """
     results: list[Any] = []
     waiting: list[tuple[Node, bool]] = [(expression.root, False)]
     while waiting:
@@ -164,14 +166,14 @@ def fold(expression: Expression, combine: Callable[[Node, list[Any]], Any]) -> A
 
 
 def names_used(expression: Expression) -> frozenset[str]:
-    """Names of time and the state that the expression reads; parameters are numbers by now."""
+    """Names of time and the state that the expression reads; parameters are already numbers."""
     found: set[str] = set()
     fold(expression, lambda node, _: found.add(node.name) if isinstance(node, Name) else None)
     return frozenset(found)
 
 
 def constant_value(expression: Expression, context: Any) -> Any:
-    """The value of an expression without names, as mpf; None where a name occurs.
+    """The value (mpf) of an expression without names; None if it contains a name.
 
     Raises:
         ExpressionError: a constant part has no finite value.
@@ -180,10 +182,10 @@ def constant_value(expression: Expression, context: Any) -> Any:
 
 
 def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) -> Any:
-    """The value where the names have these values (mpf), as an mpf of the context.
+    """The value (mpf of the context) for given values of the names.
 
     Raises:
-        ExpressionError: no finite value; the text names the part at fault.
+        ExpressionError: there is no finite value; the text names the part at fault.
     """
 
     def combine(node: Node, operands: list[Any]) -> Any:
@@ -198,10 +200,10 @@ def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) ->
 
 
 def operate(expression: Expression, node: Operation, operands: list[Any], context: Any) -> Any:
-    """One operation on mpf operands.
+    """Apply one operation to mpf operands.
 
     Raises:
-        ExpressionError: no finite value, or one beyond 2**20000.
+        ExpressionError: the value isn't finite, or exceeds 2**20000.
     """
     operator, first, last = node.operator, operands[0], operands[-1]
     refused, why = _REFUSED.get(operator, (None, ""))
@@ -242,4 +244,4 @@ _REFUSED: dict[str, tuple[Callable[[Any, Any], bool], str]] = {
     "sinh": (lambda x, _: abs(x) > _LARGEST_EXPONENTIAL, _TOO_LARGE),
     "cosh": (lambda x, _: abs(x) > _LARGEST_EXPONENTIAL, _TOO_LARGE),
 }
-"""Where an operation on its first and last operand has no real, finite value."""
+"""Conditions under which an operation on its first and last operand has no real, finite value."""

@@ -1,1 +1,1 @@
-"""Orbits given by tables of elements, and what is interpolated between their rows."""
+"""Orbits given by tables of elements, and the interpolation between their rows."""

@@ -1,4 +1,4 @@
-"""How far off elements are between the rows of a table: every other row is left out, and interpolated.
+"""Interpolation errors of tabulated elements, measured by leaving out and interpolating every other row.
 
 Names of the elements without singularities, see ``rigidsim.scene.orbit_tables.pieces``.
 """
@@ -22,12 +22,12 @@ _LARGEST_ERROR = 0.1  # rad, of the direction when every other row is left out
 
 @dataclass(frozen=True)
 class InterpolationError:
-    """What was found where every other row was left out and interpolated from the others.
+    """Interpolation errors when every other row is left out and interpolated from the others.
 
     Attributes:
-        direction: of the source, rad, the largest.
-        distance: relative, the largest.
-        expected: by which both become smaller with all rows in, where they follow smooth functions.
+        direction: largest error of the source's direction, rad.
+        distance: largest relative error of the distance.
+        expected: factor by which both shrink with all rows present, if the rows follow smooth functions.
     """
 
     direction: float
@@ -38,12 +38,12 @@ class InterpolationError:
 def interpolation_error(
     times: Sequence[Any], elements: Mapping[str, Sequence[Any]], moving: Collection[str]
 ) -> InterpolationError:
-    """What interpolation misses.
+    """Measure the interpolation errors of a table.
 
     Args:
         times: mpf, s.
-        elements: of each row (mpf, SI); the mean longitude where it is one of those that move.
-        moving: those that change.
+        elements: elements of each row (mpf, SI); with the mean longitude if it is one that changes.
+        moving: names of those that change.
 
     Raises:
         TableError: rows so far apart that the table means little between them.
@@ -63,7 +63,7 @@ def interpolation_error(
     for i, name in enumerate(moving):
         guessed[name] = found[:, i]
     direction = distance = 0.0
-    # where the anomaly isn't tabulated the worst of several places on the orbit counts
+    # if the anomaly isn't tabulated, the worst of several places on the orbit counts
     phases = [0.0] if timed else [i * math.pi / 4 for i in range(8)]
     base = np.zeros(len(rows))
     if timed:

@@ -1,4 +1,4 @@
-"""Tables of orbital elements over time, as CSV: a header of names with units, then one row for each time.
+"""Tables of orbital elements over time in CSV: a header of names with units, then one row for each time.
 
     # comments begin with a hash
     time [kyr], semi_major_axis [au], eccentricity, inclination [deg], ascending_node [deg]
@@ -34,9 +34,9 @@ UNITS = {
     "mean_anomaly": "rad",
     "mean_longitude": "rad",
 }
-"""Columns that a table may have, and the SI units that they are read into."""
+"""Columns that a table may have, with the SI units into which they are read."""
 FEWEST_ROWS = 8
-"""So that every other row is still enough for an interpolation to be held against the rest."""
+"""Least number of rows, so that every other row still suffices for a check of the interpolation."""
 
 _HEAD = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
 _DECIMAL = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?")
@@ -53,8 +53,8 @@ class ElementTable:
 
     Attributes:
         times: ascending, s (mpf).
-        columns: the others by name, SI (mpf), one value for each time.
-        context: mpmath context that they belong to.
+        columns: the other columns by name, SI (mpf), one value for each time.
+        context: mpmath context of the numbers.
     """
 
     times: Sequence[Any]
@@ -67,7 +67,7 @@ def read_table(text: str, bits: int) -> ElementTable:
     """Read a table's text.
 
     Args:
-        bits: of the numbers' precision.
+        bits: bits of the numbers' precision.
 
     Raises:
         TableError: with the line at fault.

@@ -1,4 +1,4 @@
-"""Smooth interpolation of tables: polynomials of fifth degree between neighbouring rows.
+"""Smooth interpolation of tables by polynomials of fifth degree between neighbouring rows.
 
 Each has the rows' values and, at both ends, the first and second derivatives of the polynomial through the
 seven nearest rows (as many as there are, in shorter tables), so that the whole is twice differentiable. It is
@@ -15,14 +15,14 @@ import numpy as np
 
 NEAREST = 7
 ORDER = 6
-"""By which power of the rows' distance errors fall."""
+"""Order of convergence in the rows' spacing."""
 
 
 class Interpolation:
-    """Between rows of numbers of any kind (floats, or mpf in an array of objects).
+    """Interpolation between rows of numbers of any kind (floats, or mpf in an array of objects).
 
     Args:
-        times: ascending, at least four.
+        times: at least four, ascending.
         values: (times, columns).
     """
 
@@ -35,7 +35,7 @@ class Interpolation:
 
     @property
     def pieces(self) -> int:
-        """How many there are."""
+        """Number of pieces."""
         return len(self.times) - 1
 
     def piece(self, number: int) -> np.ndarray:
@@ -45,14 +45,14 @@ class Interpolation:
         (d0, s0), (d1, s1) = self._at(number), self._at(number + 1)
         square = length * length / 2
         a, b = d0 * length, s0 * square  # arrays first: mpmath would print one that it doesn't know
-        # what is left at the far end for the powers 3 to 5: value, derivative, and half the second derivative
+        # remainder at the far end for the powers 3 to 5: value, derivative, and half the second derivative
         u = y1 - (y0 + a + b)
         v = d1 * length - (a + b * 2)
         w = s1 * square - b
         return np.array([y0, a, b, u * 10 - v * 4 + w, v * 7 - u * 15 - w * 2, u * 6 - v * 3 + w])
 
     def _at(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """First and second derivatives (columns,) at a row."""
+        """First and second derivatives (columns,) at a row, by finite differences."""
         if row not in self._derivatives:
             first = min(max(row - self._count // 2, 0), len(self.times) - self._count)
             near = range(first, first + self._count)
@@ -62,7 +62,7 @@ class Interpolation:
         return self._derivatives[row]
 
     def _differentiation(self, offsets: tuple[Any, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Weights of the values at offsets from a row, for its first and second derivative."""
+        """Weights of the values at offsets from a row in its first and second derivative."""
         if offsets not in self._weights:
             here = next(i for i, x in enumerate(offsets) if x == 0)
             products = [_product([x - y for y in offsets if y != x]) for x in offsets]
@@ -88,7 +88,7 @@ def _product(factors: Sequence[Any]) -> Any:
 
 
 def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What interpolation makes of every other row when these are left out.
+    """Values that interpolation gives for every other row when these are left out.
 
     Args:
         times: (n,) float64, ascending; values: (n, columns).

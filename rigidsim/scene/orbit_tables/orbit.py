@@ -1,4 +1,4 @@
-"""From the keys of a load to the orbit that its table gives."""
+"""The orbit given by a load's table and keys."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ def tabulated_orbit(
     constants: tuple[tuple[str, ExactNumber], ...],
     strength: tuple[Any, ...] | None,
 ) -> TabulatedOrbit:
-    """An orbit by a table, made once however often a scene is built.
+    """A tabulated orbit, made once however often a scene is built.
 
     Args:
-        name, text: of the table.
-        bits: of the scene's precision.
-        constants: elements that the table doesn't have, by their names, and maybe the period.
-        strength: gravitational parameter of Kepler's third law, m^3/s^2, as the parts of an mpf; None where
+        name, text: name and text of the table.
+        bits: bits of the scene's precision.
+        constants: elements that the table lacks, by name, and possibly the period.
+        strength: gravitational parameter of Kepler's third law, m^3/s^2, as the parts of an mpf; None if
             none is known.
 
     Raises:
-        TableError: says what is wrong with it.
+        TableError: says what is wrong with the table.
     """
     table = read_table(text, bits)
     context = table.context
@@ -70,7 +70,7 @@ def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroun
     """Work out the orbit of a table.
 
     Args:
-        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None where none is known.
+        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
 
     Raises:
         ConfigError: no such table, a bad one, or one that doesn't cover the run.

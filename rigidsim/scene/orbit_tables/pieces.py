@@ -1,6 +1,6 @@
-"""An orbit whose elements a table gives over time, in elements without singularities.
+"""Tabulated orbits in elements without singularities, interpolated over time.
 
-With longitude of periapsis pi, node W and inclination i these are (Broucke & Cefalu 1972, Celestial Mechanics
+With longitude of periapsis pi, node W and inclination i they are (Broucke & Cefalu 1972, Celestial Mechanics
 5, 303, with sin(i/2) in place of the tangent)
 
     k = e cos pi, h = e sin pi,   q = sin(i/2) cos W, p = sin(i/2) sin W,   a,   mean longitude l = M + pi.
@@ -37,13 +37,13 @@ _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
 
 
 class TabulatedOrbit:
-    """Elements over time; numbers are mpf of the scene's precision, SI.
+    """An orbit with elements over time; numbers are mpf of the scene's precision, SI.
 
     Attributes:
-        key: what it is made of; orbits with the same key are the same.
-        name: of the table.
+        key: everything the orbit is made from; orbits with equal keys are the same.
+        name: name of the table.
         table: its numbers.
-        motion: from a semi-major axis (m) to the mean motion (rad/s).
+        motion: function from the semi-major axis (m) to the mean motion (rad/s).
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class TabulatedOrbit:
         self._rows = self._regular()
         moving = [name for name, values in self._rows.items() if isinstance(values, list)]
         self.moving: tuple[str, ...] = tuple(moving)
-        """The elements that change: among axis, k, h, q, p, longitude."""
+        """The elements that change, among axis, k, h, q, p, longitude."""
         columns = np.array([self._rows[name] for name in moving], dtype=object).T
         self._interpolation = Interpolation(list(table.times), columns)
         self._pieces: dict[int, dict[str, list[Any]]] = {}
@@ -74,11 +74,11 @@ class TabulatedOrbit:
     # --- rows -----------------------------------------------------------------------------------------------
 
     def _column(self, name: str) -> Any:
-        """Values of a column, one constant, or None."""
+        """Values of a column, one constant, or None if there is neither."""
         return self.table.columns.get(name, self._constants.get(name))
 
     def _regular(self) -> dict[str, Any]:
-        """The elements of the module: for each a list over the rows, or one constant."""
+        """The regular elements: for each a list over the rows, or one constant."""
         context, count = self.context, len(self.table.times)
         zero = context.zero
 
@@ -122,7 +122,7 @@ class TabulatedOrbit:
                 raise TableError(f"{at}{name} is out of range; {words} is allowed")
 
     def _unwrapped(self, longitude: list[Any], axis: Any) -> list[Any]:
-        """With the whole turns that Kepler's law gives between the rows."""
+        """The mean longitude with the whole turns between rows that Kepler's law gives."""
         context, times = self.context, self.table.times
         axes = axis if isinstance(axis, list) else [axis] * len(times)
         rates, turn = [self.motion(a) for a in axes], 2 * context.pi
@@ -144,7 +144,7 @@ class TabulatedOrbit:
     # --- pieces ---------------------------------------------------------------------------------------------
 
     def piece(self, number: int) -> dict[str, list[Any]]:
-        """Of each moving element the coefficients of the powers 0 to 5 of (t - t_i) / (t_{i+1} - t_i)."""
+        """For each changing element, the coefficients of the powers 0 to 5 of (t - t_i) / (t_{i+1} - t_i)."""
         if number not in self._pieces:
             coefficients = self._interpolation.piece(number)
             self._pieces[number] = {name: list(coefficients[:, i]) for i, name in enumerate(self.moving)}
@@ -155,11 +155,11 @@ class TabulatedOrbit:
         return {name: x[number] if isinstance(x, list) else x for name, x in self._rows.items()}
 
     def number_at(self, time: Any) -> int:
-        """Of the piece that a time lies in; the first or last beyond the table's ends."""
+        """Number of the piece that contains a time; the first or last beyond the table's ends."""
         return min(max(bisect_right(self.table.times, time) - 1, 0), len(self.table.times) - 2)
 
     def at(self, time: Any) -> dict[str, Any]:
-        """All elements at a time (s): moving ones as interpolated, and the constant ones."""
+        """All elements at a time (s), interpolated or constant."""
         number, times = self.number_at(time), self.table.times
         x = (time - times[number]) / (times[number + 1] - times[number])
         found = {name: values for name, values in self._rows.items() if name not in self.moving}
@@ -168,7 +168,7 @@ class TabulatedOrbit:
         return found
 
     def eccentric_longitude(self, elements: Mapping[str, Any], longitude: Any) -> Any:
-        """K of l = K - k sin K + h cos K (Kepler's equation)."""
+        """Eccentric longitude K from l = K - k sin K + h cos K (Kepler's equation)."""
         context, k, h = self.context, elements["k"], elements["h"]
         e = context.sqrt(k * k + h * h)
         if e == 0:
@@ -177,8 +177,8 @@ class TabulatedOrbit:
         return eccentric_anomaly(context, longitude - periapsis, e) + periapsis
 
     def starting_longitude(self, time: Any) -> Any:
-        """The mean longitude at a time; where no column gives it, from the anomaly at time zero of the scene
-        by the mean motion of that time's axis.
+        """The mean longitude at a time; if no column gives it, from the anomaly at the scene's time zero and
+        the mean motion for the axis at this time.
         """
         elements = self.at(time)
         if LONGITUDE in elements:
@@ -193,7 +193,7 @@ class TabulatedOrbit:
 
     @property
     def described(self) -> str:
-        """For ``plan``: the table, and how well interpolation does between its rows."""
+        """Description for ``plan``: the table, and the errors of interpolation between its rows."""
         times, error = self.table.times, self.error
         nstr = self.context.nstr
         return (
@@ -211,20 +211,20 @@ class TabulatedOrbit:
 
     @cached_property
     def semi_major_axis(self) -> Any:
-        """The constant, or the mean over the rows, m."""
+        """Semi-major axis, constant or the mean over the rows, m."""
         axes = self._each(AXIS)
         return sum(axes, self.context.zero) / len(axes)
 
     @cached_property
     def largest_eccentricity(self) -> Any:
-        """Over the rows."""
+        """Largest eccentricity over the rows."""
         count = max(len(self._each("k")), len(self._each("h")))
         k, h = (x if len(x) == count else x * count for x in (self._each("k"), self._each("h")))
         return max(self.context.sqrt(a * a + b * b) for a, b in zip(k, h, strict=True))
 
     @property
     def smallest_axis(self) -> Any:
-        """Over the rows, m."""
+        """Smallest semi-major axis over the rows, m."""
         return min(self._each(AXIS))
 
     @property
@@ -233,14 +233,14 @@ class TabulatedOrbit:
         return self.smallest_axis * (1 - self.largest_eccentricity)
 
     def normal(self, time: Any) -> list[Any]:
-        """Unit vector at a time (s) about which the body goes in the direct sense, space axes."""
+        """Unit normal at a time (s) about which the motion is direct, space axes."""
         q, p = (self.at(time)[name] for name in TILTED)
         chi = self.context.sqrt(1 - p * p - q * q)
         return [2 * p * chi, -2 * q * chi, 1 - 2 * (p * p + q * q)]
 
     @property
     def mean_motion(self) -> Any:
-        """Of the mean axis, rad/s."""
+        """Mean motion for the mean axis, rad/s."""
         return self.motion(self.semi_major_axis)
 
     def fastest_rate(self) -> Any:
@@ -250,13 +250,13 @@ class TabulatedOrbit:
 
     @cached_property
     def normal_drift(self) -> Any:
-        """Bound of the rate at which the plane turns, rad/s: twice what neighbouring rows show."""
+        """Bound of the rate at which the plane turns, rad/s: twice that between neighbouring rows."""
         return 4 * self._fastest(TILTED)
 
     @cached_property
     def shape_drift(self) -> Any:
-        """Bound of the rate at which the periapsis turns where the orbit is most eccentric, rad/s: twice what
-        neighbouring rows show.
+        """Bound of the rate at which the periapsis turns where the orbit is most eccentric, rad/s: twice that
+        between neighbouring rows.
         """
         e = self.largest_eccentricity
         return 2 * self._fastest(EXCENTRIC) / e if e > 0 else self.context.zero
@@ -274,13 +274,15 @@ class TabulatedOrbit:
 
     @property
     def longitude_exponent(self) -> int:
-        """Binary, of a unit of which the mean longitude passes less than one over the whole table, rad."""
+        """Binary exponent of the unit of the mean longitude (rad), chosen so that it passes less than one
+        unit over the whole table.
+        """
         span = self.table.times[-1] - self.table.times[0]
         return int(self.context.mag(self.motion(self.smallest_axis) * span)) + 1
 
     @cached_property
     def error(self) -> InterpolationError:
-        """Of interpolation, see ``InterpolationError``.
+        """Interpolation errors, see ``InterpolationError``.
 
         Raises:
             TableError: rows so far apart that the table means little between them.

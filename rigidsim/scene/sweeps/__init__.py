@@ -1,1 +1,1 @@
-"""What ``[sweep]`` makes of one config: its members, each with exact values."""
+"""Members of a ``[sweep]``, each with exact values."""

@@ -1,4 +1,4 @@
-"""What the schema says of a swept key: the unit of its numbers, and how many they are."""
+"""Unit and length of a swept key, from the schema."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def _json_schema(model: Any) -> dict[str, Any]:
 
 
 def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
-    """SI unit of the numbers that a key takes ("1" for none), and how many they are (0: a plain number).
+    """SI unit of the numbers that a key takes ("1" for none), and their count (0 for a plain number).
 
     Args:
-        tables: of the config: which keys a load has depends on its kind.
+        tables: tables of the config, since a load's keys depend on its kind.
 
     Raises:
         ValueError: no such key.
@@ -48,7 +48,7 @@ def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
 def _refuse_unknown(
     key: str, nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any], value: Any
 ) -> None:
-    """For a key that none of the tables has that may stand there."""
+    """Raise an error for a key that no table at this place has."""
     allowed = sorted({n for node in _alternatives(nodes, schema, value) for n in node.get("properties", {})})
     if allowed:
         raise ValueError(f'unknown key "{key[:60]}"{nearest(key, allowed)}; allowed: {", ".join(allowed)}')
@@ -65,7 +65,7 @@ def _inside(value: Any, step: str | int) -> Any:
 def _alternatives(
     nodes: Sequence[Mapping[str, Any]], schema: Mapping[str, Any], value: Any
 ) -> Iterator[Mapping[str, Any]]:
-    """What nodes refer to, without those that another kind of table is for."""
+    """Schemas that nodes refer to, without those for another kind of table."""
     for node in nodes:
         if "$ref" in node:
             yield from _alternatives([schema["$defs"][node["$ref"].rpartition("/")[2]]], schema, value)

@@ -1,4 +1,4 @@
-"""A sweep: the members of ``[sweep]``, each a single experiment that is known by its exact values."""
+"""A sweep: the members of ``[sweep]``, each a single experiment identified by its exact values."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Axis:
     """One swept key.
 
     Attributes:
-        key: dotted, with indices from 0.
-        name: of its dimension (product) or variable (zip).
+        key: dotted key, with indices from 0.
+        name: name of its dimension (product) or variable (zip).
         unit: SI unit of its numbers; "1" for none.
     """
 
@@ -47,12 +47,14 @@ class Axis:
 
     @property
     def numeric(self) -> bool:
-        """Whether its values are numbers, or vectors of them."""
+        """Whether its values are numbers or vectors."""
         return self.values.entry is not None
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """The keys of its numbers, one by one: ``initial.angular_velocity[0]`` ...; none without numbers."""
+        """The keys of its single numbers: ``initial.angular_velocity[0]`` ...; empty if values aren't
+        numbers.
+        """
         if not self.numeric:
             return ()
         components = self.values.components
@@ -70,8 +72,8 @@ class Sweep:
 
     Attributes:
         experiment: the config as it was given, with its ``[sweep]``.
-        base: the single experiment that the members are variations of.
-        axes: in the order in which the config has them; the last runs fastest in a product.
+        base: the single experiment that the members vary.
+        axes: axes in the order of the config; the last varies fastest in a product.
     """
 
     experiment: Experiment
@@ -83,8 +85,8 @@ class Sweep:
         """The sweep of a config.
 
         Raises:
-            ConfigError: it has none, or one that names no members; every problem found. Whether members can
-                be run is for ``experiment(member)`` to tell.
+            ConfigError: there is no sweep, or one without members; every problem found. Whether members can
+                be run is told by ``experiment(member)``.
         """
         table = experiment.config.sweep
         if table is None:
@@ -126,7 +128,7 @@ class Sweep:
 
     @property
     def product(self) -> bool:
-        """Whether its members are all combinations."""
+        """Whether the members are all combinations of the axes' values."""
         return self.table.mode == "product"
 
     @property
@@ -142,11 +144,11 @@ class Sweep:
 
     @property
     def count(self) -> int:
-        """Of members."""
+        """Number of members."""
         return math.prod(self.shape)
 
     def indices(self, member: int) -> tuple[int, ...]:
-        """Which value of each axis a member has; the last axis runs fastest."""
+        """Index of each axis's value for a member; the last axis varies fastest."""
         if not self.product:
             return (member,) * len(self.axes)
         found = []
@@ -156,18 +158,18 @@ class Sweep:
         return tuple(reversed(found))
 
     def texts(self, member: int) -> tuple[str, ...]:
-        """The values that a member is known by, as a config says them, in the order of the axes."""
+        """The values that identify a member, as written in a config, in the order of the axes."""
         return tuple(axis.values.text(i) for axis, i in zip(self.axes, self.indices(member), strict=True))
 
     def overrides(self, member: int) -> list[str]:
-        """``KEY=VALUE`` texts that make the base experiment the member."""
+        """``KEY=VALUE`` texts that turn the base experiment into the member."""
         return [f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(member), strict=True)]
 
     def experiment_of(self, member: int) -> Experiment:
         """The member as a single experiment.
 
         Raises:
-            ConfigError: a value that its key doesn't take; says which member it is.
+            ConfigError: a key doesn't take its value; names the member.
         """
         try:
             return self.base.having(self.overrides(member))
@@ -175,10 +177,10 @@ class Sweep:
             raise self.blamed(member, error) from None
 
     def worked_out(self, member: int) -> Experiment:
-        """As ``experiment_of`` in a tenth of the time, without the member's own text: to try it out.
+        """Like ``experiment_of`` in a tenth of the time, without the member's own text: for checks.
 
         Raises:
-            ConfigError: as there.
+            ConfigError: as for ``experiment_of``.
         """
         try:
             table = parse_toml(self.base.text, self.base.source)
@@ -188,7 +190,7 @@ class Sweep:
             raise self.blamed(member, error) from None
 
     def blamed(self, member: int, error: ConfigError) -> MemberError:
-        """The error naming the member beside the key; one that does is left as it is."""
+        """The error with the member named besides the key, unless it names the member already."""
         if isinstance(error, MemberError):
             return error
         named = ", ".join(
@@ -203,16 +205,16 @@ class Sweep:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The dotted keys of all swept numbers, axis by axis; vectors by their components."""
+        """Dotted keys of all swept numbers, axis by axis; vectors by component."""
         return tuple(key for axis in self.axes for key in axis.columns)
 
     @property
     def numeric(self) -> bool:
-        """Whether members differ in numbers alone."""
+        """Whether members differ only in numbers."""
         return all(axis.numeric for axis in self.axes)
 
     def exact(self, members: Sequence[int]) -> list[list[ExactNumber]]:
-        """The swept numbers of some members, SI, a list for each of ``columns``.
+        """Swept numbers of some members, SI, one list for each of ``columns``.
 
         Raises:
             ValueError: the sweep isn't ``numeric``.
@@ -241,7 +243,7 @@ def _plain_key(key: str) -> str:
     """A key without blanks.
 
     Raises:
-        ConfigError, ValueError: it is no key of a member.
+        ConfigError, ValueError: members have no such key.
     """
     steps = key_steps(key, "axes")
     first = str(steps[0])
@@ -255,7 +257,7 @@ def _default_name(key: str) -> str:
 
 
 def _clashes(axes: Sequence[Axis]) -> list[Problem]:
-    """Names given twice, and keys of which one holds the other."""
+    """Names given twice, and keys that contain one another."""
     problems: list[Problem] = []
     names: dict[str, str] = {}
     keys: dict[str, tuple[str | int, ...]] = {}
@@ -276,7 +278,7 @@ def _clashes(axes: Sequence[Axis]) -> list[Problem]:
 
 
 def _counts(table: SweepTable, axes: Sequence[Axis]) -> list[Problem]:
-    """Axes that don't fit each other, or make too many members."""
+    """Axes of incompatible lengths, or with too many members."""
     sizes = [axis.values.count for axis in axes]
     if table.mode == "zip":
         if len(set(sizes)) > 1:
@@ -298,7 +300,7 @@ def _taken(name: str) -> Problem:
 
 
 def _without_sweep(experiment: Experiment) -> Experiment:
-    """The config without its ``[sweep]``, and everything else as it was written."""
+    """The config without its ``[sweep]``, everything else as written."""
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 

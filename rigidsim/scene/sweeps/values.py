@@ -1,6 +1,6 @@
-"""The values that an axis of a sweep takes: exact numbers, each with the text that a config would say it in.
+"""Values of a sweep's axis: exact numbers, each with its text in a config.
 
-A value is the same number whatever else the axis holds, so that a member is known by its values: an axis that
+A value is the same number whatever else the axis holds, so that its values identify a member: an axis that
 is prolonged keeps those that it had, random ones included, which depend on seed, key and index alone.
 """
 
@@ -24,22 +24,23 @@ from rigidsim.scene.validation_messages import shown
 DIGITS = 40
 """Significant decimal digits of values that aren't rational: of logspace, and on a sphere."""
 _DRAWN = 10**14
-"""Draws from the normal distribution are rounded to such a part of the deviation: fewer digits than double
-precision has, so that mathematical libraries that differ in the last bit draw the same."""
+"""Draws from the normal distribution are rounded to this fraction of the deviation: fewer digits than double
+precision has, so that mathematical libraries that differ in the last bit give the same draws.
+"""
 _PLACES = 10**18
-"""In so many equal parts the interval from 0 to 1 is divided for uniform draws."""
+"""Number of equal parts into which uniform draws divide the interval from 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Written:
-    """A number in the unit that it is written in; ``unit`` is empty where none is."""
+    """A number in the unit in which it is written; ``unit`` is empty if there is none."""
 
     number: ExactNumber
     unit: str = ""
 
     @classmethod
     def of(cls, value: Any) -> Written:
-        """A TOML value as a number.
+        """Read a TOML value as a number.
 
         Raises:
             ValueError: it is none.
@@ -48,7 +49,7 @@ class Written:
 
     @property
     def exact(self) -> ExactNumber:
-        """In SI units.
+        """The number in SI units.
 
         Raises:
             ValueError: no such unit.
@@ -57,7 +58,7 @@ class Written:
 
     @property
     def text(self) -> str:
-        """As a config says it."""
+        """The number as written in a config."""
         plain = decimal_text(self.number.rational)
         if self.number.pi_power:
             power = "" if self.number.pi_power == 1 else f"^{self.number.pi_power}"
@@ -68,7 +69,7 @@ class Written:
 
 
 def nearest_double(number: ExactNumber) -> float:
-    """For labels: the double nearest to a number."""
+    """The double nearest to a number, for labels."""
     value = number.rational
     if number.pi_power:
         value = fraction_of(number.at(_labelling()))
@@ -94,13 +95,13 @@ Entry = tuple[Written, ...]
 
 @dataclass(frozen=True)
 class AxisValues:
-    """The values of an axis.
+    """Values of an axis.
 
     Attributes:
-        count: how many there are.
-        components: of each; 0 for plain numbers, and for what is no number.
-        entry: the numbers of one of them; None where they are no numbers.
-        word: the TOML text of one of them that is no number; None where they are numbers.
+        count: number of values.
+        components: components of each value; 0 for plain numbers, and for values that aren't numbers.
+        entry: function that gives the numbers of a value; None if values aren't numbers.
+        word: function that gives the TOML text of a value that isn't a number; None for numbers.
     """
 
     count: int
@@ -109,7 +110,7 @@ class AxisValues:
     word: Callable[[int], str] | None = None
 
     def text(self, index: int) -> str:
-        """One of them as a config says it, by which it is known."""
+        """A value as written in a config, which identifies it."""
         if self.entry is None:
             assert self.word is not None
             return self.word(index)
@@ -118,12 +119,12 @@ class AxisValues:
 
 
 def axis_values(table: AxisTable, key: str, seed: int, length: int) -> AxisValues:
-    """What a table of ``[sweep] axes`` asks for.
+    """The values that a table of ``[sweep] axes`` asks for.
 
     Args:
-        key: whose values they are.
-        seed: of random values.
-        length: components of the vector that the key takes; 0 where it takes a number.
+        key: the swept key.
+        seed: seed of random values.
+        length: components of the vector that the key takes; 0 if it takes a number.
 
     Raises:
         ValueError: says what was given, and what is allowed.
@@ -163,7 +164,7 @@ def axis_values(table: AxisTable, key: str, seed: int, length: int) -> AxisValue
 
 
 Rational = tuple[Fraction, int, str]
-"""A number with its power of pi and its unit."""
+"""A rational number with its power of pi and its unit."""
 
 
 def _numbers(count: int, value: Callable[[int], Fraction], like: Rational) -> AxisValues:
@@ -174,10 +175,10 @@ def _numbers(count: int, value: Callable[[int], Fraction], like: Rational) -> Ax
 
 
 def _alike(*given: Any) -> tuple[Rational, ...]:
-    """Numbers in one unit, times one power of pi.
+    """Numbers in a common unit, times a common power of pi.
 
     Raises:
-        ValueError: they can't be told so.
+        ValueError: there is no such common form.
     """
     written = [Written.of(value) for value in given]
     if len({w.unit for w in written}) > 1 or len({w.number.pi_power for w in written if w.number.sign}) > 1:
@@ -198,7 +199,9 @@ def _counted(count: Any) -> int:
 
 
 def _listed(given: Sequence[Any]) -> AxisValues:
-    """Numbers or vectors of them where all can be read so, else whatever a config may hold."""
+    """A list's values: numbers or vectors if all can be read as such, otherwise anything that a config may
+    hold.
+    """
     from rigidsim.scene.python_values import inline_text
 
     if len(given) > LARGEST_AXIS:
@@ -211,7 +214,7 @@ def _listed(given: Sequence[Any]) -> AxisValues:
         return AxisValues(len(given), 0, numbers.__getitem__)
     except ValueError:
         if all(isinstance(value, int | float) or hasattr(value, "is_finite") for value in given):
-            raise  # such as nan, which no key takes
+            raise  # for instance nan, which no key takes
         words = [inline_text(value) for value in given]
         return AxisValues(len(given), 0, None, words.__getitem__)
 
@@ -248,7 +251,7 @@ _UNIT, _WIDE = 10**DIGITS, 10 ** (DIGITS + 5)
 
 
 def _uniform(seed: int, key: str, index: int, component: int) -> int:
-    """Between 0 and 1, neither included, in units of ``1 / (2 _PLACES)``."""
+    """Uniform draw between 0 and 1, both excluded, in units of ``1 / (2 _PLACES)``."""
     name = f"{seed}\n{key}\n{index}\n{component}".encode()
     drawn = int.from_bytes(hashlib.blake2b(name, digest_size=8).digest(), "big")
     return 2 * (drawn * _PLACES >> 64) + 1
@@ -258,7 +261,7 @@ _quantile = NormalDist().inv_cdf  # Wichura 1988, algorithm AS 241
 
 
 def _normal(seed: int, key: str, index: int, component: int) -> int:
-    """Of mean 0 and deviation 1, in units of ``1 / _DRAWN``."""
+    """Normal draw of mean 0 and deviation 1, in units of ``1 / _DRAWN``."""
     share = _uniform(seed, key, index, component)
     below = share < _PLACES
     size = round(_quantile((share if below else 2 * _PLACES - share) / (2 * _PLACES)) * _DRAWN)
@@ -304,7 +307,7 @@ _SUCH_AS = {"normal": "[[0, 0, 1], [0.1, 0.1, 0.1]]", "uniform": "[[0, 0, 0], [1
 
 
 def _random_directions(radius: Written, key: str, seed: int, length: int) -> Callable[[int], Entry]:
-    """Points at equal density on the sphere: normal draws, brought to its radius."""
+    """Random points of uniform density on a sphere: normal draws scaled to its radius."""
 
     def entry(index: int) -> Entry:
         whole = [_normal(seed, key, index, component) for component in range(length)]
@@ -316,7 +319,7 @@ def _random_directions(radius: Written, key: str, seed: int, length: int) -> Cal
 
 
 def _grid_of_directions(radius: Written, polar: int, azimuths: int) -> Callable[[int], Entry]:
-    """The centres of cells of equal area; the azimuth runs fastest."""
+    """Centres of cells of equal area on a sphere; the azimuth varies fastest."""
     context = mpmath.MPContext()
     context.dps = DIGITS + 20
 

@@ -1,1 +1,1 @@
-"""Numbers of a scene that is worked out once for all members of a sweep."""
+"""Tracing: numbers of a scene that is worked out once for all members of a sweep."""

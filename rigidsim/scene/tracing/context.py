@@ -1,4 +1,4 @@
-"""The arithmetic of a scene that is worked out for all members of a sweep at once (see ``numbers``)."""
+"""Arithmetic of a scene that is worked out for all members of a sweep at once (see ``numbers``)."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class TracingContext:
         return Traced(self.graph, self.graph.node(name, nodes, result))
 
     def mpf(self, value: Any) -> Any:
-        """As mpmath's."""
+        """See mpmath."""
         return value if isinstance(value, Traced) else self._plain.mpf(value)
 
     convert = mpf
 
     def nstr(self, value: Any, *arguments: Any, **options: Any) -> str:
-        """For messages: of the representative."""
+        """The representative's number as text, for messages."""
         return str(self._plain.nstr(plain(value), *arguments, **options))
 
     def ldexp(self, value: Any, exponent: Any) -> Any:
@@ -61,14 +61,14 @@ class TracingContext:
         return self._plain.ldexp(value, exponent)
 
     def mag(self, value: Any) -> Any:
-        """Binary magnitude: used for limits alone, which the representative keeps."""
+        """Binary magnitude; used only for limits, for which the representative's is taken."""
         return self._plain.mag(plain(value))
 
     def isint(self, value: Any) -> bool:
-        """Whether a number is whole, which is decided for one value at a time."""
+        """Whether a number is whole, decided for the representative's value."""
         return bool(self._plain.isint(value._decided() if isinstance(value, Traced) else value))
 
 
 def plain(value: Any) -> Any:
-    """The number itself for pictures and messages, where a traced one may be: the representative's."""
+    """The plain number of one that may be traced, for pictures and messages: the representative's."""
     return value.value if isinstance(value, Traced | TracedWhole) else value

@@ -1,4 +1,4 @@
-"""Swept numbers as they stand in a config, and what expressions make of them (see ``numbers``)."""
+"""Swept numbers as written in a config, and in expressions (see ``numbers``)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rigidsim.scene.tracing.numbers import Traced
 
 
 class TracedExact(ExactNumber):
-    """A swept number as it stands in a config.
+    """A swept number as written in a config.
 
     Args:
-        exact: the representative's.
+        exact: the representative's number.
     """
 
     def __init__(self, graph: Graph, node: int, exact: ExactNumber) -> None:
@@ -30,7 +30,7 @@ class TracedExact(ExactNumber):
 
     @property
     def swept(self) -> bool:
-        """Yes."""
+        """True."""
         return True
 
     def at(self, context: Any) -> Any:
@@ -39,17 +39,17 @@ class TracedExact(ExactNumber):
 
     @property
     def rational(self) -> Fraction:
-        """The representative's, and that of members that have the same."""
+        """The representative's value, and that of members that share it."""
         self._traced()._decided()
         return self.exact.rational
 
     @property
     def pi_power(self) -> int:
-        """The same for all members."""
+        """Power of pi, the same for all members."""
         return self.exact.pi_power
 
     def fraction(self, context: Any) -> Fraction:
-        """As ``rational``."""
+        """See ``rational``."""
         self._traced()._decided()
         return self.exact.fraction(context)
 
@@ -58,7 +58,7 @@ class TracedExact(ExactNumber):
 
     @property
     def alone(self) -> ExactNumber:
-        """Itself."""
+        """The number itself."""
         return self
 
     def _traced(self) -> Traced:
@@ -66,7 +66,7 @@ class TracedExact(ExactNumber):
 
     @property
     def sign(self) -> int:
-        """Decided by a guard."""
+        """Sign, decided by a guard."""
         number = self._traced()
         return 0 if number == 0 else (1 if number > 0 else -1)
 
@@ -86,8 +86,8 @@ def swept_number(graph: Graph, number: int, exact: ExactNumber) -> TracedExact:
 
 
 def exactly(operator: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None:
-    """What an expression makes of numbers of which some are swept; None where that isn't a rational times a
-    power of pi.
+    """Result of an operation on numbers of which some are swept; None if it isn't a rational times a power of
+    pi.
     """
     swept = next(n for n in numbers if isinstance(n, TracedExact))
     graph = swept.graph

@@ -1,4 +1,6 @@
-"""The graph of operations behind a sweep's traced numbers, and what is decided by it (see ``numbers``)."""
+"""The graph of operations behind a sweep's traced numbers, and the decisions made with them (see
+``numbers``).
+"""
 
 from __future__ import annotations
 
@@ -12,11 +14,13 @@ FUNCTIONS = (
     "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "hypot", "exp", "log", "sinh", "cosh",
     "tanh", "asinh", "acosh", "atanh", "erf",
 )  # fmt: skip
-"""Of the context, which the graph knows; whatever else is made of a traced number is refused."""
+"""Functions of the context that the graph knows; any other use of a traced number is refused."""
 
 
 class Untraceable(Exception):
-    """Something was asked of a traced number that the graph can't hold: its members are run one by one."""
+    """Raised if something is asked of a traced number that the graph can't hold: its members are run one by
+    one.
+    """
 
 
 @dataclass(frozen=True)
@@ -42,8 +46,8 @@ class Graph:
         context: mpmath context of the scene, in which the representative is worked out.
         nodes: (operation, arguments): "column" (its number), "constant" (an mpf), "power_of_two" (a whole
             node), or a function of nodes.
-        values: the representative's, mpf.
-        wholes, whole_values: the same of whole numbers: "exponent" and "magnitude" of a node, "constant", and
+        values: the representative's values, mpf.
+        wholes, whole_values: the same for whole numbers: "exponent", "magnitude" of a node, "constant", and
             sums, products, negatives and absolute values of whole nodes.
         guards: decisions so far, each once.
     """
@@ -57,7 +61,7 @@ class Graph:
     _known: dict[Any, int] = field(default_factory=dict)
 
     def node(self, operation: str, arguments: tuple[Any, ...], value: Any) -> int:
-        """Number of a node, which is new or known."""
+        """Number of a node, new or known."""
         key = (operation, tuple(a._mpf_ if hasattr(a, "_mpf_") else a for a in arguments))
         if key not in self._known:
             self._known[key] = len(self.nodes)
@@ -66,7 +70,7 @@ class Graph:
         return self._known[key]
 
     def whole(self, operation: str, arguments: tuple[Any, ...], value: int) -> int:
-        """The same of whole numbers."""
+        """Number of a node of a whole number, new or known."""
         key = ("whole", operation, arguments)
         if key not in self._known:
             self._known[key] = len(self.wholes)
@@ -89,7 +93,7 @@ class Graph:
 
 
 class Node:
-    """A number of a graph, and how it compares: whatever is decided by it is noted as a guard.
+    """A number in a graph; any decision made with it is noted as a guard.
 
     Attributes:
         whole: whether it is one of the graph's whole numbers.
@@ -103,7 +107,7 @@ class Node:
 
     @property
     def value(self) -> Any:
-        """The representative's."""
+        """The representative's value."""
         return self._values[self.node]
 
     @property
@@ -112,7 +116,7 @@ class Node:
 
     @abstractmethod
     def _other(self, other: Any) -> int:
-        """The node of another number, plain ones included."""
+        """Node of another number, which may be plain."""
 
     def _less(self, left: int, right: int) -> bool:
         outcome = self._values[left] < self._values[right]

@@ -16,7 +16,7 @@ from rigidsim.scene.tracing.graph import Node, Untraceable
 
 
 class Traced(Node):
-    """A number of a graph; see the module."""
+    """A real number in a graph; see the module."""
 
     __slots__ = ()
     whole = False
@@ -117,18 +117,18 @@ class Traced(Node):
         return int(self._decided())
 
     def _decided(self) -> Any:
-        """The value itself, of the representative and of members that have the same."""
+        """The value itself, which restricts members to those that share it."""
         self.graph.decide("=", self.node, self.graph.constant(self.value), outcome=True)
         return self.value
 
 
 def root(x: Traced) -> Traced:
-    """The square root."""
+    """Square root."""
     operation, arguments = x.graph.nodes[x.node]
     square = (
         arguments[1] == 2 if operation == "power" else operation == "multiply" and len(set(arguments)) == 1
     )
-    if square:  # whose root is exact
+    if square:  # its root is exact
         base = Traced(x.graph, arguments[0])
         return base if base >= 0 else -base
     return Traced(x.graph, x.graph.node("sqrt", (x.node,), x.graph.context.sqrt(x.value)))

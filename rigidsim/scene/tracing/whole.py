@@ -59,14 +59,14 @@ class TracedWhole(Node):
 
 
 def binary_exponent(value: Traced) -> TracedWhole:
-    """The smallest e with abs(value) <= 2**e, of a number that isn't zero."""
+    """The smallest e with abs(value) <= 2**e; the value must not be zero."""
     mantissa, power = value.graph.context.frexp(abs(value.value))
     exponent = int(power) - 1 if mantissa == 0.5 else int(power)
     return TracedWhole(value.graph, value.graph.whole("exponent", (value.node,), exponent))
 
 
 def binary_magnitude(context: Any, value: Any) -> int:
-    """The smallest e with abs(value) < 2**e, of a number that isn't zero."""
+    """The smallest e with abs(value) < 2**e; the value must not be zero."""
     power = int(context.frexp(abs(value.value if isinstance(value, Traced) else value))[1])
     if not isinstance(value, Traced):
         return power
