@@ -36,6 +36,7 @@ STUDIES = (
     "satellite_stability",
     "flip_sphere",
     "round_off_ensemble",
+    "sweep_coverage",
     "apophis_flyby",
     "averaged_motions",
     "whole_cycle",

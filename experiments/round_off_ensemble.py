@@ -262,7 +262,7 @@ def draw_figure(shown: list[tuple[Ensemble, Growth, Growth]], out: Path) -> None
             "root mean square ± 2 error bars; shade: 5 to 95 % of the members",
         )
         tidy(below, "time (s), 1 rad/s", "over the law")
-        above.legend(loc="center left", bbox_to_anchor=(0.01, 0.62), fontsize=9)
+        above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncol=2, fontsize=9)  # beside all points
     save(figure, out, NAME)
 
 

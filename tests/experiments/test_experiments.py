@@ -35,6 +35,7 @@ SLOW = {  # about how many seconds they take
     "round_off_ensemble": 25,
     "satellite_stability": 15,
     "spectral_lines": 15,
+    "sweep_coverage": 20,
     "tumbling_averages": 15,
     "whole_cycle": 15,
 }

@@ -44,9 +44,9 @@ class LaneResults:
 
     @classmethod
     def empty(cls, samples: int, states: int, members: int) -> LaneResults:
-        """Before anything ran."""
+        """Before anything ran; states are anything at all."""
         yes = np.ones(members, dtype=bool)
-        table = np.full((samples, states, members), np.nan)
+        table = np.empty((samples, states, members))
         return cls(table, yes, yes.copy(), np.zeros(members, dtype=np.int64))
 
     def put(self, places: np.ndarray, others: LaneResults) -> None:

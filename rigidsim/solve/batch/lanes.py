@@ -128,6 +128,7 @@ class BatchEngine:
         if len(times) <= 2 and bool((times[:-1] == start).all()) and bool((times[-1] > start).all()):
             if len(times) == 2:
                 result.states[0] = initial
+            result.states[-1] = np.nan  # of those that are lost on the way
             self._in_turn(result, initial, parameters, start, times[-1], longest, most_steps)
             return result
         bundle = np.empty((_GROUPS, len(times), len(initial), self.width))

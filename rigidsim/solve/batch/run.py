@@ -19,8 +19,8 @@ from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
-_VALUES_AT_ONCE = 4_000_000
-"""Of samples, evaluated together."""
+_VALUES_AT_ONCE = 2_000_000
+"""Of samples, evaluated together: more take memory that has to be fetched anew for each step of it."""
 _MOST_STEPS = 10_000
 _STEPS_PER_UNIT = 200.0
 """A natural step is of the order of one internal unit of time. A lane that takes so many more is given up
