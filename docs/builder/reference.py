@@ -46,11 +46,11 @@ def config_page() -> str:
 
     schema = editor_schema()
     parts = [
-        "# Config keys\n\nEvery key of every table, from the schema that configs are checked with "
+        "# Config keys\n\nEvery key of every table, generated from the schema that validates configs "
         "(`rigidsim schema` prints it for editors). Numbers are TOML numbers in the unit given, or "
         "strings with any unit "
         '(`"430 day"`), a ratio (`"1/3"`), a power (`"2^-20"`) or a multiple of pi (`"pi/4"`); bare '
-        "numbers are SI. Keys in bold must be given. How keys work together: [writing a "
+        "numbers are in SI. Keys in bold are required. For how keys work together see [writing a "
         "config](../config.md)."
     ]
     for heading, node in _tables(schema):
@@ -70,7 +70,7 @@ def _tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def _named(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """The tables that a config names, each load by its kind."""
-    yield "The whole file", {**schema, "description": "Above all tables, and the tables there are."}
+    yield "The whole file", {**schema, "description": "The keys above all tables, and the tables."}
     for name, key in schema["properties"].items():
         target = _target(key, schema)
         if name == "loads":
@@ -185,10 +185,10 @@ def commands_page() -> str:
 
     whole: Any = typer.main.get_command(program())
     parts = [
-        "# Commands\n\n`rigidsim COMMAND -h` says the same in a terminal. Progress is on stderr, results "
-        "are on stdout. Exit codes: 0 done; 1 the check asked for failed (`verify`); 2 bad usage or bad "
+        "# Commands\n\n`rigidsim COMMAND -h` shows the same in a terminal. Progress goes to stderr, results "
+        "to stdout. Exit codes: 0 done; 1 the check asked for failed (`verify`); 2 bad usage or bad "
         "config; 3 the run stopped (guard, non-finite state, a folder that can't be written any more), "
-        "with what was integrated kept; 130 interrupted, to be resumed."
+        "and everything integrated so far is kept; 130 interrupted, can be resumed."
     ]
     for name, command in whole.commands.items():
         parts.append(f"## rigidsim {name}\n\n{_help(command)}\n\n{_options(command)}")
@@ -226,11 +226,11 @@ def dataset_page() -> str:
     from rigidsim.scene.registry import OBSERVABLES
     from rigidsim.store.variables import LABELS
 
-    words = {always: "where the scene has it", only_when_named: "when named"}
+    words = {always: "if the scene has it", only_when_named: "when named"}
     rows = []
     for item in OBSERVABLES.values():
         dims = ", ".join(("time", *item.dims))
-        by_default = words.get(item.by_default, "where the scene is about it")
+        by_default = words.get(item.by_default, "if it suits the scene")
         needs = ", ".join(need.replace("_", " ") for need in item.needs)
         rows.append([code(item.name), dims, code(item.units), item.long_name, item.frame, needs, by_default])
     return "\n\n".join(
@@ -242,8 +242,9 @@ def dataset_page() -> str:
             "## Variables\n\n"
             + table(["variable", "dimensions", "unit", "what", "frame", "needs", "recorded"], rows),
             "Every invariant of the scene has a `NAME_drift` beside it, (value - initial) / scale, whose "
-            "attributes name the scale; where invariants are held, `NAME_put_back` is what was put back "
-            "so far. Events have `NAME_time` and, at that time, `NAME_VARIABLE` for all that is recorded. "
+            "attributes name the scale; where invariants are held, `NAME_put_back` is the correction "
+            "accumulated so far. Events have `NAME_time` and, at that time, `NAME_VARIABLE` for all that is "
+            "recorded. "
             "With an epoch there are `year`, `julian_date` and `date` along time ([epochs and "
             "axes](../epochs_and_axes.md)).",
             "Beyond double precision a variable `v` has residuals `v_lo`, `v_lo2`, ...: the sum, smallest "

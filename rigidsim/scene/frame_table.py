@@ -23,7 +23,7 @@ class Frame(ConfigTable):
     """``[frame]``: what the scene's axes are, beside its own equations, and what angles are counted from."""
 
     axes: SpaceAxes | None = Field(
-        default=None, description="what the axes of space are; an ephemeris has ecliptic J2000"
+        default=None, description="name of the space axes; with an ephemeris they are ecliptic J2000"
     )
     reference: Annotated[
         Annotated[Literal["space", "orbit"], Tag(PLANE_OR_NORMAL[0])]
@@ -36,11 +36,11 @@ class Frame(ConfigTable):
         ),
     ] = Field(
         default="space",
-        description="the plane that obliquity and longitudes count from: space (XY), orbit (the source's "
-        "own, moving plane), or a normal [x, y, z] in space axes",
+        description="reference plane of obliquity and longitudes: space (XY), orbit (the moving plane of "
+        "the source's orbit), or a normal [x, y, z] in space axes",
     )
     figure_axis: Literal["x", "y", "z", "largest", "symmetry"] | None = Field(
         default=None,
-        description="the body axis that obliquity, wobble and polar motion speak of; by default the axis of "
-        "symmetry, or that of the largest moment where there is none",
+        description="the body axis to which obliquity, wobble and polar motion refer; by default the "
+        "axis of symmetry, or that of the largest moment if there is none",
     )

@@ -24,14 +24,15 @@ class Integrator(ConfigTable):
         | Annotated[StrictInt, WithJsonSchema({"type": "integer", "minimum": 1, "maximum": LARGEST_DIGITS})]
     ) = Field(
         default="double",
-        description="of the arithmetic: 24, 53, 64 or 113 bits, or so many decimal digits",
+        description="precision of the arithmetic: single, double, extended or quadruple (24, 53, 64 or "
+        "113 bits), or a number of decimal digits",
         examples=["extended", 50],
     )
     tolerance: Literal["auto"] | Dimensionless = Field(
         default="auto",
-        description="of each step, relative to the largest component of the state; auto is the precision's "
-        "epsilon in double precision and an eighth of it in others, whose series would otherwise be just too "
-        "short to keep what is cut off well below rounding",
+        description="error tolerance of each step, relative to the largest component of the state; auto "
+        "is epsilon in double precision, and an eighth of it in others, where epsilon would "
+        "truncate the series slightly too early",
         examples=["auto", 1e-12],
         json_schema_extra={"x-above": 0, "x-at-most": 1},
     )
@@ -39,21 +40,22 @@ class Integrator(ConfigTable):
         "auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar"
     ] = Field(
         default="auto",
-        description="which variables are integrated; canonical: Euler angles and their momenta; planar: an "
-        "angle and its rate, for a body that turns about one axis",
+        description="the variables that are integrated; canonical: Euler angles and their momenta; "
+        "planar: an angle and its rate, for a body that turns about one axis",
     )
     euler_sequence: EulerSequence = Field(
-        default="zxz", description="axes of intrinsic rotations, of [initial] and of what is recorded"
+        default="zxz", description="axes of the intrinsic rotations, for [initial] and for recorded angles"
     )
     method: Literal["taylor", "closed_form"] = Field(
         default="taylor",
-        description="Taylor series step by step, or, for a free body or a heavy symmetric top, theta "
-        "functions at a cost that doesn't depend on the time",
+        description="taylor: Taylor series step by step; closed_form: for a free body or a heavy "
+        "symmetric top, theta functions at a cost independent of the time",
     )
     hold_invariants: StrictBool | Literal["auto"] = Field(
         default="auto",
-        description="put what is conserved back as the run goes on: errors of long runs grow far slower; "
-        "auto: from step 8192 on, so that shorter runs are the plain ones; in sweeps it means false",
+        description="project the state onto its invariants, so that errors of long runs grow far more "
+        "slowly; auto: from step 8192 on, leaving shorter runs unchanged; in sweeps auto "
+        "means false",
     )
 
     @field_validator("hold_invariants", mode="before")
@@ -65,19 +67,19 @@ class Integrator(ConfigTable):
 
     accuracy: Annotated[Dimensionless, WithJsonSchema(number_schema("rad"))] | None = Field(
         default=None,
-        description="attitude error to hold at the end, instead of precision and tolerance; certified",
+        description="attitude error allowed at the end, instead of precision and tolerance; certified",
         examples=[1e-9],
         json_schema_extra={"x-above": 0, "x-below": 3},
     )
     accuracy_axis: Dimensionless | None = Field(
         default=None,
-        description="error (rad) of the momentum's and the figure axis' direction to hold until the end; "
-        'with [model] level = "auto" the cheapest model that does is chosen',
+        description="error (rad) allowed until the end in the directions of the angular momentum and the "
+        'figure axis; with [model] level = "auto" the cheapest model within it is chosen',
         examples=[1e-6],
     )
     accuracy_position: Metre | None = Field(
         default=None,
-        description="error of the position to hold at the end, where the body flies; certified",
+        description="position error allowed at the end if the body flies; certified",
         examples=["1 um"],
         json_schema_extra={"x-above": 0},
     )

@@ -18,14 +18,15 @@ class Model(ConfigTable):
 
     level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = Field(
         default="full",
-        description="full resolves every rotation; spin_averaged carries the direction of the angular "
-        "momentum under torques averaged over the body's free rotation; orbit_averaged averages over the "
-        "sources' orbits as well; auto is the cheapest that keeps [integrator] accuracy_axis",
+        description="full resolves every rotation; spin_averaged follows the direction of the angular "
+        "momentum under torques averaged over the body's free rotation; orbit_averaged "
+        "averages over the sources' orbits as well; auto is the cheapest level that keeps "
+        "[integrator] accuracy_axis",
     )
     short_period: StrictBool = Field(
         default=False,
-        description="add back, to first order, what averaging removed: the nutation with the orbits' "
-        "periods, and the figure and spin axes' distance from the angular momentum",
+        description="add back, to first order, what averaging removed: the nutation with the orbital "
+        "periods, and the offset of figure and spin axes from the angular momentum",
     )
 
     @property

@@ -22,23 +22,35 @@ class Orbit(ConfigTable):
     """
 
     body: StrictStr | None = Field(
-        default=None, description="name of the one of [[bodies]] that attracts, alone", examples=["sun"]
+        default=None,
+        description="name of the attracting point mass in [[bodies]]; excludes all other keys",
+        examples=["sun"],
     )
     table: StrictStr | None = Field(
         default=None,
         description="name of a CSV file beside the config, with elements over time",
         examples=["mars_elements.csv"],
     )
-    semi_major_axis: Metre | None = Field(default=None, description="of the ellipse", examples=["7000 km"])
+    semi_major_axis: Metre | None = Field(
+        default=None, description="semi-major axis of the ellipse", examples=["7000 km"]
+    )
     eccentricity: Dimensionless = Field(default=ZERO, description="0 to below 1")
-    inclination: Angle = Field(default=ZERO, description="to the plane XY of space", examples=["51.6 deg"])
-    ascending_node: Angle = Field(default=ZERO, description="its longitude from X, at time 0")
-    periapsis: Angle = Field(default=ZERO, description="from the ascending node, at time 0")
-    mean_anomaly: Angle = Field(default=ZERO, description="at time 0")
-    node_rate: Rate = Field(default=ZERO, description="of the ascending node", examples=["-19.3 deg/yr"])
-    periapsis_rate: Rate = Field(default=ZERO, description="of the periapsis against the node")
+    inclination: Angle = Field(
+        default=ZERO, description="inclination to the XY plane of the space axes", examples=["51.6 deg"]
+    )
+    ascending_node: Angle = Field(
+        default=ZERO, description="longitude of the ascending node from X, at time 0"
+    )
+    periapsis: Angle = Field(
+        default=ZERO, description="argument of periapsis from the ascending node, at time 0"
+    )
+    mean_anomaly: Angle = Field(default=ZERO, description="mean anomaly at time 0")
+    node_rate: Rate = Field(default=ZERO, description="rate of the ascending node", examples=["-19.3 deg/yr"])
+    periapsis_rate: Rate = Field(default=ZERO, description="rate of the argument of periapsis")
     period: Second | None = Field(
-        default=None, description="instead of that of Kepler's third law", examples=["27.3 day"]
+        default=None,
+        description="orbital period, instead of that from Kepler's third law",
+        examples=["27.3 day"],
     )
 
 

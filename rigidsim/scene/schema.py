@@ -49,7 +49,7 @@ from rigidsim.scene.sweep_table import SweepTable
 from rigidsim.scene.validation_messages import nearest, shown
 
 _FOLDER_NAME = "^[A-Za-z0-9._-]{1,100}$"
-_ABOUT_LOADS = "what acts on the body, told apart by kind; none: free rotation"
+_ABOUT_LOADS = "loads that act on the body, each of a kind; without any the body rotates freely"
 STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
 
 
@@ -58,16 +58,18 @@ class Initial(ConfigTable):
 
     angular_velocity: Triple[Rate] | None = Field(
         default=None,
-        description="of the body in space, in body axes; this or angular_momentum",
+        description="angular velocity relative to space, in body axes; this or angular_momentum",
         examples=[[0.1, 1.0, 0.05], ["0 deg/s", "0 deg/s", "20 deg/h"]],
     )
     angular_momentum: Triple[Momentum] | None = Field(
-        default=None, description="in space axes; instead of angular_velocity", examples=[[0, 0, 12.5]]
+        default=None,
+        description="angular momentum in space axes, instead of angular_velocity",
+        examples=[[0, 0, 12.5]],
     )
     quaternion: Four[Dimensionless] | None = Field(
         default=None,
-        description="w, x, y, z: takes body axes to space axes; any norm but zero; without it and "
-        "euler_angles the body's axes lie along those of space",
+        description="attitude w, x, y, z: takes body axes to space axes; any norm but zero; by default "
+        "the body axes start along the space axes",
         examples=[[1, 0, 0, 0]],
     )
     euler_angles: Triple[Angle] | None = Field(
@@ -77,11 +79,14 @@ class Initial(ConfigTable):
     )
     position: Triple[Metre] | None = Field(
         default=None,
-        description="of the centre of mass, in space axes; with it or velocity the body flies freely",
+        description="position of the centre of mass, in space axes; with it or velocity the body flies "
+        "freely",
         examples=[["7000 km", 0, 0]],
     )
     velocity: Triple[Speed] | None = Field(
-        default=None, description="of the centre of mass, in space axes", examples=[[0, "7.5 km/s", 0]]
+        default=None,
+        description="velocity of the centre of mass, in space axes",
+        examples=[[0, "7.5 km/s", 0]],
     )
 
 
@@ -90,27 +95,30 @@ class Time(ConfigTable):
     the unit that times are shown in.
     """
 
-    start: Second = Field(default=ZERO, description="of the run: when the state is [initial]'s")
+    start: Second = Field(default=ZERO, description="start of the run, to which [initial] refers")
     end: Second | None = Field(
-        default=None, description="of the run; with samples or every", examples=[1000.0, "10 yr"]
+        default=None, description="end of the run; with samples or every", examples=[1000.0, "10 yr"]
     )
     samples: StrictInt | None = Field(
-        default=None, description="how many, evenly from start to end, both included", examples=[10001]
+        default=None,
+        description="number of samples, equally spaced from start to end, both included",
+        examples=[10001],
     )
     every: Second | None = Field(
-        default=None, description="between samples, instead of samples", examples=[0.1, "1 day"]
+        default=None, description="interval between samples, instead of samples", examples=[0.1, "1 day"]
     )
     times: list[Second] | None = Field(
-        default=None, description="of the samples, ascending, instead of end", examples=[[0, 1, 10, 100]]
+        default=None, description="sample times, ascending, instead of end", examples=[[0, 1, 10, 100]]
     )
     epoch: Instant | None = Field(
         default=None,
-        description="what time 0 is; scales TDB, TT and UTC",
+        description="date of time 0; scales TDB, TT and UTC",
         examples=["J2000", "2029-04-13T21:46:00 TDB"],
     )
     unit: TimeUnitName | None = Field(
         default=None,
-        description="what times are shown in, such as day, yr or kyr; bare numbers stay seconds",
+        description="unit in which times are displayed, such as day, yr or kyr; bare numbers in the "
+        "config remain seconds",
         examples=["day"],
     )
 
@@ -120,8 +128,8 @@ class Output(ConfigTable):
 
     record: list[StrictStr] | None = Field(
         default=None,
-        description="variables of the dataset; by default all that the scene has (drifts of invariants "
-        "always are there)",
+        description="names of the variables to record; by default those that suit the scene (drifts of "
+        "invariants are always recorded)",
         examples=[["quaternion", "obliquity"]],
         json_schema_extra={"x-items": "observables"},
     )
@@ -129,16 +137,17 @@ class Output(ConfigTable):
     timeline_rows: StrictInt = Field(
         default=100_000,
         ge=2,
-        description="of the timeline at most; a longer run is thinned there, never in the dataset",
+        description="largest number of rows in the timeline; longer runs are thinned there, never in the "
+        "dataset",
     )
     estimate: StrictBool = Field(
         default=True,
-        description="announce the errors of attitude and path; a few percent of the run, in batches of "
-        "a sweep one to two times its members",
+        description="estimate the errors of attitude and position; costs a few percent of the run, in "
+        "batches of a sweep one to two times the members themselves",
     )
     lyapunov: StrictBool = Field(
         default=False,
-        description="Lyapunov exponents from variational equations; tens of times the plain run",
+        description="Lyapunov exponents from variational equations; costs tens of times the plain run",
     )
     tip: Triple[Metre] | None = Field(
         default=None,
@@ -171,15 +180,17 @@ class EventTable(ConfigTable):
     """``[[events]]``: where an expression of time and the state crosses zero."""
 
     name: StrictStr = Field(
-        description="of the dataset's variables: NAME_time, NAME_quaternion, ...", examples=["flip"]
+        description="prefix of the dataset's variables: NAME_time, NAME_quaternion, ...", examples=["flip"]
     )
     expression: StrictStr = Field(
-        description="of t, the states (wx wy wz, qw qx qy qz, phi theta psi, x y z, vx vy vz) and "
-        "[parameters], in SI: the event is where it crosses zero",
+        description="expression of t, the states (wx wy wz, qw qx qy qz, phi theta psi, x y z, vx vy vz) "
+        "and [parameters], in SI; the event is its crossing of zero",
         examples=["wy", "theta - pi/2"],
     )
-    direction: Literal["any", "up", "down"] = Field(default="any", description="of the crossing")
-    action: Literal["record", "stop"] = Field(default="record", description="stop: the run ends there")
+    direction: Literal["any", "up", "down"] = Field(default="any", description="direction of the crossing")
+    action: Literal["record", "stop"] = Field(
+        default="record", description="record the event, or stop the run at it"
+    )
 
     @field_validator("name")
     @classmethod
@@ -195,10 +206,13 @@ class Limits(ConfigTable):
     """``[limits]``: guards that stop the run, resumable, with the reason named."""
 
     wall_time: Second | None = Field(
-        default=None, description="of integrating and recording in one session", examples=["2 h"]
+        default=None, description="time for integrating and recording in one session", examples=["2 h"]
     )
     max_steps: StrictInt | None = Field(
-        default=None, ge=1, description="in one session, never exceeded", examples=[1_000_000_000]
+        default=None,
+        ge=1,
+        description="number of steps in one session, never exceeded",
+        examples=[1_000_000_000],
     )
     max_drift: Dimensionless | None = Field(
         default=None,
@@ -210,14 +224,14 @@ class Limits(ConfigTable):
 class TableText(ConfigTable):
     """``[tables.NAME]``: a table that belongs to the config; files that it names are taken in like this."""
 
-    text: StrictStr = Field(description="of the CSV file")
+    text: StrictStr = Field(description="text of the CSV file")
 
 
 class Config(ConfigTable):
     """One experiment; ``config_model`` knows the kinds of loads beside."""
 
     name: StrictStr = Field(
-        description="of the run folder: letters, digits, dots, underscores and hyphens",
+        description="name of the run folder: letters, digits, dots, underscores and hyphens",
         examples=["intermediate_axis"],
         json_schema_extra={"pattern": _FOLDER_NAME},
     )
@@ -227,36 +241,39 @@ class Config(ConfigTable):
         description="named constants for expressions",
         examples=[{"k": 0.25, "c": "2e-4 N m s"}],
     )
-    body: Later[Body] = Field(description="what turns")
+    body: Later[Body] = Field(description="the rigid body")
     initial: Later[Initial] = Field(description="the state at the start")
     loads: list[LoadFields] = Field(default_factory=list, description=_ABOUT_LOADS)
     bodies: list[Later[PointMassBody]] = Field(
-        default_factory=list, description="point masses under mutual gravity, beside the body"
+        default_factory=list, description="point masses under mutual gravity, integrated with the body"
     )
     events: list[Later[EventTable]] = Field(
-        default_factory=list, description="where an expression of time and the state crosses zero"
+        default_factory=list, description="events: zero crossings of an expression of time and the state"
     )
     frame: Later[Frame] = Field(
         default_factory=Frame.model_construct,
-        description="what the axes of space are, and what angles count from",
+        description="name of the space axes, and the references of angles",
     )
-    time: Later[Time] = Field(description="how long, and where the samples lie")
+    time: Later[Time] = Field(description="time span and sample times")
     model: Later[Model] = Field(
-        default_factory=Model.model_construct, description="how much of the motion is resolved"
+        default_factory=Model.model_construct, description="the full motion, or an average of it"
     )
     integrator: Later[Integrator] = Field(
-        default_factory=Integrator.model_construct, description="how accurately, and in which variables"
+        default_factory=Integrator.model_construct,
+        description="accuracy, and the variables that are integrated",
     )
     output: Later[Output] = Field(
-        default_factory=Output.model_construct, description="what is kept and how it is shown"
+        default_factory=Output.model_construct, description="what is recorded and displayed"
     )
     limits: Later[Limits] = Field(
-        default_factory=Limits.model_construct, description="guards that stop the run, resumable"
+        default_factory=Limits.model_construct, description="guards that stop the run; it can be resumed"
     )
-    sweep: Later[SweepTable] | None = Field(default=None, description="many members of one experiment")
+    sweep: Later[SweepTable] | None = Field(
+        default=None, description="the sweep: many members of one experiment"
+    )
     tables: dict[StrictStr, Later[TableText]] = Field(
         default_factory=dict,
-        description="texts of tables that loads name; files beside the config are taken in here",
+        description="texts of tables that loads refer to; the text of files beside the config is copied here",
         examples=[{"elements.csv": {"text": "time [yr], eccentricity\n0, 0.01\n"}}],
     )
 

@@ -35,14 +35,14 @@ class AxisTable(ConfigTable):
         default=None, description="[from, to, count], both ends included", min_length=3, max_length=3
     )
     logspace: list[Any] | None = Field(
-        default=None, description="[from, to, count], of equal ratios, both ends included",
+        default=None, description="[from, to, count], with equal ratios, both ends included",
         min_length=3, max_length=3,
     )  # fmt: skip
     step: list[Any] | None = Field(
-        default=None, description="[from, step, count]", min_length=3, max_length=3
+        default=None, description="[from, step, count], equally spaced", min_length=3, max_length=3
     )
     values: list[Any] | None = Field(
-        default=None, description="each as the key itself would take it", min_length=1
+        default=None, description="list of values, each as the key itself accepts it", min_length=1
     )
     normal: list[Any] | None = Field(
         default=None, description="[mean, standard deviation]; with count", min_length=2, max_length=2
@@ -52,15 +52,15 @@ class AxisTable(ConfigTable):
     )
     sphere: Any = Field(
         default=None,
-        description="its radius: random directions of a vector with count, or a grid of them with grid",
+        description="radius: random directions of a vector with count, or a grid of directions with grid",
     )
-    count: StrictInt | None = Field(default=None, ge=1, description="of random values")
+    count: StrictInt | None = Field(default=None, ge=1, description="number of random values")
     grid: list[StrictInt] | None = Field(
         default=None, min_length=2, max_length=2,
-        description="of a sphere: polar angles (at equal distances of their cosines) and azimuths",
+        description="for sphere: numbers of polar angles (equally spaced in their cosine) and azimuths",
     )  # fmt: skip
     name: StrictStr | None = Field(
-        default=None, description="of its dimension; the key's last part by default"
+        default=None, description="name of the dimension; by default the last part of the key"
     )
 
     @model_validator(mode="after")
@@ -103,25 +103,29 @@ class SweepTable(ConfigTable):
         default="product",
         description="product: every combination of the axes' values; zip: the first of each, the second, ...",
     )
-    seed: StrictInt = Field(default=0, description="of random values; each depends on seed, key and index")
+    seed: StrictInt = Field(
+        default=0, description="seed of random values; each draw depends on seed, key and index"
+    )
     keep: list[StrictStr] = Field(
         default_factory=lambda: ["final"],
-        description="what is kept of a member, beside drifts, steps and warnings",
+        description="results kept of each member, besides drifts, steps and warnings",
         json_schema_extra={"items": {"type": "string", "enum": list(KEPT)}, "default": ["final"]},
     )
     most_events: StrictInt = Field(
-        default=16, ge=1, description="times (events) and points (section) kept of an event, at most"
+        default=16, ge=1, description="largest number of times (events) or points (section) kept of an event"
     )
     tile: StrictInt | None = Field(
-        default=None, ge=1, description="members that are computed and saved at once; by default some seconds"
+        default=None,
+        ge=1,
+        description="number of members computed and saved together; by default some seconds of work",
     )
     batch: StrictBool = Field(
         default=True,
-        description="members that share their equations run side by side; false: each by itself, in many "
-        "times the time",
+        description="integrate members that share their equations side by side; false: each by itself, "
+        "which takes many times as long",
     )
     axes: dict[StrictStr, AxisTable] = Field(
-        min_length=1, description="by the dotted keys whose values are swept, indices from 0"
+        min_length=1, description="the axes, by the dotted keys whose values are swept, with indices from 0"
     )
 
     @field_validator("keep")

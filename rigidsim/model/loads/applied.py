@@ -52,7 +52,9 @@ class TorqueFields(LoadFields):
         description="in N m: expressions of t, the state and [parameters], or numbers",
         examples=[["0", "0", "k*sin(t)^2"]],
     )
-    frame: Literal["body", "space"] = Field(default="body", description="whose axes the components are along")
+    frame: Literal["body", "space"] = Field(
+        default="body", description="axes of the components: body or space"
+    )
 
 
 class ForceFields(LoadFields):
@@ -66,11 +68,12 @@ class ForceFields(LoadFields):
         examples=[["0", "0", "-c*vz"]],
     )
     frame: Literal["body", "space"] = Field(
-        default="space", description="whose axes the components are along"
+        default="space", description="axes of the components: body or space"
     )
     point: Triple[Metre] | None = Field(
         default=None,
-        description="where it acts, in body axes from the reference point; by default the centre of mass",
+        description="point of application, in body axes from the reference point; by default the centre "
+        "of mass",
         examples=[[0, 0, 0.2]],
     )
 

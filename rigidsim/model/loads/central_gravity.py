@@ -33,12 +33,13 @@ class CentralGravityFields(LoadFields):
     )
     orbit: Orbit | None = Field(
         default=None,
-        description="names the one of [[bodies]] that attracts, in place of parameter and position",
+        description="the attracting point mass in [[bodies]], instead of gravitational_parameter and "
+        "position",
         examples=[{"body": "earth"}],
     )
     position: Triple[Metre] = Field(
         default_factory=lambda: [ZERO] * 3,
-        description="of the attracting point, space axes",
+        description="position of the attracting point, space axes",
         json_schema_extra={"default": [0, 0, 0]},
     )
 

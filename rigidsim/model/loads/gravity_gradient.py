@@ -40,14 +40,16 @@ class GravityGradientFields(LoadFields):
     )
     orbit: Orbit | None = Field(
         default=None,
-        description="of the attracting body as seen from this one; this, position or ephemeris",
+        description="orbit of the attracting body as seen from this one; exactly one of orbit, position "
+        "and ephemeris",
         examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
     )
     position: Triple[Metre] | None = Field(
-        default=None, description="of a source at rest, space axes", examples=[["7000 km", 0, 0]]
+        default=None, description="position of a source at rest, space axes", examples=[["7000 km", 0, 0]]
     )
     ephemeris: Literal["sun", "moon"] | None = Field(
-        default=None, description="as seen from the Earth, by analytic series in the ecliptic of J2000"
+        default=None,
+        description="geocentric position of Sun or Moon, from analytic series in the ecliptic of J2000",
     )
 
 

@@ -39,16 +39,17 @@ class MagneticDipoleFields(LoadFields):
 
     kind: Literal["magnetic_dipole"]
     moment: Triple[MagneticMoment] = Field(
-        description="of the body, body axes", examples=[["0 A m^2", "0 A m^2", "0.5 A m^2"]]
+        description="magnetic moment of the body, body axes", examples=[["0 A m^2", "0 A m^2", "0.5 A m^2"]]
     )
     field: Triple[FluxDensity] | None = Field(
         default=None, description="uniform flux density, space axes", examples=[["30 uT", 0, 0]]
     )
     orbit: Orbit | None = Field(
-        default=None, description="of the source as seen from the body, instead of field; with source_moment"
+        default=None,
+        description="orbit of the source as seen from the body, instead of field; needs source_moment",
     )
     source_moment: Triple[MagneticMoment] | None = Field(
-        default=None, description="of the dipole that is circled, space axes", examples=[[0, 0, -7.7e22]]
+        default=None, description="magnetic moment of the source, space axes", examples=[[0, 0, -7.7e22]]
     )
     gravitational_parameter: GravitationalParameter | None = Field(
         default=None, description="G M of the source, from which the orbit's period follows"

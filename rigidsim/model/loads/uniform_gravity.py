@@ -24,12 +24,12 @@ def _standard_gravity() -> list[ExactNumber]:
 
 
 class UniformGravityFields(LoadFields):
-    """A uniform field; a torque about the fixed point, or free fall in a scene with a position."""
+    """A uniform field: a torque about the fixed point, or free fall in a scene with a position."""
 
     kind: Literal["uniform_gravity"]
     acceleration: Triple[Acceleration] = Field(
         default_factory=_standard_gravity,
-        description="of free fall, space axes",
+        description="acceleration of free fall, space axes",
         examples=[[0, 0, -3.72]],
         json_schema_extra={"default": [0, 0, -9.80665]},
     )

@@ -50,8 +50,8 @@ def _kind_of_reference(value: Any) -> str | None:
 class PointMass(ConfigTable):
     """One particle of a body of particles."""
 
-    mass: Kilogram = Field(description="of the particle")
-    position: Triple[Metre] = Field(description="in body axes")
+    mass: Kilogram = Field(description="mass of the particle")
+    position: Triple[Metre] = Field(description="position in body axes")
 
 
 def _named(names: Iterable[str]) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def _named(names: Iterable[str]) -> dict[str, Any]:
 class _Shaped(ConfigTable):
     shape: StrictStr | None = Field(
         default=None,
-        description="a homogeneous solid, with mass and its dimensions",
+        description="a homogeneous solid; needs mass and dimensions",
         json_schema_extra=_named(SHAPES),
     )
 
@@ -102,22 +102,22 @@ class Part(Solid):
     """One solid of a composite body, placed by its centre of mass, turned by a quaternion or Euler angles."""
 
     shape: StrictStr = Field(
-        description="a homogeneous solid, with mass and its dimensions", json_schema_extra=_named(SHAPES)
+        description="a homogeneous solid; needs mass and dimensions", json_schema_extra=_named(SHAPES)
     )
-    mass: Kilogram = Field(description="of the part")
+    mass: Kilogram = Field(description="mass of the part")
     position: Triple[Metre] = Field(
         default_factory=lambda: [ZERO] * 3,
-        description="of its centre of mass, in body axes",
+        description="position of its centre of mass, in body axes",
         json_schema_extra=_ORIGIN,
     )
     quaternion: Four[Dimensionless] | None = Field(
-        default=None, description="w, x, y, z: takes the part's own axes to the body's"
+        default=None, description="attitude w, x, y, z: takes the part's own axes to the body's"
     )
     euler_angles: Triple[Angle] | None = Field(
-        default=None, description="from the part's own axes to the body's, instead of quaternion"
+        default=None, description="attitude from the part's own axes to the body's, instead of quaternion"
     )
     euler_sequence: EulerSequence | None = Field(
-        default=None, description="of euler_angles; that of [integrator] by default"
+        default=None, description="sequence of euler_angles; by default that of [integrator]"
     )
 
 
@@ -133,27 +133,33 @@ class Body(Solid):
     """``[body]``: exactly one source of inertia, and what loads need beside it."""
 
     principal_moments: Triple[Moment] | None = Field(
-        default=None, description="of inertia, about the body axes x, y, z", examples=[[1, 2, 2.5]]
+        default=None,
+        description="principal moments of inertia about the body axes x, y, z",
+        examples=[[1, 2, 2.5]],
     )
     inertia_tensor: Triple[Triple[Moment]] | None = Field(
         default=None,
-        description="symmetric, in any body axes (products are -sum m x y); results are in these axes",
+        description="symmetric inertia tensor in any body axes (products are -sum m x y); results are in "
+        "these axes",
         examples=[[[2, -0.1, 0], [-0.1, 3, 0], [0, 0, 4]]],
     )
     points: Annotated[list[Later[PointMass]], Field(min_length=1)] | None = Field(
-        default=None, description="particles", examples=[[{"mass": 1, "position": [0, 0, 1]}]]
+        default=None, description="list of particles", examples=[[{"mass": 1, "position": [0, 0, 1]}]]
     )
     parts: Annotated[list[Later[Part]], Field(min_length=1)] | None = Field(
         default=None, description="solids that make up the body"
     )
     preset: StrictStr | None = Field(
-        default=None, description="a published body", json_schema_extra=_named(PRESETS)
+        default=None, description="name of a published body", json_schema_extra=_named(PRESETS)
     )
     mass: Kilogram | None = Field(
-        default=None, description="needed by shapes, and where a load or a path needs it", examples=[12]
+        default=None,
+        description="mass of the body; required for shapes, and wherever a load or the translational "
+        "motion uses it",
+        examples=[12],
     )
     host: StrictStr | None = Field(
-        default=None, description="name of the one of [[bodies]] that this body is", examples=["earth"]
+        default=None, description="name of the point mass in [[bodies]] that this body is", examples=["earth"]
     )
     coupling: Literal["one_way", "full"] | None = Field(
         default=None,
@@ -161,7 +167,8 @@ class Body(Solid):
     )
     center_of_mass: Triple[Metre] | None = Field(
         default=None,
-        description="from the point that the body turns about, in body axes; with moments or a tensor",
+        description="position relative to the point that the body turns about, in body axes; with "
+        "moments or a tensor",
         examples=[[0, 0, 0.5]],
     )
     reference: (
