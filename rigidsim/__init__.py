@@ -76,5 +76,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Everything that can be asked for, loaded or not: what tab completion shows."""
+    """All public names, loaded or not, for tab completion."""
     return sorted({*globals(), *__all__})

@@ -5,7 +5,7 @@ from rigidsim.cli.ending import left_at_once
 
 
 def start() -> None:
-    """The program in a process of its own."""
+    """Run the program in a process of its own."""
     left_at_once(main)
 
 

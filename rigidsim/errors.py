@@ -13,7 +13,7 @@ _EITHER = re.compile(f"{_COMMAND}([^{_PYTHON}]*){_PYTHON}([^{_END}]*){_END}")
 
 
 def either(command_line: str, python: str) -> str:
-    """A remedy in two wordings: errors that are printed by a command give the first, in Python the second."""
+    """A remedy in two wordings: commands print the first, Python errors show the second."""
     return f"{_COMMAND}{command_line}{_PYTHON}{python}{_END}"
 
 
@@ -26,7 +26,7 @@ VIEW = either("rigidsim view", "run.view()")
 class RigidsimError(Exception):
     """Base of all errors that rigidsim raises on purpose; its text is meant for the user.
 
-    What to do about it is said in Python's words; ``for_command_line`` says it in options and commands.
+    Remedies are worded for Python; ``for_command_line`` words them as options and commands.
     """
 
     exit_code = 2
@@ -35,7 +35,7 @@ class RigidsimError(Exception):
         return _EITHER.sub(r"\2", super().__str__())
 
     def for_command_line(self) -> str:
-        """The text with commands and their options."""
+        """The text with remedies worded as commands and options."""
         return _EITHER.sub(r"\1", super().__str__())
 
 
@@ -56,7 +56,7 @@ class Problem:
 
 
 def _visible(text: str) -> str:
-    """A terminal shows what was given, and obeys none of it: control characters stand as escapes."""
+    """The text with control characters escaped, so that a terminal shows them instead of obeying."""
     return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
 
 
@@ -77,12 +77,12 @@ class ConfigError(RigidsimError):
         return f"{head}{count} problem{'s' if count > 1 else ''} in the config\n{lines}"
 
     def at(self, source: str) -> ConfigError:
-        """The same error, naming the file that it came from."""
+        """The same error with the file that it came from."""
         return ConfigError(self.problems, source)
 
 
 class MemberError(ConfigError):
-    """A member of a sweep can't be run; ``problems`` name it beside the key."""
+    """A member of a sweep can't be run; ``problems`` name the member besides the key."""
 
 
 class RunFolderError(RigidsimError):
@@ -110,5 +110,5 @@ _ONCE = {
 
 
 def once_mended(error: OSError) -> str:
-    """What has to happen before a place that couldn't be written can be."""
+    """What has to happen before a place that couldn't be written can be written again."""
     return _ONCE.get(error.errno or 0, "once that is mended")

@@ -1,4 +1,4 @@
-"""A dataset's signals taken apart into secular rates and labelled lines."""
+"""Decomposition of a dataset's signals into secular rates and labelled lines."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SECULAR = "node_longitude.figure"
 
 @dataclass(frozen=True)
 class _Raw:
-    """A signal before its lines have names, with frequencies in rad/s."""
+    """A signal before its lines are labelled, with frequencies in rad/s."""
 
     signal: Signal
     found: Decomposition
@@ -33,13 +33,13 @@ class _Raw:
     bits: int
 
     def finest(self, line: SpectralLine) -> float:
-        """Of a line's frequency: its error as it was found, rad/s."""
+        """Frequency error of a line as it was found, rad/s."""
         distance = [abs(abs(float(f)) - abs(float(line.observed))) for f in self.frequencies]
         return self.errors[distance.index(min(distance))]
 
     @property
     def factor(self) -> int:
-        """Amplitude of a cosine over that of its exponential."""
+        """Ratio of a cosine's amplitude to that of its exponential: 2 for real signals, otherwise 1."""
         return 2 if self.signal.real else 1
 
 
@@ -56,13 +56,13 @@ def analyse_dataset(
     """Secular rates and lines of a dataset's signals.
 
     Args:
-        dataset: with equidistant ``time``; residuals ``_lo``, ``_lo2`` are taken into account.
+        dataset: dataset with equidistant ``time``; residuals ``_lo``, ``_lo2`` are taken into account.
         variables: names of variables or of their signals; see ``signals_of``.
-        lines: of each signal at most.
+        lines: largest number of lines per signal.
         floor: lines below this share of a signal's strongest are left out.
         known: frequencies for labels; those with a tolerance are replaced by the strongest line near them.
-        order: of the Hann window; chosen by the lines' distances by default.
-        attitude_error: of the run at its end, rad, where it is known.
+        order: order of the Hann window; chosen by the lines' distances by default.
+        attitude_error: attitude error of the run at its end, rad, if known.
 
     Raises:
         RigidsimError: samples aren't equidistant, too few or not finite, or there is no such variable.
@@ -118,7 +118,9 @@ def _raw(signal: Signal, clock: EquidistantTimes, lines: int, floor: float, orde
 
 
 def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: EquidistantTimes) -> list[Known]:
-    """The equinox goes back with the precession that was measured, where it was and isn't known already."""
+    """The known frequencies with the equinox's: it moves back with the measured precession, unless known
+    already.
+    """
     names = list(known)
     if not known or any(k.name == "precession" for k in known):
         return names
@@ -216,7 +218,7 @@ def _line(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], n: int) ->
 
 
 def _wrapped(context: Any, angle: Any) -> Any:
-    """Within +-pi; where rounding alone makes it -pi, it is pi."""
+    """The angle within +-pi; pi rather than a -pi caused by rounding."""
     angle = angle - 2 * context.pi * context.nint(angle / (2 * context.pi))
     return -angle if angle + context.pi < 1e-6 else angle
 

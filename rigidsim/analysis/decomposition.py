@@ -1,4 +1,4 @@
-"""Lines of a quasi-periodic signal and its secular part, found and refined together.
+"""Lines and secular part of a quasi-periodic signal, found and refined together.
 
 Frequency analysis after Laskar (1993, Physica D 67, 257) with the corrections of Sidlichovsky & Nesvorny
 (1996, Celest. Mech. Dyn. Astron. 65, 137), which free each line of what all others do to it: here as a Newton
@@ -33,15 +33,15 @@ _HIGHEST_ORDER = 10
 
 @dataclass(frozen=True)
 class Decomposition:
-    """What a signal consists of; complex lines of real signals come with their mirror images.
+    """Components of a signal; complex lines of real signals come with their mirror images.
 
     Attributes:
         sum: polynomial, and lines (of a real signal those of positive frequency: twice their real part).
-        order: of the window.
-        frequency_errors, amplitude_errors: one standard deviation each, from what is left next to the line:
+        order: order of the window.
+        frequency_errors, amplitude_errors: one standard deviation each, from the remainder next to the line:
             turns per sample, and the signal's unit.
-        polynomial_errors: the same of the polynomial's coefficients.
-        left: rms of what is left.
+        polynomial_errors: the same for the polynomial's coefficients.
+        left: rms of the remainder.
         level: median size of the windowed remainder's spectrum: lines below it aren't seen.
         close: frequencies (turns per sample) at which something is left that is too close to a line, or to
             the secular part, to be told apart.
@@ -65,10 +65,10 @@ def decompose(
     """Find the strongest lines and a polynomial.
 
     Args:
-        lines: at most so many.
-        degree: of the polynomial; -1 for none.
+        lines: largest number of lines.
+        degree: degree of the polynomial; -1 for none.
         floor: lines below this share of the strongest are left.
-        order: of the window; by default as high as the distance of the lines allows.
+        order: order of the window; by default as high as the distance of the lines allows.
     """
     double = replace(samples, parts=samples.parts[:1], bits=min(samples.bits, 53))
     search: _Search | None = None
@@ -96,7 +96,7 @@ def decompose(
 
 
 def _final_order(total: Sum, real: bool) -> int:
-    """Half the least distance in bins, less one: main lobes stay apart."""
+    """Window order from the least distance of lines: half of it in bins, less one, keeps main lobes apart."""
     places = _places(total, real)
     if total.polynomial:
         places = np.append(places, 0.0)
@@ -113,7 +113,9 @@ def _places(total: Sum, real: bool) -> Reals:
 
 
 def _merged(total: Sum, real: bool) -> int | None:
-    """The weaker of two lines that have moved to one place, or one that has moved to the secular part."""
+    """Index of the weaker of two lines that have merged, or of one that merged with the secular part; None if
+    there is none.
+    """
     lines = len(total.frequencies)
     places = _places(total, real)
     sizes = np.array([abs(complex(a)) for a in total.amplitudes] * (2 if real else 1))
@@ -127,7 +129,7 @@ def _merged(total: Sum, real: bool) -> int | None:
 
 
 class _Search:
-    """One line after the other, the strongest first, all refined after each."""
+    """Search for lines one after the other, the strongest first, refining all after each."""
 
     def __init__(self, samples: SignalSamples, degree: int, order: int) -> None:
         self.samples, self.order = samples, order
@@ -164,7 +166,7 @@ class _Search:
                 hidden.append(frequency)
 
     def _strongest(self, found: Spectrum, hidden: Sequence[float], floor: float) -> int | None:
-        """The largest point that stands out of what is beside it."""
+        """Index of the largest point that stands out from its neighbourhood; None if there is none."""
         size = found.sizes.copy()
         reach = self.order + 2
         for frequency in hidden:
@@ -204,7 +206,7 @@ class _Search:
 
 
 def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> Decomposition:
-    """With errors from what is left."""
+    """The decomposition, with errors from the remainder."""
     left = remainder(samples, total)
     found = spectrum(left, order, real=samples.real)
     x = positions(total.count)
@@ -244,8 +246,12 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
 
 
 def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int) -> tuple[Reals, Reals]:
-    """Frequencies (turns per sample) and sizes of the signal's spectrum without its secular part, for a
-    picture: of neighbours the largest, so that no line is lost. Of a real signal the amplitude of the cosine.
+    """Spectrum of the signal without its secular part, for a picture: frequencies (turns per sample) and
+    sizes.
+
+    Of neighbouring points the largest is kept, so that no line is lost. For a real signal, sizes are
+    amplitudes of
+    the cosine.
     """
     secular = replace(found.sum, frequencies=(), amplitudes=())
     left = remainder(replace(samples, parts=samples.parts[:1], bits=53), secular)

@@ -1,4 +1,4 @@
-"""Sums of exponentials at equidistant times, and what is left of a signal without them, to any precision.
+"""Sums of exponentials at equidistant times, and a signal's remainder without them, to any precision.
 
 A sample's number is split as ``block a + b``, so that exp(i w t) is a product of two short tables and a sum
 of many exponentials is a product of two narrow matrices. In double precision the tables are right to rounding
@@ -26,17 +26,17 @@ _ROWS = 64  # of blocks that are worked on at once, in a precision beyond double
 
 
 def block_length(count: int) -> int:
-    """Samples in a block: about the square root."""
+    """Number of samples in a block: about the square root of the total."""
     return 1 << max(math.ceil(math.log2(max(count, 2)) / 2), 1)
 
 
 def block_count(count: int) -> int:
-    """Blocks that hold all samples."""
+    """Number of blocks that hold all samples."""
     return -(-count // block_length(count))
 
 
 def blocks(values: Any) -> Any:
-    """Samples (n,) as (blocks, block length), zeros after the end."""
+    """Samples (n,) as (blocks, block length), padded with zeros."""
     count = len(values)
     rows, width = block_count(count), block_length(count)
     padded = np.zeros(rows * width, dtype=values.dtype)
@@ -65,7 +65,7 @@ def exponentials(frequencies: Sequence[Any], numbers: NDArray[np.int64]) -> Comp
 
 @dataclass(frozen=True)
 class Grid:
-    """Numbers of samples, counted from the middle of a series."""
+    """Numbers of samples counted from the middle of a series."""
 
     count: int
 
@@ -90,10 +90,10 @@ class Sum:
 
     Attributes:
         context: mpmath context of the numbers.
-        count: samples.
+        count: number of samples.
         polynomial: coefficients (mpc) of powers of 2 n / count, n counted from the middle.
         frequencies: mpf, turns per sample.
-        amplitudes: mpc, at the middle.
+        amplitudes: amplitudes (mpc) at the middle.
     """
 
     context: Any
@@ -130,7 +130,7 @@ class Sum:
 
         Args:
             parts: real and imaginary parts of the signal, (n,); its value is the sum over the list.
-            bits: of the signal's precision; beyond 53 the difference is taken in as many and rounded once.
+            bits: bits of the signal's precision; beyond 53 the difference is taken in as many, rounded once.
         """
         if bits <= 53:
             real, imaginary = parts[0]
@@ -139,7 +139,7 @@ class Sum:
 
 
 class _Wide:
-    """The difference beyond double precision: all in fixed point, in a common unit."""
+    """The difference beyond double precision, in fixed point with a common unit."""
 
     def __init__(self, total: Sum, parts: Sequence[tuple[Reals, Reals]], bits: int) -> None:
         self.total, self.parts = total, parts
@@ -164,7 +164,7 @@ class _Wide:
         return result
 
     def _chunk(self, left: Reals, right: Reals, begin: int, end: int, which: int) -> Reals:
-        """Real (0) or imaginary part (1) of the difference, samples begin to end."""
+        """Real (0) or imaginary part (1) of the difference for samples begin to end."""
         weights: dict[int, Reals] = {}
         for i in range(self.limbs):
             for j in range(max(self.limbs - 2 - i, 0), self.limbs):
@@ -224,7 +224,7 @@ class _Wide:
     def _powers(
         self, context: Any, start: tuple[Any, Any], turn: Any, count: int
     ) -> tuple[list[int], list[int]]:
-        """start exp(i pi turn n), real and imaginary parts in fixed point."""
+        """Real and imaginary parts of start exp(i pi turn n) in fixed point."""
         extra = self.bits + 16
         step = context.expjpi(turn)
         c, s = (int(context.ldexp(x, extra)) for x in (step.real, step.imag))
@@ -237,7 +237,7 @@ class _Wide:
         return real, imaginary
 
     def _digits(self, values: list[int]) -> Reals:
-        """(limbs, n): digits of 16 bits, the lowest first; the highest is signed."""
+        """Digits of 16 bits, (limbs, n), the lowest first; the highest is signed."""
         size = 2 * self.limbs
         raw = b"".join(v.to_bytes(size, "little", signed=True) for v in values)
         digits = np.frombuffer(raw, dtype="<u2").reshape(len(values), self.limbs).astype(np.float64)
@@ -246,7 +246,7 @@ class _Wide:
 
 
 def _exact_sum(terms: Sequence[Reals]) -> Reals:
-    """Sum of numbers that nearly cancel, as with three times their precision (Ogita, Rump & Oishi 2005,
+    """Sum of nearly cancelling numbers, as if with three times their precision (Ogita, Rump & Oishi 2005,
     SIAM J. Sci. Comput. 26, 1955, algorithm 4.8 with K = 3).
     """
     first, second, third = (np.zeros_like(terms[0]) for _ in range(3))

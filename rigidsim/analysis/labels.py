@@ -1,7 +1,7 @@
-"""Names for lines: integer combinations of known frequencies, also of lines that sampling has folded.
+"""Labels of lines: integer combinations of known frequencies, also for lines folded by sampling.
 
-A line that is sampled too rarely shows up at its frequency less a whole number of turns a sample. It is
-unfolded only where one combination of known frequencies fits it, beyond Nyquist's, and no other that is
+A line that is sampled too rarely appears at its frequency less a whole number of turns per sample. It is
+unfolded only if one combination of known frequencies beyond Nyquist's fits it, and no other that is
 nearly as simple.
 """
 
@@ -28,13 +28,13 @@ _RIVALS = 2  # orders more that another combination may have and still make a la
 
 @dataclass(frozen=True)
 class Known:
-    """A frequency that a scene is known to have.
+    """A frequency known for a scene.
 
     Attributes:
         name: one word.
         value: rad/s, mpf or float; the sign counts.
-        tolerance: relative; 0 where the value is exact. The strongest line within it takes its place.
-        source: where the value comes from.
+        tolerance: relative; 0 if the value is exact. The strongest line within it takes its place.
+        source: origin of the value.
         error: one standard deviation of a value that was measured, rad/s.
         where: "body" or "space" where only signals in body axes, or only those in space, can have it: how far
             a symmetric body has turned about its axis is to be seen in body axes alone.
@@ -50,13 +50,13 @@ class Known:
 
 @dataclass(frozen=True)
 class Label:
-    """What a line is.
+    """The label of a line.
 
     Attributes:
-        multipliers: of the known frequencies; empty where none fits.
-        text: ``2 orbit - node``; "" where nothing fits.
-        folds: whole turns a sample that were added to the observed frequency.
-        doubtful: other combinations that fit as well; a folded line is not unfolded then.
+        multipliers: multipliers of the known frequencies; empty if nothing fits.
+        text: such as ``2 orbit - node``; "" if nothing fits.
+        folds: whole turns per sample that were added to the observed frequency.
+        doubtful: other combinations that fit as well; a folded line is then not unfolded.
     """
 
     multipliers: tuple[int, ...] = ()
@@ -108,15 +108,15 @@ def label(
     blend: float = 0.0,
     resolution: float = math.inf,
 ) -> Label:
-    """The combination that a line is.
+    """Find the combination that a line represents.
 
     Args:
         frequency, error: rad/s, as observed: within +-nyquist.
-        real: of a real signal, in which a line can't be told from its mirror image.
+        real: whether the signal is real, so that a line can't be told from its mirror image.
         in_body: whether the signal is in body axes.
         blend: rad/s, far less than a bin: where nothing fits within the error, combinations that near do:
             a line can have absorbed others that are too close to be told apart.
-        resolution: rad/s, a bin: where the error is about as large there is no name.
+        resolution: a bin, rad/s: a line whose error is about as large gets no label.
     """
     if _SIGMAS * error > resolution:
         return Label()
@@ -142,7 +142,9 @@ def label(
 
 @dataclass(frozen=True)
 class _Candidates:
-    """All combinations, with where each is observed and the turns a sample that this lacks."""
+    """All combinations, with the frequency at which each is observed and the turns per sample lost by
+    folding.
+    """
 
     vectors: NDArray[np.int64]
     observed: NDArray[np.float64]
@@ -159,7 +161,7 @@ class _Candidates:
         real: bool,
         blended: bool = False,
     ) -> Label:
-        """The simplest that fits; other frequencies that are nearly as simple make it doubtful."""
+        """The simplest combination that fits; others of nearly the same simplicity make it doubtful."""
         vectors, turns = self.vectors, self.turns
         fits = np.abs(self.observed - frequency) <= allowed
         if real:
@@ -191,7 +193,9 @@ class _Candidates:
         return Label(multipliers, named(multipliers, known), folds, others)
 
     def _by_chance(self, frequency: float, allowed: float, cost: int) -> float:
-        """How many combinations as simple would fit by chance, as dense as they are here."""
+        """Expected number of equally simple combinations that would fit by chance, given their density
+        here.
+        """
         width: float = max(200 * allowed, self.nyquist / 500)
         near = np.abs(self.observed - frequency) <= width
         near &= np.abs(self.vectors).sum(axis=1) <= cost
@@ -199,7 +203,7 @@ class _Candidates:
 
 
 def reversed_label(name: Label, known: Sequence[Known]) -> Label:
-    """Of a real line's mirror image."""
+    """The label of a real line's mirror image."""
     multipliers = tuple(-m for m in name.multipliers)
     return Label(multipliers, named(multipliers, known), -name.folds, name.doubtful)
 
@@ -209,10 +213,10 @@ def _same(one: NDArray[np.int64], other: NDArray[np.int64], real: bool) -> bool:
 
 
 def settled(known: Sequence[Known], lines: Mapping[str, Sequence[tuple[Any, float, float]]]) -> list[Known]:
-    """Frequencies that are known roughly, replaced by the strongest line near them, or left out.
+    """Roughly known frequencies, replaced by the strongest line near them, or left out.
 
     Args:
-        lines: of each signal, frequency (rad/s), its error, and amplitude.
+        lines: for each signal's lines, frequency (rad/s), its error, and amplitude.
     """
     found = []
     for one in known:

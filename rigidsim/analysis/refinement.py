@@ -1,6 +1,6 @@
 """Newton's method for a sum of lines and a polynomial: all frequencies, amplitudes and coefficients at once.
 
-The steps are computed in double precision, what is left of the signal in its own; see ``decomposition``.
+The steps are computed in double precision, the remainder in the signal's own; see ``decomposition``.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ _MOST_STEPS = 25
 
 @dataclass(frozen=True)
 class SignalSamples:
-    """Equidistant samples of a signal, from sample numbers.
+    """Equidistant samples of a signal.
 
     Attributes:
         parts: real and imaginary parts, (n,) float64; the value is the sum over the list.
-        real: whether imaginary parts are zero by nature.
-        bits: of the precision.
+        real: whether the signal is real by definition.
+        bits: bits of the precision.
         context: mpmath context with more digits than that.
         late: by how much of a spacing samples are later than equidistant ones, (n,): times are rounded, in a
             pattern that would show up as lines.
@@ -39,12 +39,12 @@ class SignalSamples:
 
     @property
     def count(self) -> int:
-        """How many."""
+        """Number of samples."""
         return len(self.parts[0][0])
 
 
 def mirrored(total: Sum, real: bool) -> Sum:
-    """With the mirror images of a real signal's lines."""
+    """The sum together with the mirror images of a real signal's lines."""
     if not real:
         return total
     context = total.context
@@ -56,7 +56,7 @@ def mirrored(total: Sum, real: bool) -> Sum:
 
 
 def remainder(samples: SignalSamples, total: Sum) -> Complexes:
-    """What is left of a signal, in double precision."""
+    """The remainder of a signal, in double precision."""
     whole = mirrored(total, samples.real)
     left = whole.left_of(samples.parts, samples.bits)
     if samples.late is not None and samples.bits <= 53 and (whole.frequencies or whole.polynomial):
@@ -65,7 +65,7 @@ def remainder(samples: SignalSamples, total: Sum) -> Complexes:
 
 
 def refined(samples: SignalSamples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
-    """Newton's method from where a sum is, as long as it gains."""
+    """Apply Newton's method to a sum as long as it improves."""
     if not total.frequencies and not total.polynomial:
         return total
     last = math.inf
@@ -131,7 +131,7 @@ def _products(total: Sum, left: Complexes, order: int) -> Complexes:
 
 
 def _gram(total: Sum, order: int) -> Complexes:
-    """Windowed means of the products of all columns, nearly: what it lacks the next step mends."""
+    """Approximate windowed means of the products of all columns; the next step corrects the approximation."""
     count = total.count
     places = np.array([float(f) for f in total.frequencies]) * count
     powers, lines = len(total.polynomial), len(places)
@@ -148,7 +148,7 @@ def _gram(total: Sum, order: int) -> Complexes:
 
 
 def error_growth(total: Sum, order: int) -> Reals:
-    """By how much the error of each column's factor is larger than if it stood alone."""
+    """Factor by which the error of each column's coefficient exceeds that of a column on its own."""
     matrix = _gram(total, order)
     if not len(matrix):
         return np.empty(0)

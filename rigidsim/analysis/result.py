@@ -1,4 +1,4 @@
-"""What an analysis finds, as typed values and as a Dataset."""
+"""Results of an analysis, as typed values and as a Dataset."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class SpectralLine:
-    """One line: of a real signal A cos(w t + phase), of a complex one A exp(i (w t + phase)).
+    """One line: A cos(w t + phase) in a real signal, A exp(i (w t + phase)) in a complex one.
 
     Attributes:
-        frequency: w, rad/s (mpf with the digits of the samples), unfolded where ``label.folds`` says so.
-        observed: before it was unfolded.
+        frequency: w, rad/s (mpf with the digits of the samples), unfolded if ``label.folds`` says so.
+        observed: frequency before unfolding.
         frequency_error: one standard deviation, from what is left of the signal beside the line.
         amplitude: A, in the signal's unit; mpf.
         phase: at time zero of the scene, rad within +-pi; mpf.
         phase_error: of the phase in the middle of the samples, rad.
-        label: what it is; ``mismatch`` is how far from that, rad/s.
+        label, mismatch: its label, and the distance from the labelled frequency, rad/s.
     """
 
     frequency: Any
@@ -47,7 +47,7 @@ class SpectralLine:
 
     @property
     def period(self) -> float:
-        """In s, positive; infinite for a constant."""
+        """Period in s, positive; infinite for a constant."""
         return float(TURN / abs(self.frequency)) if self.frequency else float("inf")
 
     @property
@@ -57,7 +57,7 @@ class SpectralLine:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether several combinations fit it."""
+        """Whether several combinations fit the line."""
         return bool(self.label.doubtful)
 
 
@@ -66,14 +66,14 @@ class SignalAnalysis:
     """One signal: a secular part and lines, the largest first.
 
     Attributes:
-        value, value_error: of the secular part in the middle of the samples; None without one.
-        rate, rate_error: of the secular part, per s; None without one.
-        order: of the Hann window.
-        left: rms of what is left without lines and secular part.
+        value, value_error: secular part in the middle of the samples, and its error; None without one.
+        rate, rate_error: rate of the secular part per s, and its error; None without one.
+        order: order of the Hann window.
+        left: rms of the remainder.
         level: lines below it aren't seen.
         close: frequencies (rad/s) where something is left that is too close to a line to be told apart.
         exhausted: whether there are more lines than were asked for.
-        notes: what a reader has to know.
+        notes: remarks that a reader needs.
         spectrum: frequencies (rad/s) and sizes, for a picture.
     """
 
@@ -101,9 +101,9 @@ class Analysis:
 
     Attributes:
         known: frequencies that labels are made of, in the order of multipliers.
-        spacing, length, start: of the samples, s.
-        attitude_error: of the run at its end, rad, as far as it is known.
-        title: of the dataset.
+        spacing, length, start: those of the samples, s.
+        attitude_error: attitude error of the run at its end, rad, if known.
+        title: title of the dataset.
     """
 
     signals: tuple[SignalAnalysis, ...]
@@ -115,7 +115,7 @@ class Analysis:
     title: str
 
     def __getitem__(self, name: str) -> SignalAnalysis:
-        """By the signal's name, or that of a variable that has one signal."""
+        """The analysis of a signal by its name, or by that of a variable with just one signal."""
         found = [s for s in self.signals if name in (s.name, s.name.split(".")[0])]
         if len(found) != 1:
             raise KeyError(f"{name!r}; there are {', '.join(s.name for s in self.signals)}")
@@ -127,7 +127,7 @@ class Analysis:
 
     @property
     def nyquist(self) -> float:
-        """rad/s."""
+        """Nyquist's angular frequency, rad/s."""
         return float(np.pi / self.spacing)
 
     @property
@@ -151,7 +151,7 @@ class Analysis:
         return spectrum_figure(self.dataset)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Values for JSON."""
         return {
             "title": self.title,
             "start_seconds": self.start,

@@ -1,4 +1,4 @@
-"""What of a dataset is analysed: its variables along time as real and complex signals, with every digit."""
+"""Signals of a dataset: its variables along time as real and complex signals, with every digit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _PAIRS = {
     "space_axis": [("X", "Y")],
     "quaternion_component": [("w", "z"), ("x", "y")],
 }
-"""Components, by variable or dimension, that are the real and imaginary part of a complex signal."""
+"""Components, by variable or dimension, that form the real and imaginary part of a complex signal."""
 _IN_BODY = (
     "polar_motion", "andoyer_angles", "rotation_angle", "spin_angle", "quaternion", "euler_angles",
     "roll_pitch_yaw", "nadir",
@@ -39,17 +39,17 @@ FIRST = (
     "polar_motion", "obliquity", "node_longitude", "libration", "roll_pitch_yaw", "tilt", "precession_angle",
     "spin_angle", "figure_axis", "momentum_axis", "andoyer_angles", "wobble_angle", "nutation_angle",
 )  # fmt: skip
-"""Variables that are analysed where none is named; else the angular velocity, else all."""
+"""Variables analysed by default; failing these the angular velocity, failing that all."""
 
 
 @dataclass(frozen=True)
 class EquidistantTimes:
-    """Equidistant times.
+    """Equidistant times of samples.
 
     Attributes:
         start, spacing: mpf, s.
-        count: how many.
-        bits: of the precision of the times.
+        count: number of samples.
+        bits: bits of the times' precision.
         late: what their rounding adds to equidistant times, in spacings, (n,); None beyond double precision.
     """
 
@@ -62,17 +62,17 @@ class EquidistantTimes:
 
     @property
     def middle(self) -> Any:
-        """Of the first and the last time."""
+        """Middle between the first and the last time, s."""
         return self.start + self.spacing * (self.count - 1) / 2
 
     @property
     def length(self) -> Any:
-        """As many spacings as there are samples: one turn over it is a bin."""
+        """Number of samples times the spacing, s; one turn over it is a bin."""
         return self.spacing * self.count
 
     @property
     def nyquist(self) -> float:
-        """Angular frequency of a turn in two samples, rad/s."""
+        """Nyquist's angular frequency, one turn in two samples, rad/s."""
         return float(math.pi / self.spacing)
 
 
@@ -80,7 +80,7 @@ def clock_of(dataset: xarray.Dataset) -> EquidistantTimes:
     """The times of a dataset.
 
     Raises:
-        RigidsimError: none, too few, or not equidistant.
+        RigidsimError: times are missing, too few, or not equidistant.
     """
     if "time" not in dataset.coords or dataset["time"].dims != ("time",):
         raise RigidsimError("the dataset has no coordinate time along a dimension time; analyse needs one")
@@ -119,7 +119,7 @@ def _late(times: Reals, first: Any, spacing: Any) -> Reals:
 
 
 def _refuse_uneven(times: Reals, first: float, spacing: float) -> None:
-    """Rounded times lie within half a unit in the last place of equidistant ones."""
+    """Refuse uneven times; rounded ones lie within half a unit in the last place of equidistant ones."""
     finest = 4 * np.finfo(float).eps * float(np.max(np.abs(times)))
     gaps = np.diff(times)
     if not spacing > 0 or not np.all(np.isfinite(times)):
@@ -133,7 +133,7 @@ def _refuse_uneven(times: Reals, first: float, spacing: float) -> None:
 
 
 def bits_of(dataset: xarray.Dataset, parts: int) -> int:
-    """Of the precision of values that are kept in so many parts."""
+    """Bits of the precision of values kept in so many parts."""
     if parts == 1:
         return 53
     given: Any = dataset.attrs.get("precision_bits")
@@ -146,14 +146,14 @@ def bits_of(dataset: xarray.Dataset, parts: int) -> int:
 
 @dataclass(frozen=True)
 class Signal:
-    """A real or complex function of time, as it is sampled.
+    """A sampled real or complex function of time.
 
     Attributes:
         name: variable and components: ``polar_motion.m1+i.m2``, ``obliquity.figure``.
-        variable: that it is made of.
-        units: of its values.
-        real: whether it is.
-        degree: of the secular polynomial; -1 for none.
+        variable: variable it is made of.
+        units: units of its values.
+        real: whether it is real.
+        degree: degree of the secular polynomial; -1 for none.
     """
 
     name: str
@@ -165,10 +165,10 @@ class Signal:
     components: tuple[dict[str, Any], ...]
 
     def samples(self, clock: EquidistantTimes) -> SignalSamples:
-        """All values.
+        """All samples of the signal.
 
         Raises:
-            RigidsimError: some aren't finite, or don't vary.
+            RigidsimError: some samples aren't finite, or all are equal.
         """
         names = parts_in(self.dataset, self.variable)
         parts = []
@@ -201,7 +201,7 @@ def signals_of(dataset: xarray.Dataset, chosen: Sequence[str] = ()) -> list[Sign
             dataset has, of axes the figure axis, else the angular velocity, else every variable.
 
     Raises:
-        RigidsimError: there is none of a name.
+        RigidsimError: a name is unknown.
     """
     offered = [signal for name in _variables(dataset) for signal in _signals(dataset, name)]
     if not offered:
@@ -227,7 +227,7 @@ def _of_figure(signal: Signal) -> bool:
 
 
 def _variables(dataset: xarray.Dataset) -> list[str]:
-    """Along time, of numbers, no residuals, no drifts."""
+    """Numeric variables along time, without residuals and drifts."""
     names = []
     for name, data in dataset.data_vars.items():
         plain = (

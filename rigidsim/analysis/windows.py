@@ -24,7 +24,7 @@ _ASIDE = 256  # spectral points to either side whose median is the noise beside 
 
 @lru_cache(maxsize=2)
 def positions(count: int) -> Reals:
-    """Where samples are on -1 < x < 1."""
+    """Positions of samples on -1 < x < 1."""
     x = (2.0 * np.arange(count) - (count - 1)) / count
     x.flags.writeable = False
     return np.asarray(x)
@@ -32,7 +32,7 @@ def positions(count: int) -> Reals:
 
 @lru_cache(maxsize=2)
 def hann(count: int, order: int) -> Reals:
-    """The window of an order at so many samples, of mean 1."""
+    """Hann window of an order at so many samples, with mean 1."""
     weights = (1 + np.cos(np.pi * positions(count))) ** order
     weights /= weights.mean()
     weights.flags.writeable = False
@@ -52,7 +52,7 @@ def _table(order: int, power: int) -> Complexes:
 
 
 def moments(order: int, power: int, distance: Reals) -> Complexes:
-    """Mean of the window times x^power exp(i pi D x), to some 1e-5: what one line shows of another.
+    """Mean of the window times x^power exp(i pi D x), to some 1e-5: the trace of one line at another.
 
     Args:
         distance: D in bins, any shape.
@@ -68,13 +68,13 @@ def moments(order: int, power: int, distance: Reals) -> Complexes:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Amplitudes of a windowed signal.
+    """Amplitude spectrum of a windowed signal.
 
     Attributes:
         frequencies: turns per sample, ascending.
-        sizes: of the amplitudes; a line of such a frequency has its own.
+        sizes: sizes of the amplitudes; a line at such a frequency has exactly its own.
         turned: the amplitudes as they are at the first sample, complex.
-        count: samples.
+        count: number of samples.
     """
 
     frequencies: Reals
@@ -88,18 +88,18 @@ class Spectrum:
         return 1 / self.count
 
     def amplitude(self, at: int) -> complex:
-        """Of one point, at the middle of the samples."""
+        """Complex amplitude of one point, at the middle of the samples."""
         return complex(self.turned[at] * np.exp(1j * np.pi * self.frequencies[at] * (self.count - 1)))
 
     def around(self, frequency: float, reach: float) -> slice:
-        """Points within so many bins."""
+        """Points within ``reach`` bins of a frequency."""
         low, high = np.searchsorted(
             self.frequencies, (frequency - reach * self.bin, frequency + reach * self.bin)
         )
         return slice(int(low), int(high))
 
     def noise(self, at: int, reach: float) -> float:
-        """Median size beside a point, without those within so many bins."""
+        """Median size beside a point, without points within ``reach`` bins."""
         near = self.around(float(self.frequencies[at]), reach)
         beside = np.concatenate(
             [self.sizes[max(near.start - _ASIDE, 0) : near.start], self.sizes[near.stop : near.stop + _ASIDE]]
@@ -108,7 +108,9 @@ class Spectrum:
 
 
 def spectrum(values: Complexes, order: int, *, real: bool) -> Spectrum:
-    """Two points a bin; of a real signal the positive half, with the amplitude of exp(i w t)."""
+    """Spectrum with two points per bin; for a real signal the positive half, with amplitudes of exp(i w
+    t).
+    """
     count = len(values)
     size = _smooth(2 * count)
     weights = hann(count, order) / count
@@ -122,7 +124,7 @@ def spectrum(values: Complexes, order: int, *, real: bool) -> Spectrum:
 
 
 def _smooth(least: int) -> int:
-    """The next number without prime factors above 5: fast to transform."""
+    """The next number without prime factors above 5, which transforms fast."""
     best = 1 << (least - 1).bit_length()
     fives = 1
     while fives < best:
@@ -136,7 +138,7 @@ def _smooth(least: int) -> int:
 
 
 def peak(found: Spectrum, at: int) -> float:
-    """Frequency of the maximum next to a point: the parabola through the logarithms of three sizes."""
+    """Frequency of the maximum next to a point, from the parabola through the logarithms of three sizes."""
     if not 0 < at < len(found.frequencies) - 1:
         return float(found.frequencies[at])
     with np.errstate(divide="ignore"):

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 def main() -> None:
-    """The program ``rigidsim``: what it is called with says which command has to be loaded."""
-    # what follows loads hundreds of modules, which hold no garbage to be looked for every 700 objects
+    """Entry point of ``rigidsim``: its arguments decide which command has to be loaded."""
+    # hundreds of modules are about to be imported, without garbage worth a search every 700 objects
     gc.set_threshold(400_000, 20, 20)
     # pydantic would read the metadata of every installed package to find plugins that nothing here uses
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
@@ -32,11 +32,11 @@ def main() -> None:
             sys.exit(_run(usual))
         program(named if set(named) <= set(COMMANDS) and named else COMMANDS)(prog_name="rigidsim")
     finally:
-        gc.freeze()  # what is left is given back with the process, and needn't be searched for garbage
+        gc.freeze()  # the rest is freed with the process and needn't be searched for garbage
 
 
 def _run(arguments: dict[str, Any]) -> int:
-    """The usual ``rigidsim run``; its exit code."""
+    """Execute a plain ``rigidsim run``; returns its exit code."""
     from rigidsim.cli.ending import exit_code
 
     def command() -> int:
@@ -48,7 +48,7 @@ def _run(arguments: dict[str, Any]) -> int:
 
 
 def program(names: Iterable[str] = COMMANDS) -> typer.Typer:
-    """Some commands as a program."""
+    """A program with the given commands."""
     import typer
 
     from rigidsim.cli.options import user_errors, version

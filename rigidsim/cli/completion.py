@@ -1,4 +1,4 @@
-"""What the shell offers on Tab: scenes, runs, and keys of a config; nothing heavy is loaded for it."""
+"""Completions that the shell offers on Tab: scenes, runs, and keys of a config, without heavy imports."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ if TYPE_CHECKING:
 
 
 def scenes(incomplete: str) -> list[tuple[str, str]]:
-    """Templates of ``rigidsim new``, with what they are."""
+    """Templates of ``rigidsim new`` with their descriptions."""
     from rigidsim.workflows.templates import described
 
     return [(name, text) for name, text in described().items() if name.startswith(incomplete)]
 
 
 def runs(incomplete: str) -> list[str]:
-    """Run folders in ``runs``; nothing beside them, so that the shell goes on to its files."""
+    """Run folders in ``runs``; none elsewhere, so that the shell continues with its files."""
     found = sorted(str(path.parent) for path in Path("runs").glob("*/config.toml"))
     return [path for path in found if path.startswith(incomplete)]
 
 
 def settings(incomplete: str) -> list[str]:
-    """Keys for ``--set``, and behind ``KEY=`` the values where these are names."""
+    """Keys for ``--set``, and after ``KEY=`` the values if these are names."""
     from rigidsim.scene import schema
 
     key, equals, _ = incomplete.partition("=")

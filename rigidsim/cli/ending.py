@@ -1,4 +1,5 @@
-"""How a command ends: its exit code, whatever it meets, and no traceback for what users are told.
+"""End of a command and of its process: the exit code in every case, and no traceback for errors users are
+told.
 
 Python takes its modules apart before its process ends, and the libraries theirs: a twelfth of a short run's
 time, for memory that goes back with the process anyway. So the process is left at once, after what programs
@@ -18,10 +19,10 @@ from rigidsim.errors import RigidsimError
 
 
 def exit_code(command: Callable[[], int]) -> int:
-    """Of a command that returns its own; an error meant for the user is printed and has a code, too.
+    """Run a command that returns its exit code; an error meant for the user is printed and has a code, too.
 
     Args:
-        command: is called once, in this thread.
+        command: called once, in this thread.
     """
     # SIGTERM ends like Ctrl-C, and so does SIGINT where a script's background job starts with it ignored:
     # later on the run itself heeds both, and one that comes before that mustn't be lost
@@ -48,8 +49,8 @@ def exit_code(command: Callable[[], int]) -> int:
 
 
 def _leave_builds(code: int) -> None:
-    """End the process at once where something is still being compiled: that can neither be waited for, which
-    may take seconds, nor be going on while libraries are unloaded.
+    """End the process at once if something is still being compiled, which can neither be waited for (it may
+    take seconds) nor go on while libraries are unloaded.
     """
     threads = sys.modules.get("rigidsim.solve.building")  # not loaded, nothing was compiled
     if threads is not None and threads.building():
@@ -59,10 +60,10 @@ def _leave_builds(code: int) -> None:
 
 
 def left_at_once(program: Callable[[], None]) -> None:
-    """Run a program and end the process with its exit code, the long way where other threads go on.
+    """Run a program and end the process with its exit code; in the usual way if other threads are running.
 
     Raises:
-        SystemExit: the long way.
+        SystemExit: the usual way.
     """
     try:
         program()
@@ -78,7 +79,7 @@ def left_at_once(program: Callable[[], None]) -> None:
 
 
 def _written_out() -> bool:
-    """Whether what was printed went out; not to a pipe that nobody reads, which Python has words for."""
+    """Whether everything printed was written out; not to a pipe that nobody reads, which Python reports."""
     try:
         for stream in (sys.stdout, sys.stderr):
             if stream is not None:

@@ -1,4 +1,4 @@
-"""What commands share: arguments, and how errors end the program."""
+"""Shared parts of commands: arguments, and the handling of errors."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def version(
 
 
 def user_errors(command: Callable[..., None]) -> Callable[..., None]:
-    """Errors meant for the user end the program with their message and exit code, without a traceback."""
+    """Let errors meant for the user end the program with their message and exit code, without a traceback."""
 
     @wraps(command)
     def guarded(*args: Any, **kwargs: Any) -> None:

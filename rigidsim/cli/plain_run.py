@@ -16,14 +16,14 @@ from typing import Any
 _VALUES = {"--out": "out", "--set": "overrides"}
 _FLAGS = {"--force": "force", "--json": "as_json"}
 _COMPLETING = "_RIGIDSIM_COMPLETE"
-"""Set where the shell asks what could come next."""
+"""Environment variable set when the shell asks for completions."""
 
 
 def plain(arguments: Sequence[str]) -> dict[str, Any] | None:
-    """What ``run_all`` is to be called with; None: typer has to read it.
+    """Arguments for ``run_all``; None if typer has to read the command line.
 
     Args:
-        arguments: of the program.
+        arguments: the program's arguments.
     """
     if list(arguments[:1]) != ["run"] or _COMPLETING in os.environ:
         return None
@@ -34,7 +34,7 @@ def plain(arguments: Sequence[str]) -> dict[str, Any] | None:
             found[_FLAGS[argument]] = True
         elif argument in _VALUES:
             value = next(rest, "-")
-            if value.startswith("-"):  # a value that is missing, or looks like an option
+            if value.startswith("-"):  # a missing value, or one that looks like an option
                 return None
             if argument == "--set":
                 found.setdefault("overrides", []).append(value)

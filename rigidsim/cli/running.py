@@ -1,4 +1,4 @@
-"""What ``rigidsim run`` does, once its arguments are read."""
+"""Execution of ``rigidsim run``, once its arguments are read."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def run_all(
     force: bool = False,
     as_json: bool = False,
 ) -> int:
-    """Integrate, write the run folders, print summaries; see ``rigidsim.cli.commands.run`` for what each is.
+    """Integrate, write the run folders, print summaries; see ``rigidsim.cli.commands.run`` for the arguments.
 
     Returns:
-        The exit code: of the first run that didn't finish.
+        The exit code, that of the first run that didn't finish.
 
     Raises:
-        RigidsimError: a config can't be run, or what is given contradicts itself.
+        RigidsimError: a config can't be run, or the arguments contradict each other.
     """
     from rigidsim.scene.config import has_earlier_settings
     from rigidsim.scene.suspicions import suspicious_angles, suspicious_end
@@ -89,7 +89,7 @@ def print_run(result: Run, as_json: bool) -> int:
 
 
 def _scanned(experiments: list[Experiment], scan: list[str], out: Path, *, force: bool, as_json: bool) -> int:
-    """Each config swept over what ``--sweep`` says; the exit code."""
+    """Sweep each config over the axes that ``--sweep`` gives; returns the exit code."""
     from rigidsim.cli.screens.sweeps import observer, print_sweep
     from rigidsim.workflows.sweeps.sweep import scanned, sweep
 

@@ -1,4 +1,4 @@
-"""Angles of a dataset, which are in rad, in the unit that an export asks for, with all digits of the run."""
+"""Conversion of a dataset's angles (rad) to the unit of an export, with all digits of the run."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _PI = np.longdouble("3.141592653589793238462643383279502884")
 
 
 def angle_unit_named(name: str) -> AngleUnit:
-    """By name.
+    """The unit of angle with the given name.
 
     Raises:
-        RigidsimError: there is none.
+        RigidsimError: there is no such unit.
     """
     if name not in ANGLE_UNITS:
         raise RigidsimError(f'--angle-unit: given "{name[:40]}"; allowed: {", ".join(ANGLE_UNITS)}')
@@ -27,11 +27,11 @@ def angle_unit_named(name: str) -> AngleUnit:
 
 
 def converted(parts: Sequence[np.ndarray], unit: AngleUnit, bits: int) -> list[np.ndarray]:
-    """Angles in rad as angles in a unit, rounded once to the run's precision.
+    """Angles in rad converted to a unit, rounded once to the run's precision.
 
     Args:
         parts: float64 arrays of one shape, whose sum is the value.
-        bits: of the run's precision; up to 53 one part is worked out in 64 bits.
+        bits: bits of the run's precision; up to 53, one part is worked out in 64 bits.
     """
     if unit.per_turn is None:
         return list(parts)

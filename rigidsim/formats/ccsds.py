@@ -1,4 +1,4 @@
-"""What the CCSDS ephemeris messages share: time tags, numbers and lines of their KVN syntax.
+"""Common parts of the CCSDS ephemeris messages: time tags, numbers and lines of their KVN syntax.
 
 Attitude Data Messages, CCSDS 504.0-B-2, section 6 (the orbit messages, CCSDS 502.0-B, agree with it): lines
 of at most 254 printable ASCII characters; numbers of at most 16 digits, so that a double is rounded to a
@@ -28,7 +28,7 @@ def tag(epoch: Epoch, seconds: Decimal) -> str:
     """The time tag ``YYYY-MM-DDThh:mm:ss.d`` of a time of the scene, in the epoch's scale, to 1e-14 s.
 
     Raises:
-        RigidsimError: the scale has none.
+        RigidsimError: the scale has no time tags.
     """
     try:
         return epoch.after(seconds).calendar()
@@ -67,11 +67,11 @@ def opening(
 
     Args:
         message: "AEM" or "OEM".
-        frames: keywords for what the numbers refer to, with their values.
+        frames: keywords for the reference frames, with their values.
         ending: last lines of the metadata.
 
     Raises:
-        RigidsimError: the run has no samples, or something that the standard can't express.
+        RigidsimError: the run has no samples, or there is something that the standard can't express.
     """
     naming = source.naming
     start, stop = _span(table, labels.epoch, source.bits)
@@ -108,7 +108,7 @@ def columns_of(table: Table, variable: str, labels: Sequence[str], message: str)
     """The columns of a variable.
 
     Raises:
-        RigidsimError: it wasn't recorded.
+        RigidsimError: the variable wasn't recorded.
     """
     found = [table.column(f"{variable}_{label}") for label in labels]
     if any(column is None for column in found):
@@ -120,10 +120,10 @@ def columns_of(table: Table, variable: str, labels: Sequence[str], message: str)
 
 
 def _span(table: Table, epoch: Epoch, bits: int) -> tuple[str, str]:
-    """Tags of the first and the last sample.
+    """Time tags of the first and the last sample.
 
     Raises:
-        RigidsimError: no samples, or times that have no tag.
+        RigidsimError: there are no samples, or times that have no tag.
     """
     time = table.columns[0]
     if not table.rows or time.name != "time":
@@ -143,13 +143,13 @@ def data_lines(
     bits: int,
     shown: Callable[[list[Decimal]], list[Decimal]],
 ) -> Iterator[str]:
-    """Lines ``TAG NUMBER ...``.
+    """Data lines ``TAG NUMBER ...``.
 
     Args:
-        shown: what becomes of a row's numbers: units, order, axes.
+        shown: converts a row's numbers: units, order, axes.
 
     Raises:
-        RigidsimError: a number that isn't finite, or neighbours in time with the same tag.
+        RigidsimError: a number isn't finite, or neighbouring times have the same tag.
     """
     previous, row = "", 0
     for block in table.blocks([table.columns[0], *columns]):

@@ -1,4 +1,4 @@
-"""CSV with all digits: comment lines, one line of names, then decimal text.
+"""CSV with all digits: comment lines, one header line, then decimal text.
 
     pandas.read_csv(path, comment="#", float_precision="round_trip")
 
@@ -26,7 +26,7 @@ def write_csv(table: Table, path: Path, source: TableSource) -> None:
 
     Args:
         table: rows and columns.
-        path: the file; replaced.
+        path: the file, which is replaced.
         source: the run, for the comment at the top and for the digits.
     """
     columns = [column for column in table.columns if not column.is_date]
@@ -58,7 +58,7 @@ def write_csv(table: Table, path: Path, source: TableSource) -> None:
 
 
 def _shown(column: TableColumn, parts: list[np.ndarray], source: TableSource) -> list[str]:
-    """One column's numbers, or its texts in quotes."""
+    """One column's numbers, or its strings in quotes."""
     if column.kind == "U":
         return [f'"{_on_one_line(text).replace(chr(34), chr(34) * 2)}"' for text in parts[0]]
     return texts(parts, column.bits(source.bits))
@@ -69,19 +69,19 @@ class _DateColumns:
     """Dates of a table's rows.
 
     Attributes:
-        times: the column that they are of.
+        times: the column of times that they belong to.
     """
 
     epoch: Epoch
     times: TableColumn
 
     def text(self, seconds: str) -> str:
-        """Of a time of the scene, s."""
+        """Date of a time of the scene given in s."""
         return self.epoch.after(Decimal(seconds)).calendar()
 
 
 def _dates(table: Table, source: TableSource) -> _DateColumns | None:
-    """Where time 0 is known and the calendar reaches from the first row to the last."""
+    """Date columns if the date of time 0 is known and the calendar covers all rows; else None."""
     if not table.dated:
         return None
     times = next((c for c in table.columns if re.fullmatch(r"(.*_)?time", c.variable)), None)
@@ -97,7 +97,7 @@ def _dates(table: Table, source: TableSource) -> _DateColumns | None:
 
 
 def _plain(text: str) -> str:
-    """On one line of some length, whatever a title holds."""
+    """Text on a single line of limited length."""
     return _on_one_line(text)[:200]
 
 

@@ -1,4 +1,4 @@
-"""Binary numbers of any precision as decimal text from which the same bits come back."""
+"""Conversion of binary numbers of any precision to decimal text from which the same bits can be restored."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def digits_for(bits: int) -> int:
 
 
 def exact(parts: Sequence[float]) -> Decimal:
-    """The sum of finite doubles, smallest first, with no rounding."""
+    """Exact sum of finite doubles, smallest first."""
     total = Decimal(parts[-1])
     for part in reversed(parts[:-1]):
         total = _EXACT.add(total, Decimal(part))
@@ -30,11 +30,11 @@ def exact(parts: Sequence[float]) -> Decimal:
 
 
 def texts(parts: Sequence[np.ndarray], bits: int) -> list[str]:
-    """Each number with as many digits as its precision needs; ``nan``, ``inf`` and ``-0.0`` as they are.
+    """Numbers with as many digits as their precision needs; ``nan``, ``inf`` and ``-0.0`` unchanged.
 
     Args:
         parts: float64 arrays of the same shape (rows,), the nearest double first.
-        bits: of the significand; up to 53 it is the shortest text that gives the same double.
+        bits: bits of the significand; up to 53, the shortest text that gives the same double is used.
     """
     if len(parts) == 1:
         return [repr(value) for value in parts[0].tolist()]
@@ -54,7 +54,7 @@ def _rounding(digits: int) -> Context:
 
 
 def _short(value: Decimal, lead: float, bits: int, contexts: Sequence[Context]) -> Decimal:
-    """The value to the fewest of these digits that still name it: 0.3 rather than 0.2999...9996."""
+    """The value with the fewest of these digits that still identify it: 0.3 rather than 0.2999...9996."""
     quarter = _power_of_two(math.frexp(lead)[1] - bits - 2)  # of the spacing, also just below a power of two
     for context in contexts[:-1]:
         short = context.plus(value)
@@ -69,10 +69,10 @@ def _power_of_two(exponent: int) -> Decimal:
 
 
 def _shown(value: Decimal) -> str:
-    """Without an exponent where that is short."""
+    """Text of a value, without an exponent if that is short."""
     return f"{value:f}" if -7 <= value.adjusted() < 17 else f"{value:e}"
 
 
 def decimals(parts: Sequence[np.ndarray], bits: int) -> list[Decimal]:
-    """The numbers of ``texts``; callers have refused what isn't finite."""
+    """The numbers of ``texts`` as decimals; callers have refused values that aren't finite."""
     return [Decimal(text) for text in texts(parts, bits)]

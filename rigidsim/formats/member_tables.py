@@ -1,8 +1,9 @@
-"""The dataset of a sweep as flat tables: a row per member, or per member and sample, event or spectral line.
+"""The dataset of a sweep as flat tables: one row per member, or per member and sample, event or spectral
+line.
 
-The first table has a row for each member. What has a dimension of its own beside the members' (the samples of
-whole series, occurrences of an event, spectral lines) stands in a long table for that dimension. Every table
-begins with the member's number and the values that it is known by.
+The first table has a row for each member. Variables with a dimension besides the members' (the samples of
+whole series, occurrences of an event, spectral lines) form a long table for that dimension. Every table
+begins with the member's number and the values that identify it.
 """
 
 from __future__ import annotations
@@ -30,13 +31,14 @@ _FIRST = ("status", "warnings", "steps")
 
 @dataclass(frozen=True)
 class MemberTable(Table):
-    """Rows of members, the last axis fastest; in a long table each member's own rows follow each other.
+    """A table of members, the last axis varying fastest; in a long table a member's own rows follow one
+    another.
 
     Attributes:
         members: dimensions of the members.
-        values: the columns of what is kept, among ``columns``.
-        reasons: by member, of those that didn't end well.
-        block_numbers: of all columns that are held in memory at once.
+        values: columns of kept values, among ``columns``.
+        reasons: why members failed, by member.
+        block_numbers: numbers of all columns held in memory at once.
     """
 
     members: tuple[str, ...] = ()
@@ -46,22 +48,22 @@ class MemberTable(Table):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Members along each of their dimensions."""
+        """Number of members along each of their dimensions."""
         return tuple(self.dataset.sizes[dim] for dim in self.members)
 
     @property
     def each(self) -> int:
-        """Rows of a member: 1, or in a long table as many as any has."""
+        """Rows per member: 1, or in a long table as many as any member has."""
         return 1 if self.dim == MEMBER else int(self.dataset.sizes[self.dim])
 
     @property
     def rows(self) -> int:
-        """How many there are at most: a long table has none where there is no number at all."""
+        """Largest number of rows: a long table leaves out rows without any number."""
         return math.prod(self.shape) * self.each
 
     @property
     def extent(self) -> str:
-        """For the comment at a file's top."""
+        """Extent of the table, for the comment at a file's top."""
         told = f"{math.prod(self.shape)} members along {', '.join(self.members)}"
         return told if self.dim == MEMBER else f"{told}, each along {self.dim}"
 
@@ -72,13 +74,13 @@ class MemberTable(Table):
 
     @property
     def dated(self) -> bool:
-        """No: datasets of sweeps hold no dates."""
+        """False: datasets of sweeps hold no dates."""
         return False
 
     def blocks(
         self, columns: Sequence[TableColumn] | None = None, rows: int = 0
     ) -> Iterator[list[list[np.ndarray]]]:
-        """See ``Table.blocks``; how many rows a block has follows from the number of columns."""
+        """See ``Table.blocks``; the number of columns decides how many rows a block has."""
         wanted = self.columns if columns is None else columns
         numbers = sum(len(column.parts) for column in self.columns)
         for first, shape, flat in boxes(self.shape, self.each * numbers, self.block_numbers):
@@ -91,7 +93,7 @@ class MemberTable(Table):
                 yield self._block(wanted, _Block(self.dataset.isel(here), flat, steps))
 
     def _block(self, wanted: Sequence[TableColumn], block: _Block) -> list[list[np.ndarray]]:
-        """The parts of some columns; rows of a long table without any number are left out."""
+        """Parts of some columns; rows of a long table without any number are left out."""
         if self.dim == MEMBER:
             return [self._parts(column, block) for column in wanted]
         numbers = [self._parts(column, block)[0] for column in self.values]
@@ -117,11 +119,11 @@ class MemberTable(Table):
 
 
 class _Block:
-    """Members, and samples of each, that are read together.
+    """Members, with some of their samples, that are read together.
 
     Attributes:
-        members: their numbers.
-        steps: which samples, events or lines of each.
+        members: numbers of the members.
+        steps: indices of the samples, events or lines of each.
     """
 
     def __init__(self, dataset: xarray.Dataset, members: range, steps: range) -> None:
@@ -130,8 +132,8 @@ class _Block:
         self._read: dict[str, np.ndarray] = {}
 
     def rows(self, name: str, dims: Sequence[str]) -> np.ndarray:
-        """A variable with a row for each point of some dimensions, (rows, *components); repeated along those
-        that it doesn't have.
+        """A variable with one row for each point of some dimensions, (rows, *components), repeated along
+        those that it lacks.
         """
         if name not in self._read:
             variable = self._dataset[name].variable
@@ -147,13 +149,13 @@ def member_tables(
     bits: int = 53,
     block_numbers: int = BLOCK_NUMBERS,
 ) -> list[MemberTable]:
-    """The table of the members, then the long ones.
+    """The table of the members, then the long tables.
 
     Args:
-        dataset: of a sweep.
-        angle_unit: that angles are converted to.
-        bits: of the members' precision, or more.
-        block_numbers: that are held in memory at once.
+        dataset: dataset of a sweep.
+        angle_unit: unit to which angles are converted.
+        bits: bits of the members' precision, or more.
+        block_numbers: numbers held in memory at once.
     """
     members = tuple(map(str, dataset["status"].dims))
     axes = [str(name) for name, variable in dataset.variables.items() if "swept_key" in variable.attrs]
@@ -186,10 +188,10 @@ def member_tables(
 
 
 def _is_long(dim: str, members: Sequence[str]) -> bool:
-    """Whether a dimension's points are rows; those of others, components of vectors, are columns."""
+    """Whether a dimension's points become rows; points of others, components of vectors, become columns."""
     return dim not in members and (dim in _LONG or dim.endswith("_occurrence"))
 
 
 def _made(name: str, kind: str, long_name: str) -> TableColumn:
-    """A column that is no variable of the dataset."""
+    """A column that isn't a variable of the dataset."""
     return TableColumn(name, "", (), (name,), {"units": "1", "long_name": long_name}, kind)

@@ -1,4 +1,6 @@
-"""What a CCSDS message says that no number of a run does: epoch, axes and names. None of it is made up."""
+"""Epoch, axes and names for CCSDS messages, which no number of a run contains and none of which is
+invented.
+"""
 
 from __future__ import annotations
 
@@ -25,15 +27,15 @@ _WIDE = Context(prec=60)
 
 @dataclass(frozen=True)
 class Naming:
-    """What a run's config may have left open.
+    """Values that a run's config may have left open.
 
     Attributes:
         epoch: time zero of the scene, as in ``[time] epoch``; empty for the config's.
         axes: the scene's space axes, as in ``[frame] axes``, or another name that sender and receiver agree
             on (capitals, digits and underscores); empty for the config's.
-        object_name: of the body; empty for the run's name.
+        object_name: name of the body; empty for the run's name.
         object_id: its international designator, or UNKNOWN.
-        center: what the origin of positions is called.
+        center: name of the origin of positions.
     """
 
     epoch: str = ""
@@ -45,12 +47,12 @@ class Naming:
 
 @dataclass(frozen=True)
 class Turn:
-    """From the scene's axes to those of a message that are turned about X.
+    """Rotation about X from the scene's axes to those of a message.
 
     Attributes:
-        quaternion: of the scene's axes in the message's, w x y z.
+        quaternion: attitude of the scene's axes in the message's, w x y z.
         matrix: turns vectors of the scene's axes into the message's.
-        words: for the message's comments.
+        words: description for the message's comments.
     """
 
     quaternion: list[Decimal]
@@ -59,7 +61,7 @@ class Turn:
 
     @classmethod
     def by(cls, angle: ExactNumber, words: str) -> Turn:
-        """A turn of the scene's axes about X (rad)."""
+        """Rotation of the scene's axes about X by an angle (rad)."""
         context = mpmath.MPContext()
         context.prec = _BITS
         whole = angle.at(context)
@@ -75,8 +77,8 @@ class Labels:
 
     Attributes:
         epoch: time zero of the scene.
-        frame: of the message: the scene's axes, where the standard knows them.
-        turn: from the scene's axes to the message's; None where they are the same.
+        frame: axes of the message: the scene's, if the standard knows them.
+        turn: rotation from the scene's axes to the message's; None if they are the same.
     """
 
     epoch: Epoch
@@ -85,19 +87,19 @@ class Labels:
 
     @property
     def notes(self) -> list[str]:
-        """For the message's comments."""
+        """Remarks for the message's comments."""
         found = [f"{self.epoch} is time zero of the scene"]
         return found if self.turn is None else [*found, self.turn.words]
 
     def attitude(self, quaternion: list[Decimal]) -> list[Decimal]:
-        """Quaternions w x y z from body axes to the scene's, as ones to the message's."""
+        """Quaternions w x y z from body axes to the message's axes, given those to the scene's."""
         if self.turn is None:
             return quaternion
         with localcontext(_WIDE):
             return product(self.turn.quaternion, quaternion)
 
     def vector(self, components: list[Decimal]) -> list[Decimal]:
-        """A vector of the scene's axes in the message's."""
+        """A vector in the scene's axes resolved along the message's."""
         if self.turn is None:
             return components
         with localcontext(_WIDE):
@@ -112,7 +114,7 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
     """Epoch and axes of a message, from the options given and the run's own attributes.
 
     Raises:
-        RigidsimError: neither says one of them, they contradict each other, or an option is malformed.
+        RigidsimError: one of them is given by neither, they contradict each other, or an option is malformed.
     """
     epoch = named_epoch(naming, attributes)
     axes = _axes(naming.axes, str(attributes.get("axes", "")))
@@ -125,10 +127,10 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
 
 
 def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
-    """What time 0 is, by the run or by an option.
+    """Date of time 0, from the run or from an option.
 
     Raises:
-        RigidsimError: neither says it, they contradict each other, or the option is malformed.
+        RigidsimError: neither gives it, they contradict each other, or the option is malformed.
     """
     given, known = naming.epoch, str(attributes.get("epoch", ""))
     try:

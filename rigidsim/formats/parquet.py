@@ -9,11 +9,11 @@ from rigidsim.formats.tables import BLOCK_ROWS, Table
 
 
 def write_parquet(table: Table, path: Path, source: TableSource) -> None:
-    """Write one table; ``pyarrow`` must be there.
+    """Write one table; requires ``pyarrow``.
 
     Args:
         table: rows and columns; residuals become columns such as ``time_lo``.
-        path: the file; replaced.
+        path: the file, which is replaced.
         source: the run, for the file's metadata.
     """
     import pyarrow as pa

@@ -1,4 +1,4 @@
-"""What a format is, and how the one that is asked for is found."""
+"""Formats: their description, and the lookup by name."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class TableSource:
-    """The run, or the sweep, that a table is of.
+    """The run, or the sweep, that a table comes from.
 
     Attributes:
         title: its name.
-        bits: of its precision.
-        attributes: of its dataset.
-        naming: what the dataset may not know of itself.
-        angle_unit: that angles are written in; None for rad.
+        bits: bits of its precision.
+        attributes: attributes of its dataset.
+        naming: what the dataset may not say about itself.
+        angle_unit: unit of angles; None for rad.
     """
 
     title: str
@@ -41,10 +41,10 @@ class Format:
 
     Attributes:
         write: writes a table to a path that doesn't exist yet.
-        package: that it needs beside what rigidsim always has.
+        package: package that it needs besides rigidsim's own requirements.
         angles: whether it takes angles in any unit.
         side_tables: whether tables along other dimensions than time get files of their own.
-        folder: what such a folder is called, and a file by which one is known; None: it is a file.
+        folder: what such a folder is called, and a file that identifies one; None if it writes a file.
     """
 
     write: Callable[[Table, Path, TableSource], None]
@@ -58,7 +58,7 @@ def format_named(name: str) -> Format:
     """The format ``rigidsim.formats.NAME.FORMAT``.
 
     Raises:
-        RigidsimError: there is none of that name, or the package that it needs is missing.
+        RigidsimError: there is no such format, or the package that it needs is missing.
     """
     if name not in FORMATS:
         raise RigidsimError(f'--format: given "{name[:40]}"; allowed: {", ".join(FORMATS)}')

@@ -1,4 +1,4 @@
-"""A dataset as flat tables, read block by block: what CSV, Parquet and the CCSDS messages are written from.
+"""A dataset as flat tables, read block by block, from which CSV, Parquet and the CCSDS messages are written.
 
 One table has a row per sample; each event, and the Lyapunov estimates, have a table of their own. A vector
 becomes a column per component (``angular_velocity_x``), and a column knows the residuals that hold its digits
@@ -29,13 +29,13 @@ class TableColumn:
     """One component of a variable.
 
     Attributes:
-        variable: it is a component of, ``angular_velocity``.
-        suffix: for the component, ``_x``.
-        index: of the component, beside the row.
+        variable: variable that it is a component of, such as ``angular_velocity``.
+        suffix: suffix of the component, such as ``_x``.
+        index: index of the component, besides the row.
         parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
-        attributes: units, long_name, ... of the variable.
+        attributes: the variable's units, long_name, ...
         kind: "f" for float64, "M" for datetime64, "i" for int64, "U" for texts.
-        angle_unit: that its angles are converted to, and that the column's name ends with; None: as they are.
+        angle_unit: unit of its angles, with which the column's name ends; None if unchanged.
     """
 
     variable: str
@@ -48,7 +48,7 @@ class TableColumn:
 
     @property
     def name(self) -> str:
-        """``angular_velocity_x``, or ``obliquity_figure_deg``."""
+        """Name of the column: ``angular_velocity_x``, or ``obliquity_figure_deg``."""
         return self.variable + self.suffix + self._unit
 
     @property
@@ -62,20 +62,22 @@ class TableColumn:
 
     @property
     def units(self) -> str:
-        """As in the dataset, or those that angles are converted to."""
+        """Units as in the dataset, or those to which angles are converted."""
         if self.angle_unit is not None:
             return self.angle_unit.name
         return str(self.attributes.get("units", "1"))
 
     @property
     def flags(self) -> str:
-        """What the values of a status, or the bits of a mask, mean: "0 finished, 1 ..."; empty of others."""
+        """Meaning of the values of a status, or of the bits of a mask: "0 finished, 1 ..."; empty for
+        others.
+        """
         codes = self.attributes.get("flag_values", self.attributes.get("flag_masks", ()))
         names = str(self.attributes.get("flag_meanings", "")).split()
         return ", ".join(f"{code} {name}" for code, name in zip(np.atleast_1d(codes), names, strict=True))
 
     def bits(self, of_run: int) -> int:
-        """Of the significand that its digits are to show."""
+        """Bits of the significand that its digits must show."""
         return int(self.attributes.get("significant_bits", of_run))
 
     def part_name(self, part: int) -> str:
@@ -89,9 +91,9 @@ class Table:
 
     Attributes:
         dim: "time", or the name of an event, ...
-        columns: the coordinate first where there is one.
-        dataset: that the columns are read from, block by block.
-        bits: of the run's precision.
+        columns: the columns, beginning with the coordinate if there is one.
+        dataset: dataset from which the columns are read, block by block.
+        bits: bits of the run's precision.
     """
 
     dim: str
@@ -101,26 +103,26 @@ class Table:
 
     @property
     def rows(self) -> int:
-        """How many there are."""
+        """Number of rows."""
         return int(self.dataset.sizes[self.dim])
 
     @property
     def is_main(self) -> bool:
-        """Whether it is the one that has the name of the run."""
+        """Whether it is the table that carries the run's name."""
         return self.dim == "time"
 
     @property
     def dated(self) -> bool:
-        """Whether its times may be told as dates."""
+        """Whether its times may be given as dates."""
         return True
 
     @property
     def extent(self) -> str:
-        """What its rows are, for the comment at a file's top."""
+        """Description of its rows, for the comment at a file's top."""
         return f"{self.rows} rows along {self.dim}"
 
     def column(self, name: str) -> TableColumn | None:
-        """By name; None where there is none."""
+        """The column with the given name; None if there is none."""
         return next((column for column in self.columns if column.name == name), None)
 
     def blocks(
@@ -135,7 +137,7 @@ class Table:
             yield [self._values(column, read) for column in wanted]
 
     def _values(self, column: TableColumn, read: Mapping[str, np.ndarray]) -> list[np.ndarray]:
-        """The parts of one column."""
+        """Parts of one column."""
         parts = [_column(read[part], column.index) for part in column.parts]
         unit = column.angle_unit
         return parts if unit is None else converted(parts, unit, column.bits(self.bits))
@@ -151,8 +153,8 @@ def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits
     """The table along time, then those along other dimensions.
 
     Args:
-        angle_unit: that angles are converted to.
-        bits: of the run's precision.
+        angle_unit: unit to which angles are converted.
+        bits: bits of the run's precision.
     """
     variables = dataset.variables
     names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind in "fM"]
@@ -166,10 +168,10 @@ def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits
 def columns_of(
     dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None = None, rows: Sequence[str] = ()
 ) -> list[TableColumn]:
-    """The columns of a variable, one for each component; none for a residual, which its value's columns hold.
+    """Columns of a variable, one per component; none for a residual, which its value's columns include.
 
     Args:
-        angle_unit: that angles are converted to.
+        angle_unit: unit to which angles are converted.
         rows: the dimensions that a table's rows run along; the variable's first by default.
     """
     variable = dataset[name]

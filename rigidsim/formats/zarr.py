@@ -1,4 +1,4 @@
-"""Zarr (format 2, which every reader knows): the dataset as it is, residuals and labels included."""
+"""Zarr (format 2, which every reader knows): the dataset unchanged, including residuals and labels."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def write_zarr(table: Table, path: Path, source: TableSource) -> None:
     """Write a store, a folder that doesn't exist yet, block by block along time, or a sweep's first axis.
 
     Args:
-        table: along time, or of a sweep's members; its whole dataset is written.
+        table: table along time, or of a sweep's members; its whole dataset is written.
         path: the folder.
         source: the run, for the attributes of the store.
     """
@@ -56,7 +56,7 @@ def write_zarr(table: Table, path: Path, source: TableSource) -> None:
 
 
 def _plain(dataset: xarray.Dataset, source: TableSource) -> xarray.Dataset:
-    """In memory, with angles in the unit that is asked for, without the HDF5 file's own encodings."""
+    """The dataset in memory, with angles in the requested unit, without the HDF5 file's own encodings."""
     loaded = dataset.load().copy()
     if source.angle_unit is not None:
         loaded = _converted(loaded, source.angle_unit, source.bits)
@@ -69,7 +69,7 @@ def _plain(dataset: xarray.Dataset, source: TableSource) -> xarray.Dataset:
 
 
 def _converted(dataset: xarray.Dataset, unit: AngleUnit, bits: int) -> xarray.Dataset:
-    """With all angles, and their residuals, in a unit."""
+    """The dataset with all angles, and their residuals, in a unit."""
     changed = {}
     for name in map(str, dataset.variables):
         variable = dataset[name]
@@ -83,7 +83,7 @@ def _converted(dataset: xarray.Dataset, unit: AngleUnit, bits: int) -> xarray.Da
 
 
 def _chunks(variable: xarray.DataArray, members: Sequence[str]) -> tuple[int, ...]:
-    """Rows of time; of a sweep members, as its dataset has them."""
+    """Chunk shape: rows along time; for a sweep, members as in its dataset."""
     if not members:
         return (CHUNK_ROWS, *variable.shape[1:])
     of_members = len([dim for dim in variable.dims if dim in members])

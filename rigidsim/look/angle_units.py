@@ -1,4 +1,4 @@
-"""Units in which angles read well: rad in the dataset, these in tables, figures and exports."""
+"""Units of angle for tables, figures and exports; datasets hold rad."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ class AngleUnit:
     """A unit of angle.
 
     Attributes:
-        name: as ``--angle-unit`` takes it, and as it stands in names of columns.
-        symbol: as it stands after a number.
-        per_turn: how many make a full turn; None for the radian, which divides none.
+        name: as ``--angle-unit`` takes it, and as it appears in column names.
+        symbol: as written after a number.
+        per_turn: how many make a full turn; None for the radian, which doesn't divide one.
     """
 
     name: str
@@ -37,7 +37,7 @@ ANGLE_UNITS: dict[str, AngleUnit] = {
         AngleUnit("mas", "mas", 360 * 3600 * 1000),
     )
 }
-"""By name, from the largest."""
+"""Units by name, the largest first."""
 
 _MANY_TURNS = 20 * math.pi
 _SMALL = math.radians(0.1)  # 6'

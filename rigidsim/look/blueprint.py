@@ -1,4 +1,4 @@
-"""The page that the viewer opens with: the scene, what its colours mean, its own plots, and the summary.
+"""The page that the viewer opens with: scene, legend, plots, and summary.
 
 Imports rerun when it is loaded, so load it only where a timeline is written.
 """
@@ -48,11 +48,11 @@ def build_blueprint(
         plots: as from `plots.plan_plots`.
         clock: timeline that the page opens on, at its start, and plays.
         turns: how often the body turns during the run, for the playback speed.
-        planes: figures beside the stages.
+        planes: plane figures beside the stages.
         subject: the body, for the eye's place.
         states: whether there are lanes of states.
-        pages: of text, by name.
-        following: keep to the end, of a run that goes on.
+        pages: text pages by name.
+        following: stay at the end of a run that goes on.
     """
     narrow = len(stages) > 1
     spaces: list[rrb.View | rrb.Container] = [
@@ -94,7 +94,7 @@ def build_blueprint(
 
 
 def tabs(views: Sequence[rrb.View]) -> rrb.View | rrb.Container:
-    """Views behind tabs, where they are several."""
+    """Views behind tabs, if there are several."""
     return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
 
 
@@ -144,7 +144,7 @@ def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | N
 
 
 def _window(clock: Clock, rows: int, until: int) -> list[rr.VisibleTimeRange]:
-    """From so many rows before the cursor to so many before it."""
+    """The rows shown, from ``rows`` to ``until`` before the cursor."""
     per_row = float(abs(clock.ticks[-1] - clock.ticks[0])) / max(len(clock.ticks) - 1, 1)
     return [
         rr.VisibleTimeRange(
@@ -171,7 +171,7 @@ def plane_view(plane: Plane) -> rrb.Spatial2DView:
 
 
 def legend_view(legend: Sequence[tuple[str, Color]]) -> rrb.Spatial2DView:
-    """A view of what the colours mean."""
+    """A view of the legend."""
     lines = legend_lines(legend)
     return rrb.Spatial2DView(
         origin="/legend",
@@ -183,7 +183,7 @@ def legend_view(legend: Sequence[tuple[str, Color]]) -> rrb.Spatial2DView:
 
 def plot_view(plot: Plot) -> rrb.TimeSeriesView:
     """A view of one plot."""
-    # Drifts grow upwards along time: their legend stays out of the way below.
+    # Drifts grow upwards along time: their legend stays below, out of the way.
     corner = rrb.Corner2D.RightBottom if plot.place == "drift" else rrb.Corner2D.LeftTop
     return rrb.TimeSeriesView(
         origin="/plots",

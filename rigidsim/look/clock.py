@@ -1,4 +1,4 @@
-"""Seconds of float64 to the integer timelines of the viewer.
+"""Conversion of float64 seconds to the viewer's integer timelines.
 
 rerun keeps times as int64 nanoseconds. A float given to it is truncated, steps below 1 ns vanish
 and beyond 292 years it wraps, so the integers are built and checked here. Where nanoseconds don't
@@ -25,7 +25,7 @@ _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be a
 
 @dataclass(frozen=True)
 class Clock:
-    """Times of the rows as integers.
+    """Times of the rows as integers of a viewer timeline.
 
     Attributes:
         name: name of the timeline, with the unit if it isn't a duration.

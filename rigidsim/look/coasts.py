@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
 
 WIDTH = 720
-"""Of the map in pixels: half a degree each, about what a screen shows of half a globe."""
+"""Width of the map in pixels: half a degree each, about what a screen resolves of half a globe."""
 _SEA, _LAND, _ICE = (58, 108, 176), (146, 156, 98), (226, 232, 236)
 _SOUTHERN_ICE, _NORTHERN_ICE = -60.0, (72.0, 80.0)  # degrees of latitude: land that is shown white
 
@@ -42,7 +42,7 @@ def land_map(width: int = WIDTH) -> NDArray[np.bool_]:
         crossed = (first[:, 1] > latitude) != (second[:, 1] > latitude)
         a, b = first[crossed], second[crossed]
         east = a[:, 0] + (latitude - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-        # A point is inside where an odd number of coasts lies to its west, counted on the unrolled map.
+        # A point is inside if an odd number of coasts lies to its west, counted on the unrolled map.
         pixel = np.ceil(east / 360 * width - 0.5).astype(np.int64)
         turns, pixel = np.divmod(pixel, width)
         crossings = np.bincount(pixel, minlength=width)
@@ -63,7 +63,7 @@ def earth_map() -> Pixels:
 
 
 def earth(half_sizes: Array) -> Mesh:
-    """An ellipsoid that wears the map."""
+    """An ellipsoid textured with the map."""
     mesh = ball(*half_sizes)
     unit = mesh.vertices / half_sizes
     longitude = np.arctan2(unit[:, 1], unit[:, 0]) / (2 * np.pi) % 1.0

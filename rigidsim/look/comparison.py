@@ -1,4 +1,6 @@
-"""Several runs side by side: their bodies, their plots in common ones, how far their attitudes are apart."""
+"""Several runs side by side: their bodies, their curves in common plots, and the distances between their
+attitudes.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,9 @@ if TYPE_CHECKING:
     from rigidsim.look.rows import Table
 
 MOST = 6
-"""Runs that are shown beside one another."""
+"""Largest number of runs shown side by side."""
 ROWS = 20_000
-"""Of each run."""
+"""Largest number of rows shown of each run."""
 COLORS = ((92, 148, 235), (240, 190, 60), (104, 190, 110), (225, 115, 190), (80, 200, 215), (235, 140, 80))
 _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
@@ -32,9 +34,9 @@ def write_comparison(named: Sequence[tuple[str, AnyTable]], path: Path, *, rows:
     """Write several datasets as one recording on one clock, their first stages side by side.
 
     Args:
-        named: datasets with the names that they are to have on the screen; two to ``MOST``.
+        named: datasets with their names on the screen; two to ``MOST``.
         path: the file; it is whole when this returns.
-        rows: of each, at most.
+        rows: largest number of rows of each.
 
     Returns:
         The number of rows written.
@@ -68,14 +70,14 @@ def write_comparison(named: Sequence[tuple[str, AnyTable]], path: Path, *, rows:
 
 
 def _part(clock: Clock, seconds: NDArray[np.float64]) -> Clock:
-    """The clock of all, for the times of one."""
+    """The common clock, for the times of one run."""
     whole = np.asarray(clock.ticks * clock.seconds_per_tick)
     places = np.clip(np.searchsorted(whole, seconds - 0.5 * clock.seconds_per_tick), 0, len(whole) - 1)
     return replace(clock, ticks=clock.ticks[places])
 
 
 def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
-    """A run under entities and titles of its own; its leading plots alone."""
+    """A run under entities and titles of its own, with only its leading plots."""
     root, title = f"run{number}", legible(name)
     stages = [
         replace(stage, root=f"{root}/{stage.root}", title=f"{title}: {stage.title}")
@@ -116,7 +118,7 @@ def _shade(color: tuple[int, int, int], number: int) -> tuple[int, int, int]:
 def attitude_differences(named: Sequence[tuple[str, Table]]) -> Plot | None:
     """log10 of the angle (rad) between the first run's attitude and each other's, at the first run's times.
 
-    Between the samples of another run its quaternions are interpolated on the arc. None where the first has
+    Between the samples of another run its quaternions are interpolated on the arc. None if the first has
     no attitude, or no other has one at its times.
     """
     from rigidsim.look.signals import values
@@ -155,7 +157,9 @@ def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArr
 def _at(
     times: NDArray[np.float64], theirs: NDArray[np.float64], quaternion: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Unit quaternions at some times: of a sample where there is one, on the arc between two, else nan."""
+    """Unit quaternions at given times: recorded at samples, interpolated on the arc between two, nan
+    elsewhere.
+    """
     unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     after = np.clip(np.searchsorted(theirs, times), 0, len(theirs) - 1)
     exact = theirs[after] == times

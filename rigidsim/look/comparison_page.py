@@ -25,8 +25,8 @@ def build_comparison(runs: Sequence[DrawnRun], clock: Clock, difference: Plot | 
 
     Args:
         runs: each with one stage, under names of its own.
-        clock: of all times.
-        difference: how far their attitudes are apart, where that is known.
+        clock: clock of all times.
+        difference: distances between their attitudes, if known.
     """
     spaces = [space_view(run.picture.stages[0], run.clock, narrow=True, subject=run.subject) for run in runs]
     legend = legend_of(runs[0].picture.stages)

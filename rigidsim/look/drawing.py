@@ -1,4 +1,4 @@
-"""Stages to rerun entities: what never changes, and the columns of what does.
+"""Stages as rerun entities: static parts, and columns of what changes.
 
 Imports rerun when it is loaded, so load it only where a timeline is written. Meshes are given no normals:
 the viewer then shows their own colours from all sides, and edges tell the faces apart.
@@ -21,9 +21,9 @@ from rigidsim.look.symbols import graticule, sharp_edges
 Columns = Iterable[rr.ComponentColumn]
 
 OLDER = 16
-"""Rows in one piece of the older part of a trail."""
+"""Rows in one piece of a trail's older part."""
 SCENE_ROWS = 20_000
-"""Rows of arrows and trails, from which on those are thinned whose motion allows it."""
+"""Number of rows above which arrows and trails are thinned, if their motion allows it."""
 _STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
 _SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
 _CHORDS = 5000  # of a trail that are looked at, to know how smooth it is
@@ -143,7 +143,7 @@ def _draw_surroundings(recording: rr.RecordingStream, stage: Stage) -> None:
 
 
 def _draw_shell(recording: rr.RecordingStream, path: str, shell: Shell) -> None:
-    """An ellipsoid one can look through, with its meridians and parallels."""
+    """A translucent ellipsoid with its meridians and parallels."""
     if shell.quaternion is not None:
         turn = rr.Transform3D(quaternion=rr.Quaternion(xyzw=shell.quaternion))
         recording.log(path, turn, static=True)
@@ -196,7 +196,7 @@ def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
 
 
 def strides_of(stage: Stage) -> dict[str, int]:
-    """Rows from one that is drawn to the next, of each arrow and each trail, by entity."""
+    """Strides between drawn rows for each arrow and each trail, by entity."""
     found = {_arrow_path(stage, arrow): still_stride(arrow.vectors) for arrow in stage.arrows}
     return found | {trail_path(stage, trail): trail_stride(trail) for trail in stage.trails}
 
@@ -207,7 +207,7 @@ def stage_columns(
     """Entities of a stage with their rows (of the run) and columns, for the rows of one chunk.
 
     Args:
-        strides: as of ``strides_of``.
+        strides: as from ``strides_of``.
     """
     root = f"/{stage.root}"
     # Translation and rotation in one call: apart, the viewer would see states that never were.
@@ -262,7 +262,7 @@ def _trail_columns(path: str, trail: Trail, rows: slice, stride: int) -> Iterabl
 
 
 def still_stride(vectors: NDArray[np.float64]) -> int:
-    """Rows from one to the next that has to be drawn, so that an arrow is never seen behind its motion."""
+    """Stride between rows that have to be drawn so that an arrow never visibly lags behind its motion."""
     count = len(vectors)
     if count <= SCENE_ROWS:
         return 1
@@ -281,7 +281,7 @@ def still_stride(vectors: NDArray[np.float64]) -> int:
 
 
 def trail_stride(trail: Trail) -> int:
-    """Rows from one end of a trail's pieces to the next: several where the curve stays smooth with it."""
+    """Stride between the ends of a trail's pieces: several rows if the curve stays smooth."""
     count = len(trail.points)
     if count <= SCENE_ROWS:
         return 1
@@ -299,7 +299,7 @@ def trail_stride(trail: Trail) -> int:
 
 
 def fades(trail: Trail, stride: int) -> bool:
-    """Whether a trail has an older part that is darker: a long one of a fast motion is heavy as it is."""
+    """Whether a trail has a darker older part; a long trail of a fast motion is heavy enough without."""
     return trail.line and (stride > 2 or len(trail.points) <= SCENE_ROWS)
 
 
@@ -309,7 +309,9 @@ def _every(rows: slice, stride: int) -> slice:
 
 
 def _pieces(points: NDArray[np.float64], rows: slice, stride: int, length: int) -> pa.Array:
-    """A strip of `length` + 1 points per row, up to that row, `stride` rows apart; made at once in Arrow."""
+    """For each row, a strip of `length` + 1 points up to that row, `stride` rows apart; built at once in
+    Arrow.
+    """
     ends = np.arange(rows.start, rows.stop, rows.step or 1)
     back = stride * np.arange(length, -1, -1)
     places = np.maximum(ends[:, None] - back[None, :], 0)

@@ -1,4 +1,4 @@
-"""Everything that is drawn of one run, ready to be sent to a recording: picture, plots, states and pages."""
+"""Everything drawn of one run, ready to be sent to a recording: picture, plots, states and pages."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DrawnRun:
-    """Everything that is drawn of one dataset.
+    """Everything drawn of one dataset.
 
     Attributes:
         steps: (rows,), which rows of the dataset these are.
         pages: markdown by name.
-        words: how its times are told.
+        words: wording of its times.
     """
 
     picture: Picture
@@ -50,11 +50,11 @@ class DrawnRun:
     def of(
         cls, dataset: Table, shown: Table, steps: NDArray[np.int64], clock: Clock | None = None
     ) -> DrawnRun:
-        """That of a dataset and its rows in memory.
+        """The drawing of a dataset and its rows in memory.
 
         Args:
             steps: which rows of the dataset these are.
-            clock: of their times; None for the one that suits them.
+            clock: clock of their times; None for the one that suits them.
 
         Raises:
             ValueError: a time that isn't finite, or an unreadable ``drawing``.
@@ -89,7 +89,7 @@ class DrawnRun:
         )
 
     def blueprint(self, *, following: bool = False) -> Any:
-        """The layout."""
+        """The page layout."""
         from rigidsim.look.blueprint import build_blueprint
         from rigidsim.look.plotting import legend_of
 
@@ -107,7 +107,7 @@ class DrawnRun:
         )
 
     def draw_static(self, recording: Any, *, legend: bool = True) -> None:
-        """What holds for all times.
+        """Draw what holds for all times.
 
         Args:
             legend: whether the legend with its clock is wanted.
@@ -134,7 +134,7 @@ class DrawnRun:
         plotting.draw_clock(recording, words, self._times(self.clock.ticks[told], self.steps[told]))
 
     def draw_rows(self, recording: Any, rows: slice) -> None:
-        """What changes, for some rows."""
+        """Draw what changes, for some rows."""
         from rigidsim.look import drawing, plotting
         from rigidsim.look.sending import send
 
@@ -153,7 +153,7 @@ class DrawnRun:
         plotting.draw_plane_rows(recording, self.planes, times, rows)
 
     def draw_plots(self, recording: Any, plots: list[Plot]) -> None:
-        """More plots over all rows, with their styles."""
+        """Draw additional plots over all rows, with their styles."""
         from rigidsim.look import plotting
 
         plotting.draw_plot_styles(recording, plots)

@@ -1,10 +1,10 @@
-"""The names of all figures and what each shows, in one line: for helps and messages, without any import."""
+"""Names of all figures with one line on what each shows, for help texts and messages, without any import."""
 
 OVERVIEW = "overview"
 """The page that suits the scene."""
 
 SPECTRUM = "spectrum"
-"""Drawn of a run's analysis: ``rigidsim.look.spectrum``."""
+"""Figure of a run's analysis: ``rigidsim.look.spectrum``."""
 
 FIGURES: dict[str, str] = {
     OVERVIEW: "the page that suits the scene: its leading figures, drifts and a table (the default)",

@@ -1,4 +1,4 @@
-"""A timeline as a picture or a film, drawn by the viewer without a screen."""
+"""A timeline drawn by the viewer, without a screen, as a picture or a film."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ GIF_WIDTH = 1000
 FRAMES_PER_SECOND = {".gif": 12, ".mp4": 30}
 SECONDS = 6.0
 PICTURED_AT = 0.4
-"""Where in the run a single picture is taken: trails have begun, and curves go on."""
+"""Time of a single picture, as a fraction of the run: trails have begun, and curves go on."""
 _GIF_COLORS = 128
 
 
 class NoEncoder(RuntimeError):
-    """The library that writes films isn't installed."""
+    """Raised if the library that writes films isn't installed."""
 
 
 def render(
@@ -30,9 +30,9 @@ def render(
 
     Args:
         path: a ``.rrd`` file.
-        target: its suffix says what is drawn.
-        seconds: that a film lasts.
-        told: is called with the number of frames drawn so far and of all.
+        target: the file, whose suffix decides what is drawn.
+        seconds: duration of a film.
+        told: called with the number of frames drawn so far, and the total.
 
     Returns:
         `target`.

@@ -1,4 +1,4 @@
-"""A run that goes on, in the viewer: what has been saved of it so far, and what comes, as it comes."""
+"""Following a running run in the viewer: what has been saved so far, and the rest as it comes."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class LiveRecording:
     """A recording that grows with a run.
 
     Args:
-        stream: of rerun, connected to a viewer or a file.
+        stream: recording stream of rerun, connected to a viewer or a file.
 
     Attributes:
-        rows: sent so far.
+        rows: number of rows sent so far.
     """
 
     def __init__(self, stream: Any) -> None:
@@ -42,7 +42,7 @@ class LiveRecording:
         self.rows = 0
 
     def update(self, dataset: xarray.Dataset) -> None:
-        """Send what is new of a dataset that has all samples so far.
+        """Send the new rows of a dataset that has all samples so far.
 
         Where the scales of the picture have changed with the new samples, everything is sent again.
         """
@@ -70,7 +70,7 @@ class LiveRecording:
 
 
 def _scales_of(run: DrawnRun) -> tuple[object, ...]:
-    """What earlier rows were drawn by: equal for two parts of a run whose rows fit together."""
+    """What earlier rows were drawn with: equal for two parts of a run whose rows fit together."""
     picture = run.picture
     arrows = [(s.root, a.name, *np.round(a.vectors[0], 4)) for s in picture.stages for a in s.arrows]
     trails = [(s.root, t.name, t.line, *np.round(t.points[0], 4)) for s in picture.stages for t in s.trails]
@@ -85,15 +85,15 @@ def follow(
     """Open the viewer on a run that goes on, and keep it up to date until the run or the viewer ends.
 
     Args:
-        read: gives the dataset of what is saved so far, None before there is one, and whether it goes on.
+        read: returns the dataset saved so far (None before there is one), and whether the run goes on.
         web: in the browser, served on 127.0.0.1 only, until Ctrl-C.
-        poll: seconds from one look to the next.
+        poll: interval between polls, s.
 
     Returns:
         The viewer's exit code; 130 after Ctrl-C.
 
     Raises:
-        NoDisplay, FileNotFoundError: as of ``viewer.open_viewer``.
+        NoDisplay, FileNotFoundError: as for ``viewer.open_viewer``.
         RuntimeError: the viewer ended before it listened.
     """
     process, port = viewer.start_empty(web=web)

@@ -1,4 +1,4 @@
-"""The summary page (markdown) that stands beside the pictures."""
+"""The summary page (markdown) beside the pictures."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def title_of(dataset: Table) -> str:
 
 
 def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
-    """Markdown, short enough to be seen whole: what was run, and what was conserved.
+    """Markdown page, short enough to be seen whole: what was run, and what was conserved.
 
     Args:
         dataset: the whole dataset (only its attributes and sizes are read).
         thinned: its rows as shown, in memory.
-        kind: of scene that the picture shows.
+        kind: kind of scene that the picture shows.
     """
     config = read_config(dataset)
     integrator = config.get("integrator", {})
@@ -77,18 +77,18 @@ def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
 
 
 def notes_page(kind: str, notes: list[str]) -> str:
-    """Markdown: what the picture shows, and how it is scaled."""
+    """Markdown page: what the picture shows, and how it is scaled."""
     return legible("\n".join([f"**Picture: {kind}**", "", *(f"- {note}" for note in notes), ""]))
 
 
 def config_page(dataset: Table) -> str:
-    """Markdown: the config that was run; empty where there is none."""
+    """Markdown page of the config that was run; empty if there is none."""
     text = str(dataset.attrs.get("config", "")).strip()
     return legible("\n".join(["```toml", text, "```", ""])) if text else ""
 
 
 def legible(text: str) -> str:
-    """A text of characters that the viewer has glyphs for: over others it ends itself (0.41, Inter alone)."""
+    """The text with characters that the viewer has glyphs for; it aborts on others (0.41, Inter alone)."""
     return _WITHOUT_GLYPH.sub("?", text)
 
 
@@ -104,7 +104,7 @@ _WITHOUT_GLYPH = re.compile(f"[^{_SINGLE}{_RANGES}]")
 
 
 def largest_drift(variable: Variable) -> float:
-    """Largest magnitude of a drift over the rows given; NaN when there is none that is finite."""
+    """Largest magnitude of a drift over the given rows; NaN if none is finite."""
     magnitude = np.abs(np.asarray(variable.values, dtype=np.float64))
     magnitude = magnitude[np.isfinite(magnitude)]
     return float(magnitude.max()) if magnitude.size else float("nan")

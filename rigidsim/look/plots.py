@@ -1,4 +1,4 @@
-"""Which variable goes into which plot: decided from dimensions, units and attributes alone.
+"""Assignment of variables to plots, decided by dimensions, units and attributes alone.
 
 A new observable or invariant needs no line here: it gets a plot of its own, or joins the plot of
 the scalars that share its unit.
@@ -66,7 +66,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Level:
-    """A value that holds for the whole run, drawn as a level line."""
+    """A value for the whole run, drawn as a horizontal line."""
 
     key: str
     label: str
@@ -89,7 +89,9 @@ class Plot:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """Of a plot whose curves all stay where they are: limits that don't magnify their rounding errors."""
+        """Limits for a plot of constant curves that don't magnify their rounding errors; None for other
+        plots.
+        """
         if self.place == "drift" or not self.series:
             return None
         middles = []
@@ -112,7 +114,7 @@ def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
     has its own, and so has what leads. Angles are in the unit in which they read best.
 
     Args:
-        leading: variables that the scene is about, first of all.
+        leading: variables that the scene is about, which come first.
     """
     plots: dict[str, Plot] = {}
     variables = list(_variables(dataset))
@@ -171,7 +173,9 @@ def _reading(variable: Variable, unit: str) -> tuple[float, str]:
 
 
 def _uncertainty(dataset: Table, values: NDArray[np.float64], factor: float) -> NDArray[np.float64] | None:
-    """The announced error of the attitude, growing like t^1.5 to that at the end, where it can be seen."""
+    """The announced attitude error, growing like t^1.5 to its value at the end, if large enough to be
+    seen.
+    """
     error = dataset.attrs.get("attitude_error")
     finite = values[np.isfinite(values)]
     if error is None or not len(finite) or not float(error) * factor > _SEEN * float(np.ptp(finite)):
@@ -191,7 +195,7 @@ def _announced(dataset: Table) -> list[Level]:
 
 
 def drift_floor(drifts: list[NDArray[np.float64]]) -> float:
-    """What a drift of exactly zero is drawn at: a tenth of the low end of all that isn't zero.
+    """Value at which a drift of exactly zero is drawn: a tenth of the low end of all nonzero ones.
 
     A zero has no logarithm. A fixed floor would flatten the curves of double precision or stand above
     those of quadruple precision.
@@ -278,7 +282,7 @@ def _series(variable: Variable, position: int, floor: float) -> Series:
 def _told_apart(
     labels: list[str], colors: list[Color], values: NDArray[np.float64]
 ) -> tuple[list[str], list[Color], NDArray[np.float64]]:
-    """Of axes that lie together the first, with all their names: the last would cover the others."""
+    """Of axes that coincide only the first, with all their names, since the last would cover the others."""
     kept: list[int] = []
     names: list[str] = []
     for column, label in enumerate(labels):

@@ -18,7 +18,7 @@ from rigidsim.look.states import States
 
 PIXELS = 500  # about the width of a plot
 CLOCK_ROWS = 2000
-"""At most, of the clock on the screen."""
+"""Largest number of rows of the clock on the screen."""
 _INK: Color = (205, 210, 218)
 _FAINT: Color = (90, 96, 108)
 LEGEND_COLUMNS = 3
@@ -99,7 +99,7 @@ def _measured(series: Series, rows: slice) -> rr.ComponentColumnList:
 
 
 def aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.AggregationPolicy:
-    """What the viewer draws of the rows that fall into one pixel.
+    """Which of the rows that fall into one pixel the viewer draws.
 
     Its default is their average, which is smooth, but shows a fast rotation with a vanishing
     amplitude: then the extremes are drawn. Of a drift only the largest is of interest.
@@ -119,7 +119,7 @@ def aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.Aggreg
 
 
 def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
-    """Plane figures as far as they don't change: the whole path, circles, axes."""
+    """Draw the static parts of plane figures: the whole path, circles, axes."""
     for plane in planes:
         path = plane_path(plane)
         points = flipped(plane.points)
@@ -178,14 +178,14 @@ def draw_plane_rows(
 
 
 def plane_reach(plane: Plane) -> float:
-    """Of what is drawn of a plane figure, from its origin."""
+    """Extent of what is drawn of a plane figure, from its origin."""
     finite = plane.points[np.isfinite(plane.points).all(axis=1)]
     size = float(np.abs(finite).max(initial=0.0))
     return size or 1.0
 
 
 def flipped(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Plane points as the viewer has them, whose second axis points down."""
+    """Plane points for the viewer, whose second axis points down."""
     return points * np.array([1.0, -1.0])
 
 
@@ -196,7 +196,7 @@ def _dense(points: NDArray[np.float64]) -> bool:
 
 
 def legend_of(stages: Sequence[Stage]) -> list[tuple[str, Color]]:
-    """What colours mean, each once."""
+    """Meaning of each colour, once."""
     found: dict[str, Color] = {}
     for stage in stages:
         parts: list[Arrow | Vector | Trail | Line] = [
@@ -212,12 +212,12 @@ def legend_of(stages: Sequence[Stage]) -> list[tuple[str, Color]]:
 
 
 def legend_lines(entries: Sequence[tuple[str, Color]]) -> int:
-    """Of the legend on the screen, with the clock's."""
+    """Number of lines of the legend on the screen, including the clock's."""
     return -(-(1 + len(entries)) // LEGEND_COLUMNS)
 
 
 def draw_legend(recording: rr.RecordingStream, entries: Sequence[tuple[str, Color]]) -> None:
-    """The legend as a plane figure, 30 units wide and one for each line; the clock stands first."""
+    """Draw the legend as a plane figure, 30 units wide and one per line, the clock first."""
     if entries:
         words = [f"■ {words}" for words, _ in entries]
         places = [_legend_place(number + 1) for number in range(len(entries))]
@@ -234,7 +234,7 @@ def _legend_place(number: int) -> tuple[float, float]:
 
 
 def draw_clock(recording: rr.RecordingStream, words: list[str], times: list[rr.TimeColumn]) -> None:
-    """The time of the scene in words, some of the rows."""
+    """Draw the scene's time in words, for some of the rows."""
     places = [_legend_place(0)] * len(words)
     columns = rr.Points2D.columns(positions=places, labels=words)
     recording.send_columns("/legend/clock", indexes=times, columns=columns)
@@ -243,7 +243,7 @@ def draw_clock(recording: rr.RecordingStream, words: list[str], times: list[rr.T
 def draw_states(
     recording: rr.RecordingStream, states: Sequence[States], times: list[list[rr.TimeColumn]]
 ) -> None:
-    """Lanes of what happened when."""
+    """Draw lanes of states over time."""
     for lane, indexes in zip(states, times, strict=True):
         path = f"/states/{rr.escape_entity_path_part(lane.name)}"
         values = sorted(set(lane.values))

@@ -1,6 +1,6 @@
-"""Times as people read them: a span in the unit that suits it, fs to Gyr, and an instant as a date.
+"""Readable times: a span in the unit that suits it, fs to Gyr, and an instant as a date.
 
-What a config says of it in ``[time] unit`` and ``epoch`` stands in the dataset's attributes ``time_unit`` and
+A config's ``[time] unit`` and ``epoch`` are stored in the dataset's attributes ``time_unit`` and
 ``epoch``; without a unit the span chooses one.
 """
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 DAY = 86400.0
 YEAR = 365.25 * DAY
-"""Julian, s: the unit ``yr`` of configs."""
+"""Julian year, s: the unit ``yr`` of configs."""
 _J2000_YEAR = 2000.0
 _LONG = ((1e9 * YEAR, "Gyr"), (1e6 * YEAR, "Myr"), (1e3 * YEAR, "kyr"))
 _CALENDAR = ((YEAR, "yr"), (DAY, "d"), (3600.0, "h"), (60.0, "min"))
@@ -36,8 +36,8 @@ class TimeUnit:
     """A unit of time.
 
     Attributes:
-        symbol: as it is written behind a number.
-        seconds: in one of it.
+        symbol: as written after a number.
+        seconds: its length, s.
     """
 
     symbol: str
@@ -47,7 +47,7 @@ class TimeUnit:
 def unit_for(span: float) -> TimeUnit:
     """The unit in which a span (s, of either sign) reads as a number of about 1 to 1000.
 
-    Two minutes, hours, days and years are where these begin: 90 s reads better than 1.5 min.
+    Each of min, h, d and yr is used from two of them on: 90 s reads better than 1.5 min.
     """
     size = abs(span) * _CLOSE
     if not math.isfinite(size) or size == 0:
@@ -61,16 +61,16 @@ def unit_for(span: float) -> TimeUnit:
 
 
 def named_unit(name: str) -> TimeUnit:
-    """The unit that a config calls so, such as ``day``.
+    """The unit of a name in a config, such as ``day``.
 
     Raises:
-        ValueError: it is no unit of time.
+        ValueError: the name is no unit of time.
     """
     return TimeUnit(name, float(time_unit(name)))
 
 
 def unit_of(attributes: Mapping[str, Any], span: float) -> TimeUnit:
-    """The unit that a run's attributes ask for, or else the one that suits a span (s)."""
+    """The unit that a run's attributes ask for, or otherwise the one that suits a span (s)."""
     name = str(attributes.get("time_unit") or "")
     try:
         return named_unit(name) if name else unit_for(span)
@@ -79,7 +79,7 @@ def unit_of(attributes: Mapping[str, Any], span: float) -> TimeUnit:
 
 
 def epoch_of(attributes: Mapping[str, Any]) -> Epoch | None:
-    """What time 0 is, where a run's attributes say it."""
+    """Date of time 0, if a run's attributes give it; else None."""
     try:
         return parse_epoch(str(attributes.get("epoch") or ""))
     except ValueError:
@@ -87,13 +87,13 @@ def epoch_of(attributes: Mapping[str, Any]) -> Epoch | None:
 
 
 def number_text(value: float, digits: int = 3) -> str:
-    """A number to so many digits, without an exponent where that is short: ``999.7`` gives ``1000``."""
+    """A number to so many digits, without an exponent if that is short: ``999.7`` gives ``1000``."""
     text = f"{value:.{digits}g}"
     return f"{value:.0f}" if "e" in text and 1 <= abs(value) < 1e6 else text
 
 
 def span_text(seconds: float, digits: int = 3, unit: TimeUnit | None = None) -> str:
-    """A time span, in the unit that suits it unless one is given: ``304 d``, ``25.8 kyr``, ``4.2 µs``."""
+    """A time span in the unit that suits it, or in a given one: ``304 d``, ``25.8 kyr``, ``4.2 µs``."""
     unit = unit or unit_for(seconds)
     return f"{number_text(seconds / unit.seconds, digits)} {unit.symbol}"
 
@@ -102,7 +102,7 @@ def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
     """Date and time some seconds after an epoch, to about a thousandth of a span (s).
 
     A day, a minute, a second, or decimals of one, in the epoch's scale; times of the day are rounded, dates
-    are those of the day. Where UTC isn't known it is TT; outside the years 1 to 9999 a Julian year is given.
+    are not. If UTC isn't known, TT is used; outside the years 1 to 9999 a Julian year is given.
     """
     step = abs(span) * 1e-3 * _CLOSE or 1e-6
     decimals = min(max(math.ceil(-math.log10(step)), 0), 9)
@@ -126,12 +126,12 @@ def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
 
 @dataclass(frozen=True)
 class TimeWords:
-    """How the times of one run are told.
+    """Wording of the times of one run.
 
     Attributes:
-        unit: of all of them.
-        epoch: time 0, where it is known: dates are told, too.
-        span: of the run, s; dates are as fine as a thousandth of it.
+        unit: unit of all times.
+        epoch: date of time 0, if known, so that dates are given too.
+        span: length of the run, s; dates resolve a thousandth of it.
     """
 
     unit: TimeUnit
@@ -140,11 +140,11 @@ class TimeWords:
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any], start: float, end: float) -> TimeWords:
-        """Those of a run.
+        """Wording for a run.
 
         Args:
-            attributes: ``time_unit`` and ``epoch``, where they are known.
-            start, end: of the run, s.
+            attributes: attributes with ``time_unit`` and ``epoch``, if known.
+            start, end: start and end of the run, s.
         """
         largest = max(abs(start), abs(end))
         suiting = unit_for(largest)
@@ -155,7 +155,7 @@ class TimeWords:
         return cls(unit, epoch_of(attributes), abs(end - start))
 
     def short(self, seconds: float) -> str:
-        """A time of the scene to six digits, as ``304.2 d``."""
+        """A time of the scene to six digits, like ``304.2 d``."""
         return span_text(seconds, 6, self.unit)
 
     def coarse(self, seconds: Sequence[float]) -> list[str]:
@@ -174,19 +174,19 @@ class TimeWords:
 
 
 def julian_year(epoch: Epoch) -> float:
-    """2000 at J2000, one more each 365.25 days, in the epoch's scale (TT for UTC)."""
+    """Julian year in the epoch's scale (TT for UTC): 2000 at J2000, one more every 365.25 days."""
     uniform = epoch.uniform()
     return _J2000_YEAR + float(uniform.julian_date() - J2000.julian_date()) / 365.25
 
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """How times are shown along an axis.
+    """Presentation of times along an axis.
 
     Attributes:
-        unit: of the numbers.
-        label: with the unit.
-        origin: the number that time 0 has.
+        unit: unit of the numbers.
+        label: label with the unit.
+        origin: number that stands for time 0.
     """
 
     unit: TimeUnit
@@ -194,7 +194,7 @@ class TimeAxis:
     origin: float = 0.0
 
     def numbers(self, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Times of the scene, s, as the axis shows them."""
+        """Numbers along the axis for times of the scene, s."""
         return np.asarray(self.origin + np.asarray(seconds) / self.unit.seconds, dtype=np.float64)
 
 
@@ -202,7 +202,7 @@ def time_axis_of(dataset: xarray.Dataset) -> TimeAxis:
     """The axis for a dataset's times: years of the calendar, time since the epoch, or time alone.
 
     Args:
-        dataset: of a run; its first and last time are read.
+        dataset: dataset of a run, whose first and last time are read.
     """
     ends = [float(dataset["time"][i]) for i in (0, -1)] if dataset.sizes["time"] else [0.0]
     unit = unit_of(dataset.attrs, max(map(abs, ends)))

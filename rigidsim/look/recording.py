@@ -1,4 +1,4 @@
-"""A recording of rerun written to a file: strictly, with its layout, and never on a full disk."""
+"""Writing a rerun recording to a file: with strict errors, its layout, and never on a full disk."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 @dataclass
 class Recording:
-    """A recording that is being written.
+    """A recording being written.
 
     Attributes:
-        stream: of rerun.
+        stream: recording stream of rerun.
     """
 
     stream: Any
@@ -31,7 +31,7 @@ class Recording:
     name: str
 
     def start(self, blueprint: Any) -> None:
-        """Open the file, with its layout."""
+        """Open the file and send its layout."""
         self.stream.save(self.path, default_blueprint=blueprint)
         self.stream.send_recording_name(legible(self.name))
 
@@ -41,7 +41,7 @@ def recording_to(path: Path, name: str, rows: int) -> Iterator[Recording]:
     """A recording that is whole when the block ends.
 
     Args:
-        rows: that will be written, at most.
+        rows: largest number of rows that will be written.
 
     Raises:
         RuntimeError: the environment variable RERUN switches recording off.
@@ -60,7 +60,7 @@ def recording_to(path: Path, name: str, rows: int) -> Iterator[Recording]:
 
 @contextmanager
 def strict() -> Iterator[None]:
-    """Errors of the rerun API as exceptions, for the length of the block only.
+    """Turn errors of the rerun API into exceptions inside the block.
 
     Otherwise wrong lengths, shapes and times are dropped with a warning.
     """
@@ -75,7 +75,7 @@ def strict() -> Iterator[None]:
 
 
 def check_room(path: Path, rows: int) -> None:
-    """Refuse before rerun finds the disk full: then it may wait for ever."""
+    """Refuse if there is too little room, before rerun finds the disk full and may wait for ever."""
     room, needed = shutil.disk_usage(path.parent).free, _FIRST_BYTES + _ROW_BYTES * rows
     if room < needed:
         missing = f"it may need {needed / 1e6:.1f} MB, and {room / 1e6:.1f} MB are free"

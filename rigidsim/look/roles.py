@@ -1,4 +1,4 @@
-"""What part a variable plays in a dataset: told by its attributes, never by its name."""
+"""Roles of variables in a dataset, known from their attributes and never from their names."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ if TYPE_CHECKING:
 
 
 _AVERAGED = ("spin_averaged", "orbit_averaged")
-"""Levels of the model whose datasets have axes, but no attitude."""
+"""Model levels whose datasets have axes but no attitude."""
 
 
 def is_residual(variable: Variable) -> bool:
-    """Whether it only holds the digits of another variable that float64 has no room for."""
+    """Whether a variable only holds the digits of another that don't fit its float64."""
     return "residual_of" in variable.attrs
 
 
 def drift_of(variable: Variable) -> str | None:
-    """The invariant whose relative drift it is; None where it is none."""
+    """The invariant whose relative drift a variable is; None for any other variable."""
     return _named(variable, "drift_of")
 
 
 def put_back_of(variable: Variable) -> str | None:
-    """The projected invariant of which it tells what was put back; None where it is none."""
+    """The projected invariant whose corrections put back a variable holds; None for any other variable."""
     return _named(variable, "put_back_of")
 
 
@@ -34,7 +34,7 @@ def drifts(dataset: Table) -> dict[str, Variable]:
 
 
 def put_backs(dataset: Table) -> dict[str, Variable]:
-    """What was put back of the projected invariants, by their name."""
+    """Corrections put back into projected invariants, by their name."""
     return _by_invariant(dataset, "put_back_of")
 
 

@@ -1,4 +1,4 @@
-"""The rows of a dataset that are drawn, as arrays: what a picture needs of a dataset, and nothing heavier.
+"""The rows of a dataset that are drawn, as arrays: what a picture needs, and nothing heavier.
 
 ``Rows`` and ``Column`` can be used where a picture takes an xarray dataset and its variables.
 """
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Column:
-    """One variable.
+    """One variable of a dataset.
 
     Attributes:
-        name: in the dataset.
-        dims: names of its dimensions, time first where it has it.
+        name: name in the dataset.
+        dims: names of its dimensions, time first if it has that.
         attrs: its attributes.
-        data: its numbers, an array or anything that gives one when it is sliced.
+        data: its numbers, an array or anything that yields one when sliced.
         coords: labels along its dimensions, by their names.
     """
 
@@ -44,12 +44,12 @@ class Column:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of its numbers."""
+        """Type of its numbers."""
         return np.dtype(self.data.dtype)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of its numbers."""
+        """Shape of its numbers."""
         return tuple(self.data.shape)
 
     @property
@@ -58,7 +58,7 @@ class Column:
         return len(self.dims)
 
     def transpose(self, first: str, *rest: Any) -> Column:
-        """The same with one dimension first; time is it already."""
+        """The variable with the given dimension first; time already is."""
         if self.dims[0] != first:
             raise ValueError(f"{self.name}: {first} isn't its first dimension")
         return self
@@ -68,7 +68,7 @@ class Column:
         return self.replaced(np.concatenate([np.asarray(self.data[rows]) for rows in slices]))
 
     def replaced(self, rows: np.ndarray) -> Column:
-        """The same with other rows, (rows, components)."""
+        """The variable with other rows, (rows, components)."""
         return Column(self.name, self.dims, self.attrs, rows.reshape(-1, *self.shape[1:]), self.coords)
 
 
@@ -77,9 +77,9 @@ class Rows:
     """A dataset, or some rows of it.
 
     Attributes:
-        attrs: of the dataset.
+        attrs: attributes of the dataset.
         data_vars: variables by their names, in the dataset's order.
-        coords: likewise, what isn't measured but labels; time among them.
+        coords: coordinates by their names, time among them.
     """
 
     attrs: Mapping[str, Any]
@@ -109,10 +109,10 @@ class Rows:
         return Rows(self.attrs, columns, {"time": self.coords["time"].taken(slices)})
 
     def replaced(self, names: Sequence[str], known: Mapping[str, np.ndarray]) -> Rows:
-        """Some variables with other rows, (rows, components) by name, and the times of these."""
+        """Some variables with other rows, (rows, components) by name, and the times of these rows."""
         columns = {name: self.data_vars[name].replaced(known[name]) for name in names}
         return Rows(self.attrs, columns, {"time": self.coords["time"].replaced(known["time"])})
 
     def assign_attrs(self, attrs: Mapping[str, Any]) -> Rows:
-        """The same with more attributes."""
+        """The dataset with additional attributes."""
         return Rows({**self.attrs, **attrs}, self.data_vars, self.coords)

@@ -1,4 +1,4 @@
-"""The prefix with which values of an SI unit read well."""
+"""SI prefixes with which values read well."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f", 3: "k", 6: "
 
 
 def largest(values: Array) -> float:
-    """Largest magnitude of all finite values, 0 where there are none."""
+    """Largest magnitude of all finite values; 0 if there are none."""
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max(initial=0.0))
 

@@ -1,6 +1,6 @@
-"""What pictures show of a dataset: recorded by name, else worked out from attitude and rates.
+"""Quantities that pictures show: recorded ones by name, others derived from attitude and rates.
 
-All take a dataset in memory and give float64 arrays over its rows, or None where it can't be told.
+All take a dataset in memory and give float64 arrays over its rows, or None if they can't be derived.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 NEAR_AXIS = 0.35
-"""Largest polar motion, rad, that is shown as such: beyond, the body tumbles."""
+"""Largest polar motion (rad) shown as such; beyond it, the body tumbles."""
 _ALIKE = 1e-9  # moments nearer than this are one
 _STEADY = 1e-6  # a momentum that turns by less is fixed
 
 
 def values(dataset: Table, name: str) -> Array | None:
-    """A variable along time, time first; None where it wasn't recorded."""
+    """A variable along time, time first; None if it wasn't recorded."""
     if name not in dataset or "time" not in dataset[name].dims:
         return None
     return np.asarray(dataset[name].transpose("time", ...).values, dtype=np.float64)
@@ -77,7 +77,7 @@ def norms(vectors: Array) -> Array:
 
 
 def axis_names(dataset: Table) -> list[str]:
-    """The principal axes as body axes are called, or 1, 2, 3 where they aren't body axes."""
+    """Names of the principal axes: those of body axes, or 1, 2, 3 if they aren't body axes."""
     axes = principal_axes(dataset)
     order = np.abs(axes).argmax(axis=1)
     along = np.abs(np.abs(axes).max(axis=1) - 1) < 1e-9
@@ -85,10 +85,11 @@ def axis_names(dataset: Table) -> list[str]:
 
 
 def polar_motion(dataset: Table) -> Array | None:
-    """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None where the spin leaves it.
+    """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None if the spin departs too far from
+    it.
 
-    Recorded ones as they are. Else components of the rates across the principal axis about which the body
-    spins, over that along it.
+    Recorded values if there are any. Otherwise components of the rates across the principal axis about which
+    the body spins, over that along it.
     """
     recorded = values(dataset, "polar_motion")
     if recorded is not None and recorded.shape[1:] == (2,) and np.isfinite(recorded).any():
@@ -107,7 +108,7 @@ def polar_motion(dataset: Table) -> Array | None:
 
 
 def near_axis(dataset: Table) -> bool:
-    """Whether the body spins about its figure axis but for a little, so that polar motion is what is seen."""
+    """Whether the body spins nearly about its figure axis, so that polar motion is of interest."""
     motion = polar_motion(dataset)
     if motion is None:
         return False
@@ -115,7 +116,9 @@ def near_axis(dataset: Table) -> bool:
 
 
 def figure_direction(dataset: Table) -> Array:
-    """Unit vector (3,) of the figure axis in body axes: as asked, else of symmetry or the largest moment."""
+    """Unit vector (3,) of the figure axis in body axes: as requested, else that of symmetry or largest
+    moment.
+    """
     frame: Any = read_config(dataset).get("frame", {})
     asked = frame.get("figure_axis") if isinstance(frame, dict) else None
     if asked in ("x", "y", "z"):
@@ -128,7 +131,7 @@ def figure_direction(dataset: Table) -> Array:
 
 
 def figure_index(found: Array) -> int:
-    """Which principal axis is the figure axis."""
+    """Index of the principal axis that is the figure axis."""
     for k in range(3):
         a, b = found[(k + 1) % 3], found[(k + 2) % 3]
         if abs(a - b) <= _ALIKE * max(a, b) and abs(found[k] - a) > _ALIKE * a:
@@ -137,7 +140,7 @@ def figure_index(found: Array) -> int:
 
 
 def body_direction(dataset: Table, direction: Array) -> Array | None:
-    """A direction fixed to the body, (rows, 3) in space."""
+    """A body-fixed direction along time, (rows, 3), space axes."""
     quaternion = values(dataset, "quaternion")
     return None if quaternion is None else np.einsum("tij,j->ti", rotation_matrix(quaternion), direction)
 
@@ -159,7 +162,7 @@ def pole(dataset: Table, axis: str) -> Array | None:
 
 
 def steady_momentum(dataset: Table) -> Array | None:
-    """Direction (3,) of the momentum where it stays put in space, else None."""
+    """Direction (3,) of the momentum if it is fixed in space; else None."""
     directions = pole(dataset, "momentum")
     if directions is None:
         return None
@@ -172,7 +175,7 @@ def steady_momentum(dataset: Table) -> Array | None:
 def orientation(dataset: Table, axis: str) -> tuple[Array, Array] | None:
     """Obliquity and node longitude (rows,) each, rad, of the axis named figure, spin or momentum.
 
-    As recorded; else against the XY plane of space, the longitude of the ascending node made continuous.
+    As recorded; otherwise against the XY plane of space, with a continuous longitude of the ascending node.
     """
     if "obliquity" in dataset and "node_longitude" in dataset and "axis" in dataset["obliquity"].coords:
         names = [str(label) for label in dataset["obliquity"].coords["axis"].values]
@@ -200,7 +203,7 @@ def load_kinds(dataset: Table) -> list[str]:
 
 
 def vertical(dataset: Table) -> Array:
-    """Unit vector (3,) against a uniform gravity; Z where the config names no other direction in numbers."""
+    """Unit vector (3,) against a uniform gravity; Z if the config gives no other direction in numbers."""
     for load in read_config(dataset).get("loads", []):
         if isinstance(load, dict) and load.get("kind") == "uniform_gravity" and "acceleration" in load:
             try:
@@ -217,7 +220,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def attribute(dataset: Table, name: str) -> Array | None:
-    """An attribute that is a JSON list of numbers, as an array; None where it is missing or none."""
+    """An attribute that is a JSON list of numbers, as an array; None if it is missing or something else."""
     try:
         return np.array(json.loads(str(dataset.attrs[name])), dtype=float)
     except (KeyError, ValueError, TypeError):

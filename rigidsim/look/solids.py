@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 SEGMENTS = 64  # around the axis; a multiple of 8, so that colour sectors end on an edge
 MINOR_SEGMENTS = 32  # along an arc: around a tube or from pole to pole
 POINT = "point"
-"""A point mass, which is no shape: it is drawn as a ball."""
+"""A point mass, which has no shape and is drawn as a ball."""
 
 # Faces of a cuboid carry the colour of the body axis that they face; the negative side is darker.
 _AXIS_COLORS = ((214, 84, 76), (92, 172, 98), (78, 128, 205))
@@ -43,7 +43,7 @@ class Mesh:
         triangles: (T, 3) indices into `vertices`, anticlockwise as seen from outside.
         normals: (3 T, 3), outward unit normals of the smooth surface.
         colors: (3 T, 3) uint8, red green blue, constant over a triangle.
-        picture: (height, width, 3) uint8 that it wears in place of its colours; None for none.
+        picture: (height, width, 3) uint8, texture in place of its colours; None for none.
         places: (3 T, 2) in the picture, across and down, of its sizes.
     """
 

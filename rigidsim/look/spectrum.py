@@ -1,4 +1,4 @@
-"""The figure of an analysis: spectra with their lines marked and labelled."""
+"""The figure of an analysis: amplitude spectra with lines marked and labelled."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def spectrum_figure(analysis: xarray.Dataset) -> Figure:
     """Draw each signal's amplitude spectrum, its lines, and what they are.
 
     Args:
-        analysis: dataset of ``rigidsim.analyse(...).dataset``; of its signals the first eight are drawn.
+        analysis: dataset ``rigidsim.analyse(...).dataset``, of which the first eight signals are drawn.
 
     Returns:
         A figure on the Agg canvas.
@@ -63,7 +63,7 @@ def spectrum_figure(analysis: xarray.Dataset) -> Figure:
 
 
 def save_spectrum(analysis: xarray.Dataset, path: Path, *, file_format: str | None = None) -> Path:
-    """Draw it into a PNG or SVG file.
+    """Draw the spectra into a PNG or SVG file.
 
     Returns:
         ``path``.
@@ -132,7 +132,9 @@ def _title(signal: xarray.Dataset) -> str:
 
 
 def _time_unit(rate: np.ndarray) -> TimeUnit:
-    """The shortest that is no shorter than the median period: numbers along the axis are 1 and more."""
+    """The shortest unit of time not shorter than the median period, so that numbers along the axis are at
+    least 1.
+    """
     moving = np.abs(rate[np.abs(rate) > 0])
     if not len(moving):
         return TimeUnit("s", 1.0)
@@ -150,7 +152,7 @@ def _frequency_axis(axes: Any, rate: np.ndarray, real: bool) -> None:
 
 
 def _limits(axes: Any, rate: np.ndarray, curve: np.ndarray, real: bool) -> None:
-    """All lines, and some of the curve beside them."""
+    """Set limits that show all lines, and some of the curve beside them."""
     if not len(rate):
         return
     if axes.get_xscale() == "log":

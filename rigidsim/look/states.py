@@ -1,4 +1,4 @@
-"""What happened when, as lanes of states: events, changes of chart, and how a run ended."""
+"""Lanes of states over time: events, changes of chart, and how a run ended."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ if TYPE_CHECKING:
     from rigidsim.look.rows import Table
 
 MOST_EVENTS = 2000
-"""Of one kind that a lane shows; of more it shows the first."""
+"""Largest number of events of one kind in a lane; of more, the first are shown."""
 CHART_LEFT = 0.5
-"""Singular factor below which a chart of Euler angles is left, as the solver has it."""
+"""Singular factor below which the solver leaves a chart of Euler angles."""
 _SHADES: tuple[Color, Color] = ((92, 148, 235), (240, 190, 60))
 _SECTION_POINTS = 8
-"""At least, for a section to be drawn."""
+"""Least number of points for a section to be drawn."""
 _PREFERRED = ("libration", "polar_motion", "tip", "nadir", "angular_velocity", "euler_angles")
 
 
 @dataclass(frozen=True)
 class States:
-    """One lane.
+    """One lane of states.
 
     Attributes:
         seconds: (changes,), when a state begins.
-        values: what it is called.
-        colors: by value.
+        values: names of the states.
+        colors: colours by name.
     """
 
     name: str
@@ -42,7 +42,7 @@ class States:
 
 
 def states_of(dataset: Table, start: float, end: float) -> list[States]:
-    """A lane for each event, which changes its colour when that happens, and one for a run that was stopped.
+    """Lanes: one for each event, which changes colour when it happens, and one for a run that was stopped.
 
     Args:
         start, end: times of the first and last sample, s.
@@ -64,7 +64,7 @@ def states_of(dataset: Table, start: float, end: float) -> list[States]:
 
 
 def charts_of(dataset: Table) -> list[States]:
-    """A lane for a run in Euler angles: which of its two sequences carried it.
+    """A lane for a run in Euler angles that shows which of its two sequences carried it.
 
     A chart is left at the first step after which its singular factor is below ``CHART_LEFT``. Of steps a
     dataset knows nothing: a change is shown at the first sample from which it is certain, and one that lies
@@ -106,7 +106,7 @@ def events_of(dataset: Table) -> list[str]:
 
 
 def sections_of(dataset: Table) -> list[Plane]:
-    """For each event that happened often enough: two components of what was recorded there, as points."""
+    """For each frequent event, two components recorded there, as points."""
     planes = []
     for event in events_of(dataset):
         for name in _PREFERRED:

@@ -1,4 +1,4 @@
-"""What stands around a body, as the dataset's attribute ``surroundings`` tells: gravity, sources, attractors.
+"""Surroundings of a body, from the dataset's attribute ``surroundings``: gravity, sources, attractors.
 
 It is a JSON list of objects: ``{"what": "gravity", "acceleration"}``, ``{"what": "attractor",
 "gravitational_parameter", "position"}`` and ``{"what": "source", "gravitational_parameter"}`` with ``orbit``
@@ -29,11 +29,11 @@ GREY: Color = (150, 154, 162)
 
 @dataclass(frozen=True)
 class Globe:
-    """A body that attracts, as it is drawn.
+    """An attracting body as it is drawn.
 
     Attributes:
         radius: m.
-        color: about that of its disk.
+        color: approximate colour of its disk.
     """
 
     name: str
@@ -59,7 +59,7 @@ GLOBES: tuple[Globe, ...] = (
 
 
 def told(dataset: Table, what: str) -> list[dict[str, Any]]:
-    """What the dataset says of one kind of thing around the body; empty where it says nothing."""
+    """The dataset's entries for one kind of surroundings; empty if there are none."""
     try:
         listed = json.loads(str(dataset.attrs.get("surroundings", "[]")))
     except ValueError:
@@ -68,7 +68,7 @@ def told(dataset: Table, what: str) -> list[dict[str, Any]]:
 
 
 def gravity(dataset: Table) -> Array | None:
-    """Acceleration (3,) of a uniform field, m/s^2, space axes; None where there is none."""
+    """Acceleration (3,) of a uniform field, m/s^2, space axes; None if there is none."""
     for one in told(dataset, "gravity"):
         pull = _vector(one.get("acceleration"))
         if pull is not None and np.linalg.norm(pull) > 0:
@@ -77,25 +77,25 @@ def gravity(dataset: Table) -> Array | None:
 
 
 def globe_of(one: dict[str, Any]) -> Globe | None:
-    """Who attracts, told by its gravitational parameter; None where it is nobody's."""
+    """The known body with this gravitational parameter; None if it is no known one."""
     strength = float(one.get("gravitational_parameter") or 0.0)
     near = min(GLOBES, key=lambda globe: abs(globe.gravitational_parameter - strength))
     return near if abs(strength / near.gravitational_parameter - 1) < _ALIKE else None
 
 
 def called(globe: Globe | None, unknown: str) -> str:
-    """Who attracts, as it stands in a sentence: ``the Sun``, ``Saturn``, ``the`` and a word for nobody."""
+    """The attracting body in a sentence: ``the Sun``, ``Saturn``, or ``the`` and a word if unknown."""
     if globe is None:
         return f"the {unknown}"
     return f"the {globe.name}" if globe.name in ("Sun", "Earth", "Moon") else globe.name
 
 
 def source_path(one: dict[str, Any], seconds: Array) -> Array | None:
-    """Where a source is, (rows, 3), m, space axes, from the body; None where that can't be told.
+    """Positions of a source, (rows, 3), m, space axes, from the body; None if unknown.
 
     Args:
         one: as from ``told(dataset, "source")``.
-        seconds: (rows,), of the scene.
+        seconds: (rows,), times of the scene, s.
     """
     place = _vector(one.get("position"))
     if place is not None:
@@ -134,7 +134,7 @@ def kepler_path(orbit: dict[str, float], seconds: Array) -> Array:
 
 
 def orbit_normal(orbit: dict[str, float]) -> Array:
-    """Unit vector (3,) about which the source goes in the direct sense at time zero, space axes."""
+    """Unit normal (3,) of the orbit at time zero, space axes, about which the source moves directly."""
     tilt, node = orbit["inclination"], orbit["ascending_node"]
     return np.array([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)])
 

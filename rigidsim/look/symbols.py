@@ -1,4 +1,4 @@
-"""Meshes that stand for something: a toy top, a globe; and the edges and circles that are drawn on meshes."""
+"""Symbolic meshes (a toy top, a globe), and edges and circles drawn on meshes."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def spinning_top(radius: float, height: float, whole: float) -> Mesh:
     """A top that stands on its tip at the origin, with its disk at some height and a stem above it.
 
     Args:
-        radius: of the disk.
-        height: of the disk.
-        whole: to the end of the stem.
+        radius: radius of the disk.
+        height: height of the disk.
+        whole: height of the stem's end.
     """
     stem, rim = 0.09 * radius, 0.13 * radius
     pieces = (

@@ -1,4 +1,4 @@
-"""A bounded number of rows from a dataset of any length: read, or kept while the run goes on."""
+"""A bounded number of rows from a dataset of any length: read afterwards, or kept while the run goes on."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class KeptRows:
         self._pieces: dict[str, list[NDArray[np.float64]]] = {}
 
     def take(self, first: int, block: Mapping[str, NDArray[np.float64]]) -> None:
-        """Look at the rows from `first` on; nothing is kept of a run whose beginning wasn't seen.
+        """Take the rows from `first` on; nothing is kept of a run whose beginning wasn't seen.
 
         Args:
             block: (rows, ...) by variable, `time` among them.
@@ -69,7 +69,7 @@ class KeptRows:
             self._pieces.setdefault(name, []).extend(values[part].copy() for part in picked)
 
     def columns(self, count: int) -> dict[str, NDArray[np.float64]] | None:
-        """The rows of each variable; None where not every row was seen.
+        """The kept rows of each variable; None if not every row was seen.
 
         Args:
             count: number of rows that there are now, fewer than there were to be in a run that was stopped.
@@ -87,7 +87,7 @@ def thin(dataset: AnyTable, rows: int, at_once: int = ROWS_AT_ONCE, kept: KeptRo
 
     Args:
         at_once: rows of the file that one read spans.
-        kept: while the run went on; what is there isn't read.
+        kept: rows kept while the run went on, which aren't read again.
 
     Raises:
         ValueError: no `time` dimension or coordinate, or see `thinned_indices`.

@@ -1,4 +1,4 @@
-"""`timeline.rrd`: a run as the rerun viewer plays it."""
+"""`timeline.rrd`: a run for the rerun viewer."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def write_timeline(
     """Write a dataset as a rerun recording with its own layout.
 
     Args:
-        dataset: of a run, or any part of it: what is missing isn't shown, every other numeric
+        dataset: dataset of a run, or any part of it: what is missing isn't shown, every other numeric
             variable along time gets a plot. It may be lazy: only the rows shown are read.
         path: the file; it is whole when this returns.
         rows: at most so many rows are shown, evenly strided, with the first and the last.
-        kept: these rows, where they were kept while the run went on; otherwise they are read.
+        kept: these rows, if they were kept while the run went on; otherwise they are read.
 
     Returns:
         The number of rows written.

@@ -16,17 +16,17 @@ from urllib.parse import quote
 
 LOOPBACK = "127.0.0.1"  # rerun's own default would listen on every interface
 WEB_PORT, DATA_PORT = 9090, 9876
-"""Of 127.0.0.1, on which the page for browsers and its recording are served: rerun's own."""
+"""Ports of 127.0.0.1 on which the browser page and its recording are served: rerun's own."""
 INTERRUPTED = 130
 QUIET = {"CI": "1"}  # the one variable that keeps the viewer from sending usage statistics (0.41)
 
 
 class NoGraphics(RuntimeError):
-    """The machine has no Vulkan driver that the headless viewer could draw with."""
+    """Raised if the machine has no Vulkan driver with which the headless viewer could draw."""
 
 
 class NoDisplay(RuntimeError):
-    """There is no screen that a window could be on."""
+    """Raised if there is no screen for a window."""
 
 
 NO_DISPLAY = (
@@ -37,7 +37,7 @@ NO_DISPLAY = (
 
 
 def has_display() -> bool:
-    """Whether a window can be opened; elsewhere than on Linux it is taken for granted."""
+    """Whether a window can be opened; assumed on systems other than Linux."""
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
@@ -72,7 +72,7 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
 
 
 def ended(process: subprocess.Popen[bytes], timeout: float | None = None) -> int:
-    """Wait for a viewer; its exit code, 130 where Ctrl-C reached it first.
+    """Wait for a viewer; returns its exit code, 130 if Ctrl-C reached it first.
 
     Raises:
         TimeoutExpired: of subprocess, after so many seconds.
@@ -104,15 +104,15 @@ def _served(port: int) -> list[str]:
 
 
 def _terse() -> dict[str, str]:
-    """The environment of a viewer that says what goes wrong, and nothing else."""
+    """Environment of a viewer that reports only errors."""
     return {"RUST_LOG": "warn"} | os.environ | QUIET
 
 
 def web_words(port: int) -> str:
-    """Where the page is, dark as its colours are made for, and how to end it.
+    """The page's address, dark as its colours are made for, and how to end it.
 
     Args:
-        port: on which the recording is served.
+        port: port on which the recording is served.
     """
     source = quote(f"rerun+http://{LOOPBACK}:{port}/proxy", safe="")
     page = f"http://{LOOPBACK}:{WEB_PORT}?theme=dark&url={source}"
@@ -123,7 +123,7 @@ def wait_for(process: subprocess.Popen[bytes], port: int, seconds: float) -> Non
     """Wait until a viewer takes recordings.
 
     Raises:
-        RuntimeError: it ended, or doesn't within so many seconds.
+        RuntimeError: the viewer ended, or isn't ready within so many seconds.
     """
     until = time.monotonic() + seconds
     while time.monotonic() < until:
@@ -157,7 +157,7 @@ def screenshot(
         `png`.
 
     Raises:
-        FileNotFoundError, NoGraphics, RuntimeError: as of ``HeadlessViewer``.
+        FileNotFoundError, NoGraphics, RuntimeError: as for ``HeadlessViewer``.
     """
     with HeadlessViewer(path, size=size, timeout=timeout) as viewer:
         viewer.seek(at)
@@ -174,9 +174,9 @@ class HeadlessViewer:
         timeout: seconds until everything is given up.
 
     Attributes:
-        client: of rerun, for what isn't offered here.
-        timeline: that the page opened on.
-        start, end: of that, as its integers.
+        client: client of rerun, for what isn't offered here.
+        timeline: timeline that the page opened on.
+        start, end: its first and last integer.
 
     Raises (on entering):
         FileNotFoundError: no such recording, or no viewer.
@@ -248,7 +248,7 @@ class HeadlessViewer:
         raise self._failure("its picture never came to rest")
 
     def _open(self) -> None:
-        """Wait until the recording is there.
+        """Wait until the recording is loaded.
 
         The viewer's own --screenshot-to fires after a few frames, before the plots have been read.
         """
@@ -292,7 +292,7 @@ def vulkan_drivers() -> list[Path]:
 
 
 def viewer_binary() -> Path:
-    """The viewer inside the installed rerun-sdk.
+    """Path of the viewer in the installed rerun-sdk.
 
     Raises:
         FileNotFoundError: rerun-sdk isn't installed, or without its viewer.

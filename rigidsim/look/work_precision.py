@@ -28,7 +28,7 @@ _FRONT = "#1b2733"
 
 
 def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
-    """Draw a tradeoff dataset as a page: the plot, and beside it what its numbered points are.
+    """Draw a tradeoff dataset as a page: the plot, and beside it a key to its numbered points.
 
     Args:
         path: the file, PNG whatever its suffix; it is whole when this returns.
@@ -53,7 +53,7 @@ def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
 
 
 def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Error against cost on logarithmic axes, the front as a stair."""
+    """Draw error against cost on logarithmic axes, with the front as a staircase."""
     error, cost, front = _plotted(dataset)
     held, short = dataset["held"].values.astype(bool), dataset["status"].values == "measured over less"
     for n in np.nonzero(np.isfinite(error) & np.isfinite(cost))[0]:
@@ -75,7 +75,7 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _draw_models(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Averaged models beside the settings, named: errors of axes at the end of the whole motion."""
+    """Draw averaged models beside the settings, with names: errors of axes at the end of the whole motion."""
     for n in range(dataset.sizes.get("model", 0)):
         one = dataset.isel(model=n)
         place = float(one["model_cpu_ratio"]), float(one["model_error"])
@@ -145,7 +145,7 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
 
 
 def _key(axes: Axes, dataset: xarray.Dataset) -> None:
-    """The numbered points in words."""
+    """Draw the key to the numbered points."""
     error, cost, front = _plotted(dataset)
     axes.axis("off")
     axes.set_title("The best settings, from the cheapest")

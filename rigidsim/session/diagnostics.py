@@ -26,9 +26,7 @@ if TYPE_CHECKING:
 
 NEAR_SINGULAR = 1e-3
 """Singular factor below which Euler angles lose digits near their singularity."""
-_STEPS_TO_SINGULARITY = (
-    math.e**2
-)  # a Taylor step is e^-2 of the distance to the singularity (Jorba & Zou 2005)
+_STEPS_TO_SINGULARITY = math.e**2  # a Taylor step is e^-2 of the way to it (Jorba & Zou 2005)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """One command per module, whose function has the command's name and says what it takes and does.
 
-Each loads what it needs when it is called, so that the others start fast.
+Each command imports what it needs when called, so that the others start fast.
 """
 
 COMMANDS = (
@@ -19,4 +19,4 @@ COMMANDS = (
     "analyse",
     "schema",
 )
-"""All there are, in the order in which ``rigidsim --help`` shows them."""
+"""All commands, in the order of ``rigidsim --help``."""

@@ -1,1 +1,1 @@
-"""What commands print: tables, verdicts and pages."""
+"""Printed output of the commands: tables, verdicts and pages."""

@@ -1,4 +1,4 @@
-"""What ``rigidsim analyse`` prints: numbers with as many digits as errors leave, in readable units."""
+"""Output of ``rigidsim analyse``: numbers with as many digits as errors leave, in readable units."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _RATES = ((_DEGREE, "deg/s"), (_DEGREE / 86400, "deg/d"), (_DEGREE / 3600 / YEAR
 
 
 def angle_unit(size: float) -> tuple[float, str]:
-    """The unit in which an angle (rad) reads well."""
+    """Factor and symbol of the unit in which an angle (rad) reads well."""
     return next(((u, name) for u, name in _ANGLES if abs(size) >= 0.1 * u), (1.0, "rad"))
 
 
 def rate_unit(size: float) -> tuple[float, str]:
-    """The same of a rate (rad/s)."""
+    """Factor and symbol of the unit in which a rate (rad/s) reads well."""
     return next(((u, name) for u, name in _RATES if abs(size) >= 0.5 * u), _RATES[-1])
 
 
 def justified(value: Any, error: float, most: int) -> str:
-    """A number without the digits that its error leaves open."""
+    """A number without the digits that its error leaves uncertain."""
     size = abs(float(value))
     if size == 0 or not math.isfinite(size):
         return f"{float(value):g}"
@@ -53,7 +53,7 @@ def justified(value: Any, error: float, most: int) -> str:
 
 
 def print_analysis(analysis: Analysis, saved: Saved | None = None, out: Console | None = None) -> None:
-    """A table for each signal, and what is to be said beside."""
+    """Print a table for each signal, with remarks."""
     out = out or console()
     nyquist = 2 * math.pi / analysis.nyquist
     out.print(
@@ -82,7 +82,7 @@ def print_analysis(analysis: Analysis, saved: Saved | None = None, out: Console 
 
 
 def _print_secular(signals: Sequence[SignalAnalysis], out: Console) -> None:
-    """Once more, below all lines: what moves for good, and how fast."""
+    """Print once more, below all lines, the secular rates."""
     moving = [one for one in signals if one.rate is not None and abs(one.rate.real) > _SURE * one.rate_error]
     if moving:
         out.print()
@@ -140,10 +140,10 @@ def _with_unit(value: float, units: str) -> str:
 
 
 def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) -> Table:
-    """Of the lines.
+    """Table of a signal's lines.
 
     Args:
-        narrow: the errors of frequencies, whose digits tell them, make way for the names.
+        narrow: leave out the errors of frequencies, which their digits imply, to make room for the names.
     """
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     largest = float(signal.lines[0].amplitude)

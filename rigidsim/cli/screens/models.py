@@ -1,4 +1,4 @@
-"""What a run and a plan say of models: how far an averaged one is from the full one, and at what cost."""
+"""Output of runs and plans on models: how far an averaged one is from the full one, and at what cost."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _YEAR = 365.25 * 86400  # s
 
 
 def print_modelling(found: Modelling | None, on: Page) -> None:
-    """How far a reduced model is from the full one."""
+    """Print how far a reduced model is from the full one."""
     if found is None:
         return
     if found.momentum_axis is None:
@@ -32,7 +32,7 @@ def print_modelling(found: Modelling | None, on: Page) -> None:
 
 
 def interpolated(name: str, found: TableErrors) -> str:
-    """How near an orbit by a table is to what it was made of."""
+    """Accuracy of a tabulated orbit's interpolation, in words."""
     expected = found.direction * found.expected
     return (
         f'"{name}": interpolation misses the source by {found.direction:.1e} rad at most with every other '
@@ -41,7 +41,7 @@ def interpolated(name: str, found: TableErrors) -> str:
 
 
 def print_levels(levels: list[dict[str, Any]], on: Page) -> None:
-    """What each model would cost, and leave out."""
+    """Print what each model would cost, and leave out."""
     rows: list[list[Styled]] = []
     for row in levels:
         known = row["steps"] is not None

@@ -1,4 +1,4 @@
-"""What commands print on: plain text where stdout is piped, colours on a terminal.
+"""Pages on which commands print: plain text if stdout is piped, colours on a terminal.
 
 Texts are never read as markup. The library that draws on terminals takes longer to load than many runs take,
 so it isn't where nothing but lines of text is wanted.
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 Styled: TypeAlias = "str | tuple[str, str]"
-"""A text, alone or with the style that it has on a terminal."""
+"""A text, or a text with its style on a terminal."""
 
 _PIPED_WIDTH = 110  # columns, where there is no terminal and COLUMNS says nothing
 _LEAST_WIDTH = 40
@@ -29,22 +29,22 @@ _NUMBERS = ("largest drift", "final", "bound", "initial", "put back")
 
 
 class Page:
-    """Plain lines on stdout."""
+    """Prints plain lines on stdout."""
 
     def __init__(self) -> None:
         self._width = _piped_width()
 
     @property
     def width(self) -> int:
-        """In columns."""
+        """Width in columns."""
         return self._width
 
     def say(self, *parts: Styled, whole: bool = False) -> None:
-        """A text, broken between words.
+        """Print a text, broken between words.
 
         Args:
-            parts: of one line, each with a style where it has one.
-            whole: leave it to the terminal to break it.
+            parts: parts of one line, each possibly with a style.
+            whole: leave breaking to the terminal.
         """
         text = "".join(map(_bare, parts))
         if whole:
@@ -55,7 +55,7 @@ class Page:
             _Screen.of_stdout().say(*parts)
 
     def line(self, label: str, text: str, style: str = "") -> None:
-        """A label and a text that is broken between words, indented."""
+        """Print a label and a text that is broken between words, indented."""
         if len(label) > _LABEL or not _is_narrow(label + text):
             _Screen.of_stdout().line(label, text, style)
             return
@@ -63,11 +63,11 @@ class Page:
             print(f"{'' if number else label:{_LABEL}} {part}".rstrip())
 
     def fits(self, columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> bool:
-        """Whether a table has room without folding."""
+        """Whether a table fits without folding."""
         return sum(_widths(columns, rows)) + len(_BETWEEN) * (len(columns) - 1) <= self.width
 
     def table(self, columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> None:
-        """A table under the names of its columns."""
+        """Print a table under the names of its columns."""
         rows = [tuple(row) for row in rows]
         lines = [tuple(columns), *(tuple(map(_bare, row)) for row in rows)]
         widths = _widths(columns, rows)
@@ -86,14 +86,14 @@ class Page:
 
 
 class _Screen(Page):
-    """A terminal, or what is made to look like one."""
+    """Prints on a terminal, or on something made to look like one."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
 
     @property
     def width(self) -> int:
-        """In columns."""
+        """Width in columns."""
         return self._console.width
 
     @classmethod
@@ -125,12 +125,12 @@ class _Screen(Page):
 
 
 def _piped_width() -> int:
-    """Wide enough for whole words, unless who reads it asks for another width."""
+    """Width of piped output: enough for whole words, unless the reader asks for another."""
     return max(_LEAST_WIDTH, shutil.get_terminal_size((_PIPED_WIDTH, 24)).columns)
 
 
 def console() -> Console:
-    """stdout; wide enough for whole words when piped."""
+    """Console on stdout, wide enough for whole words when piped."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else _piped_width()
@@ -138,7 +138,7 @@ def console() -> Console:
 
 
 def page(out: Console | None = None) -> Page:
-    """Where a command prints: a console that is given, or stdout in the way that suits it."""
+    """The page for a command: a given console, or stdout in the way that suits it."""
     if out is not None:
         return _Screen(out)
     colours = any(os.environ.get(name) for name in ("FORCE_COLOR", "TTY_COMPATIBLE"))
@@ -168,7 +168,7 @@ def _is_narrow(text: str) -> bool:
 
 
 def _broken(text: str, width: int) -> list[str]:
-    """Lines of at most so many letters, broken between words where that is possible."""
+    """Lines of at most ``width`` characters, broken between words if possible."""
     lines = []
     for line in text.split("\n"):
         parts = [""]

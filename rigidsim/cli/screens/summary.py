@@ -1,4 +1,4 @@
-"""What the commands print on stdout: tables for people, never needed by the library."""
+"""Tables that the commands print on stdout; the library never needs them."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def size(count: float) -> str:
 
 
 def _initial(value: float | tuple[float, ...] | None) -> str:
-    """A number, or the norm of a vector: enough to recognise it; all digits are in summary.json."""
+    """A number, or the norm of a vector, to recognise it by; all digits are in summary.json."""
     if value is None:
         return "-"
     return f"|{math.hypot(*value):.6g}|" if isinstance(value, tuple) else f"{value:.6g}"
 
 
 def _scales(invariants: dict[str, InvariantDrift]) -> str:
-    """What the drifts are relative to; invariants of the same scale together."""
+    """Scales of the drifts; invariants with the same scale together."""
     names: dict[str, list[str]] = {}
     for name, row in invariants.items():
         names.setdefault(row.scale_name, []).append(name)
@@ -50,7 +50,7 @@ def _drift(value: float | None) -> str:
 
 
 def print_summary(summary: Brief, folder: str, out: Console | None = None) -> None:
-    """The table at the end of ``run`` and of ``info``."""
+    """Print the table at the end of ``run`` and of ``info``."""
     on = page(out)
     color = "green" if summary.status == "finished" else "yellow"
     on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))
@@ -68,7 +68,7 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None) -> No
 def print_understood(
     body: UnderstoodBody | None, start: Start | None, time: Span | None, out: Console
 ) -> None:
-    """Body, start and time as they were understood."""
+    """Print body, start and time as they were understood."""
     _print_understood(body, start, time, page(out))
 
 
@@ -134,7 +134,7 @@ def _print_ended(summary: Summary, on: Page) -> None:
 
 
 def _event(summary: Summary, name: str) -> str:
-    """How often, and when."""
+    """How often an event happened, and when."""
     count, times = summary.events[name], summary.event_times.get(name)
     if times is None:
         return f"{name}: {count:,}"
@@ -156,7 +156,7 @@ def _words(summary: Summary) -> TimeWords:
 
 
 def _print_invariants(summary: Summary, on: Page) -> None:
-    """Where it doesn't fit, without the last drifts, which say least."""
+    """Print the invariants, without the final drifts if the table doesn't fit."""
     held = ["put back"] if summary.held else []
     columns = ["invariant", "initial", "largest drift", "final", "bound", *held]
     rows: list[list[Styled]] = []
@@ -208,7 +208,7 @@ def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
 
 
 def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
-    """What ``rigidsim plan`` says."""
+    """Print the result of ``rigidsim plan``."""
     on = page(out)
     on.say((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}")
     parts = UnderstoodBody(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
@@ -267,14 +267,14 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
 
 
 def print_scenes(described: dict[str, str]) -> None:
-    """What ``rigidsim new`` can write."""
+    """Print the templates that ``rigidsim new`` can write."""
     on = page()
     on.table(["scene", "what it is"], described.items())
     on.say("rigidsim new SCENE [NAME] writes NAME.toml")
 
 
 def print_checked(found: Checked) -> None:
-    """What a check found: errors on stderr, as of all commands."""
+    """Print the result of a check; errors go to stderr, as for all commands."""
     if not found.valid:
         print(f"rigidsim: {ConfigError(found.problems, found.source).for_command_line()}", file=sys.stderr)
         return
@@ -286,7 +286,7 @@ def print_checked(found: Checked) -> None:
 
 
 def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:
-    """A verification in words, from ``Verdict.as_dict``; ``what`` were compared."""
+    """Print a verification in words, from ``Verdict.as_dict``; ``what`` names the things compared."""
     on = page()
     if verdict["identical"]:
         on.say(f"identical: {verdict['samples']:,} {what}s, every variable, every bit")

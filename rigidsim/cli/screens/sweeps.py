@@ -1,4 +1,4 @@
-"""How a sweep looks on a terminal: progress over members, and what became of them."""
+"""Output for sweeps: progress over members, and how they ended."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LINE_EVERY = 5.0  # seconds between plain lines
 
 
 class SweepProgress(SweepObserver):
-    """One bar, or a plain line every few seconds where none can be drawn."""
+    """One bar, or a plain line every few seconds if none can be drawn."""
 
     def __init__(self) -> None:
         self._bar: Progress | None = None
@@ -91,12 +91,12 @@ class SweepProgress(SweepObserver):
 
 
 def observer() -> SweepProgress:
-    """Use it in a ``with``."""
+    """The observer that suits stderr; use it in a ``with``."""
     return SweepProgress()
 
 
 def duration(seconds: float | None) -> str:
-    """As h:mm:ss."""
+    """A duration as h:mm:ss."""
     if seconds is None:
         return "-:--:--"
     if seconds >= 360_000:
@@ -106,7 +106,7 @@ def duration(seconds: float | None) -> str:
 
 
 def print_sweep(result: SavedSweep) -> None:
-    """What became of a sweep's members."""
+    """Print how a sweep's members ended."""
     told, screen = result.summary, console()
     screen.print(f"[bold]{told.get('name', '')}[/] ({result.place}): {told['message']}", highlight=False)
     if not result.finished:
@@ -151,7 +151,7 @@ def print_sweep(result: SavedSweep) -> None:
 
 
 def print_sweep_plan(made: dict[str, Any]) -> None:
-    """What a sweep would run, and what it would cost."""
+    """Print what a sweep would run, and what it would cost."""
     screen = console()
     screen.print(f"[bold]{made['name']}[/]: {made['members']:,} members ({made['mode']})", highlight=False)
     table = Table("axis", "key", "values", "from", "to", box=None, pad_edge=False)

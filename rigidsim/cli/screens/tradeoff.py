@@ -1,4 +1,4 @@
-"""What ``rigidsim tradeoff`` prints on stdout."""
+"""Output of ``rigidsim tradeoff``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigidsim.look.readable_time import span_text
 
 
 def print_tradeoff(result: dict[str, Any]) -> None:
-    """What ``rigidsim tradeoff`` says, from ``Tradeoff.as_dict``."""
+    """Print the result of ``rigidsim tradeoff``, from ``Tradeoff.as_dict``."""
     on = page()
     on.say((result["name"], "bold"), "  for this accuracy, use this")
     rows = []
@@ -44,7 +44,7 @@ def print_tradeoff(result: dict[str, Any]) -> None:
 
 
 def _not_measured(on: Page, settings: list[dict[str, Any]]) -> None:
-    """Settings without numbers, those with the same reason together."""
+    """Print settings without numbers, those with the same reason together."""
     reasons: dict[str, list[str]] = {}
     for row in settings:
         if row["reason"]:

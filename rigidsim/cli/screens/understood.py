@@ -1,4 +1,4 @@
-"""What was understood of a config, in the units that people think in."""
+"""How a config was understood, in everyday units."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STRAIGHT = 1e-9  # of a direction's component: what is less is shown as zero
 def understood(
     body: UnderstoodBody | None, start: Start | None, time: Span | None
 ) -> Iterator[tuple[str, str]]:
-    """Labels and texts, one for each that there is (older summaries have fewer)."""
+    """Labels and texts for whatever is present (older summaries have less)."""
     if body is not None:
         yield "body", body_text(body)
     if start is not None:
@@ -35,7 +35,7 @@ def understood(
 
 
 def body_text(body: UnderstoodBody) -> str:
-    """Mass, centre of mass and moments about which axes."""
+    """Mass, centre of mass, and moments with their axes."""
     parts = [f"from {body.source.partition(' (')[0]}"]
     if body.mass is not None:
         parts.append(f"mass {_number(body.mass)} kg")
@@ -49,7 +49,7 @@ def body_text(body: UnderstoodBody) -> str:
 
 
 def start_text(start: Start) -> str:
-    """Attitude in degrees, rates with the time of a turn, place and velocity."""
+    """Attitude in degrees, rates with the time of a turn, position and velocity."""
     angles = _numbers(start.euler_angles_deg)
     attitude = f"attitude {start.euler_sequence} {angles} deg"
     if not any(start.euler_angles_deg):
@@ -68,7 +68,7 @@ def start_text(start: Start) -> str:
 
 
 def time_text(time: Span) -> str:
-    """From when to when, in the unit that the config names or that suits the span, and how many samples."""
+    """Start and end in the config's unit or one that suits the span, and the number of samples."""
     unit = _unit(time)
     ends = [
         f"{number_text(seconds / unit.seconds, _DIGITS)}{'' if seconds == 0 else ' ' + unit.symbol}"

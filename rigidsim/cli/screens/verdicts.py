@@ -1,4 +1,4 @@
-"""What a run's numbers come to, in plain words: the verdict, advice, and what to do next."""
+"""Interpretation of a run's numbers in plain words: the verdict, advice, and what to do next."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _ADVICE = {
 
 
 def verdict_line(summary: Summary) -> tuple[str, str]:
-    """The verdict, and the style that it has on a terminal."""
+    """The verdict, and its style on a terminal."""
     found = verdict_on(summary)
     words = _WORDS[found.soundness]
     share = found.share or 0.0
@@ -45,7 +45,7 @@ def _percent(share: float) -> str:
 
 
 def advice_line(advice: Advice) -> str | None:
-    """One piece of advice; None for one of a later version."""
+    """One piece of advice; None if it is of a later version."""
     known = {code.value: text for code, text in _ADVICE.items()}
     text = known.get(advice.code)
     if text is None:
@@ -56,7 +56,7 @@ def advice_line(advice: Advice) -> str | None:
 
 
 def next_lines(status: str, exit_code: int, place: str) -> list[str]:
-    """Commands that one may want now; none for a run in memory."""
+    """Commands that may be useful next; none for a run in memory."""
     if not place:
         return []
     where = shlex.quote(place)

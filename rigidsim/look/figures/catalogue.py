@@ -1,4 +1,4 @@
-"""All figures by name: what each shows, of which datasets, and the one that suits a scene."""
+"""All figures by name: what each shows, for which datasets, and the one that suits a scene."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _precesses(dataset: xarray.Dataset) -> bool:
 
 
 def is_top(dataset: xarray.Dataset) -> bool:
-    """Whether it is a body on a fixed point under uniform gravity, or has a top's angles recorded."""
+    """Whether the scene is a body on a fixed point under uniform gravity, or a top's angles are recorded."""
     fixed = "position" not in dataset and "uniform_gravity" in signals.load_kinds(dataset)
     return (has("tip")(dataset) and "position" not in dataset) or (
         fixed and signals.pole(dataset, "figure") is not None
@@ -61,7 +61,7 @@ def _has_wobble(dataset: xarray.Dataset) -> bool:
 
 
 def librates(dataset: xarray.Dataset) -> bool:
-    """Whether the body keeps an attitude to its orbit: the source stays near one body direction."""
+    """Whether the body keeps its attitude to its orbit: the source stays near one body direction."""
     nadir = signals.values(dataset, "nadir")
     if nadir is None:
         return has("libration")(dataset)
@@ -71,7 +71,7 @@ def librates(dataset: xarray.Dataset) -> bool:
 
 
 def _regular(dataset: xarray.Dataset) -> bool:
-    """Whether roll and yaw are defined: away from a pitch of a right angle."""
+    """Whether roll and yaw are defined: pitch stays away from a right angle."""
     table = signals.values(dataset, "roll_pitch_yaw")
     return table is not None and bool(np.nanmax(np.abs(table[:, 1])) < _STEEP)
 
@@ -121,7 +121,9 @@ class Kind:
     planes: Sequence[Panel] = ()
 
     def shows(self, rows: xarray.Dataset) -> bool:
-        """Whether a dataset (in memory) has what one of its planes needs, or where it has none, a curve."""
+        """Whether a dataset (in memory) has what one of its planes needs, or without planes, what a curve
+        needs.
+        """
         return any(panel.shows(rows) for panel in self.planes or self.curves)
 
 
@@ -155,11 +157,11 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     """A figure of a run.
 
     Args:
-        dataset: of a run; it may be lazy and of any length, of which at most 20,000 rows are drawn.
+        dataset: dataset of a run, possibly lazy, of any length; at most 20,000 rows are drawn.
         what: a name of `FIGURES`.
 
     Raises:
-        ValueError: no such figure, none of this dataset, or a dataset without samples.
+        ValueError: no such figure, none for this dataset, or a dataset without samples.
     """
     check_name(what)
     if what == OVERVIEW:
@@ -179,10 +181,10 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
 
 
 def check_name(what: str) -> None:
-    """Say what figures there are.
+    """Refuse an unknown name with a list of the figures.
 
     Raises:
-        ValueError: no figure is called so.
+        ValueError: no figure has this name.
     """
     if what not in FIGURES:
         close = get_close_matches(what, FIGURES, 1)

@@ -1,4 +1,4 @@
-"""Panels to a page: curves over time on the left, planes on the right, facts below."""
+"""Composition of panels to a page: curves over time on the left, planes on the right, facts below."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
 
 @dataclass(frozen=True)
 class Panel:
-    """What a panel needs (`shows`) and how it is drawn on axes (`draw`)."""
+    """A panel: what it needs (`shows`) and how it is drawn on axes (`draw`)."""
 
     shows: Callable[[xarray.Dataset], bool]
     draw: Callable[[Any, xarray.Dataset], None]
     begins: bool = False
-    """Of a panel over time: whether it shows the start alone where the whole would be a solid band."""
+    """For a panel over time: whether to show only the start if the whole would be a solid band."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A dataset's rows as a figure shows them, in memory, and what was found in all of them.
+    """A dataset's rows as a figure shows them, in memory, and results from all of them.
 
     Attributes:
         rows: evenly strided, not too many.
-        start: as many from the start on, every one.
+        start: as many consecutive rows from the start.
         largest: magnitude of each invariant's drift.
         complete: whether every sample was read for it.
     """
@@ -58,11 +58,11 @@ class Shown:
 
 
 def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ) -> Shown:
-    """What a figure needs of a dataset, which may be lazy and of any length.
+    """Read what a figure needs from a dataset, possibly lazy, of any length.
 
     Args:
-        most: rows that it shows.
-        read: samples up to which all drifts are read for their largest value.
+        most: largest number of rows shown.
+        read: number of samples up to which all drifts are read for their largest value.
 
     Raises:
         ValueError: no time coordinate, or no samples.
@@ -79,7 +79,7 @@ def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ)
 
 
 def beginning(axes: Axes, shown: Shown) -> float:
-    """Seconds that hold `_CYCLES` swings of a panel's curves where the run has many more; 0 where it hasn't.
+    """Seconds that hold `_CYCLES` swings of a panel's curves if the run has many more; otherwise 0.
 
     Args:
         axes: of the panel, drawn from `shown.start`.
@@ -109,12 +109,12 @@ def compose(
     *,
     facts: bool = False,
 ) -> Figure:
-    """A page of those panels that the dataset has something for.
+    """A page of those panels for which the dataset has data.
 
     Args:
-        curves: over a common time, below one another.
-        planes: square, below one another beside curves, else side by side.
-        facts: whether a table of what was run and what was conserved stands below the planes.
+        curves: panels over a common time axis, below one another.
+        planes: square panels, below one another beside curves, otherwise side by side.
+        facts: whether to put a table of what was run and what was conserved below the planes.
     """
     from matplotlib import rc_context
 
@@ -194,7 +194,7 @@ def _curve_panel(axes: Axes, panel: Panel, shown: Shown) -> tuple[Axes, xarray.D
 
 
 def facts_of(shown: Shown) -> list[tuple[str, str]]:
-    """What was run and what was conserved: rows of a table, all of them."""
+    """Table rows of what was run and what was conserved."""
     dataset = shown.rows
     integrator = read_config(dataset).get("integrator", {})
     status = str(dataset.attrs.get("status", ""))
@@ -232,5 +232,5 @@ def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
 
 
 def has(*names: str) -> Callable[[xarray.Dataset], bool]:
-    """Whether a dataset has one of the variables."""
+    """Predicate: whether a dataset has one of the variables."""
     return lambda dataset: any(signals.values(dataset, name) is not None for name in names)

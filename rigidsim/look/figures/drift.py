@@ -1,4 +1,4 @@
-"""Drifts of invariants against what rounding explains."""
+"""Drifts of invariants against the bound that rounding explains."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TYPICAL, MOST = 0.5, 50.0
-"""Of tolerance times sqrt(steps): a random walk of one rounding per step (Brouwer 1937), and the drift above
-which a summary warns (a few roundings of several operations per step)."""
+"""In units of tolerance times sqrt(steps): a random walk of one rounding per step (Brouwer 1937), and the
+drift above which a summary warns (a few roundings of several operations per step).
+"""
 
 
 def law(dataset: xarray.Dataset) -> Array | None:

@@ -1,4 +1,4 @@
-"""Bodies in three dimensions on plain axes: seen from far away, hidden parts told apart.
+"""Bodies in three dimensions drawn on plain axes: seen from far away, with hidden parts removed.
 
 A flat drawing knows where every text will be, which matplotlib's own 3D axes don't.
 """
@@ -54,15 +54,15 @@ def eye_at(toward: Array, up: Array = np.array([0.0, 0.0, 1.0])) -> Eye:  # noqa
 def draw_ellipsoid(
     axes: Axes, eye: Eye, radii: Array, color: str, *, outside: Array | None = None, alpha: float = 1.0
 ) -> Array:
-    """What is seen of an ellipsoid about the origin.
+    """Draw the visible part of an ellipsoid about the origin.
 
     Args:
         radii: semi-axes (3,).
-        outside: semi-axes of another ellipsoid: only what stands out of it is drawn.
+        outside: semi-axes of another ellipsoid; only parts outside it are drawn.
         alpha: opacity.
 
     Returns:
-        What it covers of the picture: points (n, 2).
+        The covered points of the picture, (n, 2).
     """
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
@@ -115,7 +115,7 @@ def line(axes: Axes, eye: Eye, points: Array, keep: Mask | None = None, **style:
 
 
 def spoke(axes: Axes, eye: Eye, start: Array, stop: Array, text: str, color: str, reach: float) -> Array:
-    """An axis from where it leaves a body, and its label beyond; returns the label's place (2,)."""
+    """Draw an axis from where it leaves a body, with a label beyond; returns the label's place (2,)."""
     from matplotlib.patheffects import withStroke
 
     ends = eye.flat(np.stack([start, stop]))
@@ -135,7 +135,9 @@ def spoke(axes: Axes, eye: Eye, start: Array, stop: Array, text: str, color: str
 
 
 def frame(axes: Axes, covered: Array, *, aside: float = 0.42, above: float = 0.3) -> None:
-    """Limits about what is covered (n, 2), equal scales, room for labels on all sides, and no frame."""
+    """Set limits about the covered points (n, 2), with equal scales, room for labels on all sides, and no
+    frame.
+    """
     low, high = np.nanmin(covered, axis=0), np.nanmax(covered, axis=0)
     middle, half = (low + high) / 2, (high - low) / 2
     reach = max(float(half.max()), 1e-300)

@@ -1,6 +1,6 @@
-"""Mean rates, secular parts and the leading ellipse of recorded angles: what a label says of a curve.
+"""Fits of recorded angles for labels: mean rates, secular parts and the leading ellipse.
 
-Quick estimates for labels and for taking trends off; `rigidsim analyse` has the digits.
+Quick estimates for labels and for removing trends; `rigidsim analyse` has the digits.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ _UNIFORM = 0.1  # by which the rates of both halves of a run may differ: swings 
 
 @dataclass(frozen=True)
 class SecularLine:
-    """``at_start + rate * (t - t[0])``, the secular part of an angle."""
+    """The secular part of an angle, ``at_start + rate * (t - t[0])``."""
 
     at_start: float
     rate: float
     start: float
 
     def at(self, time: Array) -> Array:
-        """Its values (rows,)."""
+        """Values (rows,) at given times."""
         return np.asarray(self.at_start + self.rate * (time - self.start))
 
 
@@ -104,7 +104,7 @@ def _solve(columns: list[Array], values: Array, root: Array) -> Array:
 
 
 def _peak(windowed: Array) -> float | None:
-    """Cycles over the whole of the strongest sinusoid, None where it has less than 1.5."""
+    """Cycles over the whole series of the strongest sinusoid; None if it has less than 1.5."""
     padded = 8 * len(windowed)
     power = np.abs(np.fft.rfft(windowed, padded)) ** 2
     k = int(power[1:-1].argmax()) + 1
@@ -119,8 +119,8 @@ def _peak(windowed: Array) -> float | None:
 def circulation(time: Array, plane: Array) -> float | None:
     """Mean rate, rad/s, at which a point of a plane (rows, 2) goes about the origin; counterclockwise > 0.
 
-    None where it doesn't, does so in less than one turn or ever faster or slower, or was sampled too sparsely
-    to tell.
+    None if it doesn't, completes less than one turn, keeps speeding up or slowing down, or was sampled too
+    sparsely to tell.
     """
     finite = np.isfinite(plane).all(axis=1)
     phase = np.arctan2(plane[finite, 1], plane[finite, 0])
@@ -149,12 +149,12 @@ class FittedEllipse:
 
     @property
     def semi_axes(self) -> tuple[float, float]:
-        """The larger and the smaller."""
+        """The larger and the smaller semi-axis."""
         a, b = abs(self.forward), abs(self.backward)
         return a + b, abs(a - b)
 
     def curve(self, points: int = 181) -> Array:
-        """Once around it, (points, 2)."""
+        """Points once around it, (points, 2)."""
         phase = np.exp(1j * np.linspace(0.0, _TURN, points))
         z = self.forward * phase + self.backward / phase
         return np.stack([z.real, z.imag], axis=1)
@@ -163,7 +163,7 @@ class FittedEllipse:
 def leading_ellipse(time: Array, plane: Array) -> FittedEllipse | None:
     """The strongest periodic part of a point's motion in a plane (rows, 2), evenly sampled.
 
-    None where the strongest has less than 1.5 periods in the run, or there is none that stands out.
+    None if the strongest has less than 1.5 periods in the run, or none stands out.
     """
     steps = np.diff(time)
     if len(time) < 16 or not np.isfinite(plane).all() or np.ptp(steps) > 1e-3 * steps.mean():

@@ -1,4 +1,4 @@
-"""The path of a body that moves: height over range, the plane of an orbit, or its path in space."""
+"""The path of a moving body: height over range, in the plane of an orbit, or in space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Panels of where axes point: polar motion, pole path, nutation, a top from above, libration."""
+"""Panels of axis directions: polar motion, pole path, nutation, a top from above, libration."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def polar_motion_panel(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def pole_path_panel(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Where the figure axis points in space, seen from outside along the pole that it circles.
+    """Path of the figure axis in space, seen from outside along the pole that it circles.
 
     Distances from the centre are angles. A free body's pole circles the momentum; else the reference
     plane's pole is the centre.
@@ -103,7 +103,7 @@ def pole_path_panel(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def pole_paths(dataset: xarray.Dataset) -> tuple[dict[str, Array], str, str]:
-    """Paths (rows, 2), rad, by axis; what the centre is; and a title."""
+    """Paths (rows, 2), rad, by axis; a description of the centre; and a title."""
     along = signals.steady_momentum(dataset)
     if along is not None:
         first = np.cross(np.eye(3)[np.abs(along).argmin()], along)
@@ -192,7 +192,7 @@ def tip_panel(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def tip(dataset: xarray.Dataset) -> tuple[Array, str, str]:
-    """A top's tip (rows, 3), its unit and what it is: recorded, else the end of its unit figure axis."""
+    """A top's tip (rows, 3), its unit and description: recorded, or else the end of the unit figure axis."""
     recorded = signals.values(dataset, "tip")
     if recorded is not None:
         return recorded, "m", "Tip"
@@ -202,7 +202,7 @@ def tip(dataset: xarray.Dataset) -> tuple[Array, str, str]:
 
 
 def nadir_panel(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Where the source stands in body axes, about its mean direction there."""
+    """Direction of the source in body axes, about its mean direction."""
     directions = signals.values(dataset, "nadir")
     assert directions is not None
     mean = np.nanmean(directions, axis=0)
@@ -224,7 +224,7 @@ def nadir_panel(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def phase_panel(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Rates of libration, else of roll, pitch and yaw, against the angles: what librates closes."""
+    """Rates of libration, or of roll, pitch and yaw, against the angles; librations are closed curves."""
     if signals.values(dataset, "libration") is not None:
         table = timelines.swings(dataset)[0]
         names = ["in the orbit's plane", "out of it"]
@@ -243,7 +243,7 @@ def phase_panel(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _level(up: Array) -> tuple[Array, Array]:
-    """Two horizontal unit vectors, X and Y where Z is up."""
+    """Two horizontal unit vectors; X and Y if Z is up."""
     along = np.array([1.0, 0.0, 0.0])
     if abs(up[0]) > 0.9:
         along = np.array([0.0, 1.0, 0.0])

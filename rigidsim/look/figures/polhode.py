@@ -34,7 +34,7 @@ _CLOSE = 0.06  # rad from an axis, within which facets are too coarse for the su
 
 
 def surfaces(dataset: xarray.Dataset) -> tuple[Array, Array] | None:
-    """Semi-axes (3,), rad/s, of the surfaces of energy and momentum; None where the motion isn't on them."""
+    """Semi-axes (3,), rad/s, of the surfaces of energy and momentum; None if the motion isn't on them."""
     moments, rates = signals.moments(dataset), signals.principal_rates(dataset)
     if moments is None or rates is None:
         return None
@@ -132,7 +132,7 @@ def polhode_panel(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _view(points: Array, radii: Array, moments: Array) -> eyes.Eye:
-    """From the side on which the polhode lies, and not along the plane of a separatrix."""
+    """A view from the side on which the polhode lies, and not along the plane of a separatrix."""
     mean = np.nanmean(points, axis=0)
     signs = np.where(mean / radii < -1e-3, -1.0, 1.0)
     normals = [np.cross(ring[0], ring[90]) for ring in separatrix(moments, radii)]
@@ -161,7 +161,7 @@ def _path(axes: Axes, view: eyes.Eye, points: Array, front: NDArray[np.bool_], *
 
 
 def _bare(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
-    """Without surfaces: the path between three axes with the ranges that it covers."""
+    """Draw the path without surfaces, between three axes with the ranges that it covers."""
     scale, unit = si_scale(rates, "rad/s")
     points = rates / scale
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
@@ -199,7 +199,7 @@ def herpolhode_panel(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def herpolhode(dataset: xarray.Dataset) -> Array | None:
-    """The angular velocity across the momentum (rows, 2), rad/s; None where the momentum moves."""
+    """Component of the angular velocity across the momentum (rows, 2), rad/s; None if the momentum moves."""
     along = signals.steady_momentum(dataset)
     rates, quaternion = signals.values(dataset, "angular_velocity"), signals.values(dataset, "quaternion")
     if along is None or rates is None or quaternion is None:

@@ -1,4 +1,4 @@
-"""Figures to files."""
+"""Saving figures to files."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ def save_figure(
     """Draw a figure of a run to a file.
 
     Args:
-        dataset: of a run; it may be lazy: at most 20,000 rows of each variable are drawn.
+        dataset: dataset of a run, possibly lazy; at most 20,000 rows of each variable are drawn.
         path: the file; it is whole when this returns.
         what: see `figure`.
-        file_format: see `figure_format`; by default what the suffix of `path` says.
+        file_format: see `figure_format`; by default given by the suffix of `path`.
 
     Returns:
         `path`.
 
     Raises:
-        ValueError: another suffix, or as `figure`.
+        ValueError: another suffix, or as for `figure`.
     """
     path = Path(path)
     file_format = file_format or figure_format(path)
@@ -43,7 +43,7 @@ def save_figure(
 
 
 def figure_format(path: Path) -> str:
-    """What a file's suffix asks for: "png" or "svg".
+    """File format for a path's suffix: "png" or "svg".
 
     Raises:
         ValueError: another suffix.

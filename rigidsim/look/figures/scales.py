@@ -1,4 +1,4 @@
-"""The unit in which an axis reads well: prefixes of SI units, and deg to microarcseconds for angles."""
+"""Readable units of axes: prefixed SI units, and deg to microarcseconds for angles."""
 
 from __future__ import annotations
 

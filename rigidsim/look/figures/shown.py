@@ -15,14 +15,14 @@ _DOTS = 100  # per inch
 
 
 class ShownFigure(Figure):
-    """A figure on the Agg canvas, of which notebooks show the picture."""
+    """A figure on the Agg canvas that notebooks display as a picture."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         FigureCanvasAgg(self)
 
     def _repr_png_(self) -> bytes:
-        """What IPython asks for."""
+        """PNG picture, which IPython asks for."""
         data = io.BytesIO()
         self.savefig(data, format="png", dpi=_DOTS)
         return data.getvalue()

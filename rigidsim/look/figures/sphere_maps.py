@@ -1,4 +1,4 @@
-"""Values over directions: a sweep's vectors of one length, on the whole sphere in equal areas."""
+"""Values over directions of a sweep, on an equal-area map of the whole sphere."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FILLED = 2.0  # area of the dots over that of the map
 
 
 def directions(dataset: xarray.Dataset, dim: str) -> Array | None:
-    """Unit vectors (members, 3) of an axis that sweeps directions; None of any other."""
+    """Unit vectors (members, 3) of an axis that sweeps directions; None for any other axis."""
     name = f"{dim}_value"
     if name not in dataset.coords or dataset[name].dims[0] != dim or dataset[name].shape[1:] != (3,):
         return None
@@ -42,7 +42,7 @@ def on_sphere(figure: Figure, vectors: Array, values: Array, scale: dict[str, An
         scale: colours, as ``scatter`` takes them.
 
     Returns:
-        The axes and what a colour bar is made for.
+        The axes, and the object for a colour bar.
     """
     axes = figure.add_subplot(projection="mollweide")
     axes.set_facecolor(PALE)

@@ -1,4 +1,4 @@
-"""How figures look: colours, fonts, the empty page with its heading, and curves with their key.
+"""Style of figures: colours, fonts, the empty page with its heading, and curves with their key.
 
 Imports no matplotlib until a figure is made.
 """
@@ -31,7 +31,9 @@ PALETTE = (BLUE, ORANGE, VIOLET, Y, X, TEAL, "#8c6d46", GREY)
 
 MOST_VECTOR_POINTS = 6000  # of a curve in an SVG; longer ones become pixels there
 IN_PLANE, OVER_TIME = 0.4, 0.8
-"""Radii between neighbours up to which samples are joined by lines: some sixteen and eight samples a turn."""
+"""Distance between neighbours, in radii of the whole, up to which samples are joined by lines: some sixteen
+and eight samples a turn.
+"""
 _KEY_ROW = 12.4  # height of a row of a key, points
 _KEY_LETTER, _TITLE_LETTER = 4.9, 6.1  # mean widths of a letter, points
 _LATER = "lighter: later"
@@ -74,8 +76,8 @@ def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
     """An empty page with the run's name and description above.
 
     Args:
-        width: of the page, inches.
-        height: of what stands below the heading, inches.
+        width: width of the page, inches.
+        height: height below the heading, inches.
     """
     # The object-oriented interface: no pyplot, no state that outlives the call.
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -113,16 +115,16 @@ def _shorten(figure: Figure, text: Any, words: str, width: float) -> None:
 
 
 def titled(axes: Axes, title: str, *, rows: int = 0) -> None:
-    """A panel's title, in as many lines as its width asks for, with room below for a key of so many rows."""
+    """Set a panel's title, broken to its width, with room below for a key of so many rows."""
     text = textwrap.fill(title, max(int(_room(axes) / _TITLE_LETTER), 20))
     axes.set_title(text, pad=7.0 + (3.0 + rows * _KEY_ROW if rows else 0.0))
 
 
 def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None:
-    """The title, and between it and the panel the key to its curves: nothing is covered, however many.
+    """Set the title, and between it and the panel the key to its curves, so that nothing is covered.
 
     Args:
-        handles: of the entries; by default all curves with a label.
+        handles: handles of the entries; by default all curves with a label.
     """
     found = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
     labels = [str(handle.get_label()) for handle in found]
@@ -142,7 +144,7 @@ def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None
 
 
 def _room(axes: Axes) -> float:
-    """Width of a panel, about, in points: before the page is laid out."""
+    """Approximate width of a panel in points, before the page is laid out."""
     return float(axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi * 72.0 * 1.1)
 
 
@@ -166,7 +168,7 @@ def joined(values: Array, reach: float = IN_PLANE) -> bool:
 
 
 def curve(axes: Axes, x: Array, y: Array, *, in_plane: bool = False, **style: Any) -> None:
-    """A curve where the samples allow one, else its samples as points.
+    """Draw a curve if the samples are dense enough, otherwise its samples as points.
 
     Long ones are drawn as pixels in an SVG, which otherwise would weigh megabytes.
 
@@ -182,7 +184,7 @@ def curve(axes: Axes, x: Array, y: Array, *, in_plane: bool = False, **style: An
 
 
 def trace(axes: Axes, x: Array, y: Array) -> None:
-    """A path in a plane: of many turns about the origin the first stand out, else coloured by time.
+    """Draw a path in a plane: of many turns about the origin the first stand out, otherwise coloured by time.
 
     The start is marked. All that stands out has a label.
     """
@@ -223,7 +225,7 @@ def trace(axes: Axes, x: Array, y: Array) -> None:
 
 
 def _first_turns(points: Array) -> tuple[int, str]:
-    """Rows of the first turns about the origin, and what to call them; 0 rows where there are few in all."""
+    """Rows of the first turns about the origin, and their name; 0 rows if there are few turns in all."""
     if not np.isfinite(points).all():
         return 0, ""
     angle = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
@@ -261,7 +263,7 @@ def square(axes: Axes, x: Array, y: Array, *, margin: float = 0.08) -> None:
 
 
 def note(axes: Axes, x: float, y: float, text: str, **style: Any) -> Any:
-    """A remark in a panel, at a place given as parts of it, on a ground that keeps it readable."""
+    """Write a remark in a panel, at a place in axes fractions, on a background that keeps it readable."""
     ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "boxstyle": "round,pad=0.2"}
     options: dict[str, Any] = {
         "ha": "center", "va": "center", "fontsize": 9.5, "color": INK, "zorder": 8, "bbox": ground,

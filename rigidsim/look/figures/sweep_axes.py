@@ -1,4 +1,4 @@
-"""Axes of a sweep's figure: where its members stand along them, and the words and scales beside."""
+"""Axes of a sweep's figure: positions of members along them, with labels and scales."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def axes_of(dataset: xarray.Dataset) -> list[str]:
 
 
 def label_of(variable: xarray.DataArray, dim: str, place: int) -> str:
-    """Of one place along a dimension: x of a vector, or a value of an axis."""
+    """Label of one place along a dimension: the component x of a vector, or a value of an axis."""
     if dim not in variable.coords:
         return str(place)
     value = variable.coords[dim].values[place]
@@ -35,7 +35,7 @@ def label_of(variable: xarray.DataArray, dim: str, place: int) -> str:
 
 
 def along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
-    """Where the values of an axis stand, and the words beside it; texts and vectors are counted."""
+    """Positions of an axis's values, and its label; texts and vectors are numbered."""
     if dim in dataset.coords and dataset[dim].ndim == 1 and dataset[dim].dtype.kind in "fi":
         coordinate = dataset[dim]
         return np.asarray(coordinate.values, dtype=np.float64), named(coordinate, dim)
@@ -46,7 +46,7 @@ def along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
 
 
 def named(variable: xarray.DataArray, name: str | None = None) -> str:
-    """A variable's name and unit; of an axis its key beside."""
+    """A variable's name and unit; for a sweep's axis also its key."""
     words = (name or str(variable.name)).replace("_", " ")
     swept = str(variable.attrs.get("swept_key", ""))
     if swept and swept != name:
@@ -56,14 +56,14 @@ def named(variable: xarray.DataArray, name: str | None = None) -> str:
 
 
 def title_of(variable: xarray.DataArray, said: str) -> str:
-    """What a variable is, and where it is cut."""
+    """Title: what a variable is, and where it is cut."""
     title = str(variable.attrs.get("long_name") or variable.name).replace("_", " ")
     title = title[:1].upper() + title[1:]
     return f"{title}; {said}" if said else title
 
 
 def spans_decades(values: Array) -> bool:
-    """Whether values are better seen on a logarithmic scale."""
+    """Whether values are better shown on a logarithmic scale."""
     finite = values[np.isfinite(values)]
     if not len(finite) or finite.min() <= 0:
         return False
@@ -72,7 +72,7 @@ def spans_decades(values: Array) -> bool:
 
 
 def geometric(place: Array) -> bool:
-    """Whether values lie at equal ratios."""
+    """Whether values are spaced at equal ratios."""
     ratios = np.diff(np.log(place))
     return len(ratios) < 2 or float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
 

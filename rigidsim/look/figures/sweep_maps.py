@@ -45,7 +45,7 @@ _MOST_POINTS = 400_000
 
 
 def drawable(dataset: xarray.Dataset) -> list[str]:
-    """Names that a sweep's figure can show, the one that it shows by default first."""
+    """Names that a sweep's figure can show, the default first."""
     axes = axes_of(dataset)
     found = [
         str(name)
@@ -74,7 +74,7 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     """A sweep's page: one variable over its axes.
 
     Args:
-        dataset: of a sweep, lazy or not.
+        dataset: dataset of a sweep, lazy or not.
         what: name of the variable, with ``[INDEX]`` for one component; by default the first indicator, else
             the first time of an event, else the first quantity that was kept.
 
@@ -116,7 +116,7 @@ def _asked(names: list[str], what: str | None) -> tuple[str, int | None]:
 
 
 def _cut(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[list[str], xarray.DataArray, str]:
-    """At most two axes of more than one value: the longest; the others are cut where they begin."""
+    """At most two axes of more than one value, the longest; others are cut at their first value."""
     axes = axes_of(dataset)
     longest = sorted(axes, key=lambda dim: -dataset.sizes[dim])[:2]
     kept = [dim for dim in axes if dim in longest and dataset.sizes[dim] > 1] or axes[:1]
@@ -179,7 +179,7 @@ def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str)
 
 
 def _ordered(dataset: xarray.Dataset, dim: str) -> bool:
-    """Whether neighbours along an axis have to do with each other: not so where members are drawn."""
+    """Whether neighbours along an axis are related, which randomly drawn members aren't."""
     if dim in dataset.coords:
         return dataset[dim].dtype.kind in "fi"
     place, _ = along(dataset, dim)
@@ -222,7 +222,7 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
 
 
 def _colours(values: Array) -> dict[str, Any]:
-    """Scale of a map's colours: logarithmic where the values span decades, signs apart where both occur.
+    """Scale of a map's colours: logarithmic if the values span decades, diverging if both signs occur.
 
     A hundredth of the values at either end doesn't take the colours from all others.
     """
@@ -269,7 +269,7 @@ def _sphere(dataset: xarray.Dataset, cut: xarray.DataArray, dim: str, said: str)
 
 
 def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
-    """Points of all members: two components against each other, or one against the axis of the members."""
+    """Points of all members: one component against the other, or against the axis of the members."""
     members = [dim for dim in variable.dims if dim in axes_of(dataset)]
     occurrence = next(str(dim) for dim in variable.dims if str(dim).endswith(_SECTION))
     rest = [str(dim) for dim in variable.dims if dim not in members and dim != occurrence]

@@ -1,4 +1,4 @@
-"""Panels along time: what each has for axes, curves, units and labels."""
+"""Panels along time: their axes, curves, units and labels."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool, begins: fl
     """Limits of the run on a panel, and on the lowest one the label with its unit.
 
     Args:
-        begins: seconds of the start that are shown alone; 0: all.
+        begins: show only so many seconds from the start; 0 shows all.
     """
     time, axis = clock(dataset)
     end = time[0] + begins / axis.unit.seconds if begins else time[-1]
@@ -64,7 +64,7 @@ def moves(values: Array) -> bool:
 
 
 def steady(axes: Axes, table: Array) -> None:
-    """Of a panel whose curves are constant: limits that don't magnify their rounding errors."""
+    """Set limits of a panel with constant curves that don't magnify their rounding errors."""
     if not any(moves(column) for column in table.T):
         middle = float(np.nanmean(table))
         reach = 0.05 * abs(middle) or 1.0
@@ -72,7 +72,7 @@ def steady(axes: Axes, table: Array) -> None:
 
 
 def rates(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Angular velocity in body axes."""
+    """Draw the angular velocity in body axes."""
     table = signals.values(dataset, "angular_velocity")
     assert table is not None
     scale, unit = si_scale(table, "rad/s")
@@ -82,7 +82,7 @@ def rates(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def attitude(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Euler angles where they were recorded, else the body's z axis in space."""
+    """Draw recorded Euler angles, or else the body's z axis in space."""
     angles = signals.values(dataset, "euler_angles")
     if angles is not None:
         table = np.rad2deg(angles)
@@ -108,7 +108,7 @@ def attitude(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def without_growth(dataset: xarray.Dataset, angles: Array) -> tuple[Array, list[str]]:
-    """Angles (rows, 3) in degrees, less their mean growth where they run through more than two turns.
+    """Angles (rows, 3) in degrees, less their mean growth if they run through more than two turns.
 
     Otherwise one fast spin would press the others flat. The labels say what was taken off.
     """
@@ -126,7 +126,7 @@ def without_growth(dataset: xarray.Dataset, angles: Array) -> tuple[Array, list[
 
 
 def turning(rate: float) -> str:
-    """A rate (rad/s) in turns a unit of time, so that there are some of them: ``0.6702 turns/s``."""
+    """A rate (rad/s) as turns per unit of time, chosen so that the number isn't tiny: ``0.6702 turns/s``."""
     unit = unit_for(20 * 2 * np.pi / rate if rate else 0.0)
     return f"{number(rate * unit.seconds / (2 * np.pi))} turns/{unit.symbol}"
 
@@ -172,7 +172,7 @@ def longitude(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
-    """Obliquity and node longitude of the axes that go together and are told apart, figure axis first."""
+    """Obliquity and node longitude of the distinguishable axes that are shown together, figure axis first."""
     found: dict[str, tuple[Array, Array]] = {}
     for name in ("figure", "spin", "momentum"):
         pair = signals.orientation(dataset, name)
@@ -206,7 +206,9 @@ def libration(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def swings(dataset: xarray.Dataset) -> tuple[Array, list[int]]:
-    """Libration angles (rows, 2), rad, less so many half turns that they swing about zero, and these."""
+    """Libration angles (rows, 2), rad, less as many half turns as make them swing about zero, and these
+    numbers.
+    """
     table = signals.values(dataset, "libration")
     assert table is not None
     turned = [int(np.round(np.nanmean(column) / np.pi)) for column in table.T]
@@ -224,7 +226,7 @@ def roll_pitch_yaw(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def one_angle(axes: Axes, dataset: xarray.Dataset, name: str, title: str, symbol: str, hue: str) -> None:
-    """A recorded angle, less its mean motion where it goes through more than a turn."""
+    """Draw a recorded angle, less its mean motion if it passes through more than a turn."""
     angle = signals.values(dataset, name)
     assert angle is not None
     seconds = signals.seconds(dataset)

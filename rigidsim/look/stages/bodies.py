@@ -1,4 +1,4 @@
-"""A body as stages draw it: meshes in units of its reach, arrows and trails of its motion, the eye."""
+"""A body as stages draw it: meshes in units of its reach, arrows and trails of its motion, the camera."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from rigidsim.look.rows import Table
 
 FIELD = np.deg2rad(55.0)
-"""Of view, from bottom to top: the viewer's own."""
+"""Field of view from bottom to top (rad), the viewer's own."""
 _FLAT = 0.12  # of the other extents, below which a body is a plate
 
 
@@ -46,7 +46,7 @@ class Subject:
         attitude: (rows, 3, 3) body to space, or None.
         quaternion: (rows, 4) w x y z as recorded, or None.
         position: (rows, 3), m, or None.
-        solids: of the attribute ``drawing``.
+        solids: solids in the attribute ``drawing``.
     """
 
     reach: float
@@ -59,7 +59,7 @@ class Subject:
 
     @classmethod
     def of(cls, dataset: Table) -> Subject:
-        """That of a dataset in memory.
+        """The body of a dataset in memory.
 
         Raises:
             ValueError: an unreadable ``drawing``, see ``solids.body_meshes``.
@@ -79,7 +79,7 @@ class Subject:
         )
 
     def stage(self, arrows: list[Arrow], trails: list[Trail], title: str = "") -> Stage:
-        """The body at the origin, to scale."""
+        """A stage with the body at the origin, to scale."""
         return Stage(
             root="scene",
             title=title or ("Body in space" if self.attitude is not None else "Body axes"),
@@ -95,14 +95,14 @@ class Subject:
 
     @property
     def thin_axis(self) -> Array | None:
-        """Unit vector (3,), body axes, across a plate; None for other bodies."""
+        """Unit vector (3,), body axes, across a plate; None for bodies that aren't plates."""
         corners = np.concatenate([mesh.vertices for mesh in self.meshes])
         _, spread, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
         return axes[2] if spread[2] < _FLAT * spread[1] else None
 
 
 def column(dataset: Table, name: str, width: int) -> Array | None:
-    """A vector variable along time, (rows, width); None where there is none of that width."""
+    """A vector variable along time, (rows, width); None if there is none of that width."""
     found = values(dataset, name)
     return found if found is not None and found.ndim == 2 and found.shape[1] == width else None
 
@@ -162,7 +162,7 @@ def vectors_of(
 
 
 def source_arrows(dataset: Table, subject: Subject, length: float) -> list[Arrow]:
-    """Directions to what pulls, in space: by orbits, recorded point masses, or the recorded nadir."""
+    """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir."""
     arrows = _mass_arrows(dataset, length)
     listed = surroundings.told(dataset, "source")
     nadir = column(dataset, "nadir", 3)
@@ -181,7 +181,7 @@ def source_arrows(dataset: Table, subject: Subject, length: float) -> list[Arrow
 
 
 def _mass_arrows(dataset: Table, length: float) -> list[Arrow]:
-    """Directions to the point masses whose positions were recorded, from the one that the body is."""
+    """Directions to the point masses whose positions were recorded, from the body that is one of them."""
     positions = signals.values(dataset, "point_mass_position")
     body = read_config(dataset).get("body", {})
     host = str(body.get("host", "")) if isinstance(body, dict) else ""
@@ -206,7 +206,7 @@ def _mass_arrows(dataset: Table, length: float) -> list[Arrow]:
 def eye_at(
     elevation: float, azimuth: float, radius: float, target: Array | None = None, *, narrow: bool = False
 ) -> Camera:
-    """A camera that has a ball of some radius in its picture, from an elevation and azimuth (rad), Z up.
+    """A camera that sees a ball of given radius from an elevation and azimuth (rad), Z up.
 
     Args:
         narrow: the view is about as wide as high, or less.
@@ -218,7 +218,7 @@ def eye_at(
 
 
 def direction_of(elevation: float, azimuth: float) -> Array:
-    """Unit vector (3,)."""
+    """Unit vector (3,) of an elevation and azimuth (rad)."""
     flat = np.cos(elevation)
     return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
 
@@ -228,7 +228,7 @@ def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None
 
     Args:
         narrow: the view is about as wide as high, so the eye stands further back.
-        subject: a plate is looked at so that its face shows most of the time.
+        subject: the body; a plate is seen so that its face shows most of the time.
     """
     if stage.camera is not None:
         if not narrow:
@@ -259,7 +259,7 @@ def _facing(normals: Array, leading: Array | None) -> tuple[float, float]:
     """Elevation and azimuth (rad) from which a plate shows its face, and an arrow isn't seen end on.
 
     Args:
-        normals: (rows, 3), of the plate.
+        normals: (rows, 3), normals of the plate.
         leading: (3,), the arrow.
     """
     normals = normals[:: max(len(normals) // 200, 1)]

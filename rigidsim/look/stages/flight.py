@@ -1,4 +1,4 @@
-"""A body that flies in a uniform gravity: its path over a ground, and the body as it turns."""
+"""Stage of a body that flies in a uniform gravity: its path over a ground, and the body as it turns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LINES = 5  # of the ground's grid, to each side
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
-    """Of a body with a position under a uniform gravity and no attractor."""
+    """Picture of a body with a position under a uniform gravity and without attractor; None for others."""
     pull, position = surroundings.gravity(dataset), subject.position
     if pull is None or position is None or surroundings.told(dataset, "attractor"):
         return None

@@ -46,7 +46,7 @@ ENERGY: tuple[int, int, int] = (120, 150, 200)
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
-    """Of a body whose energy and momentum stay put."""
+    """Picture of a body whose energy and momentum are constant; None for others."""
     radii = energy_ellipsoid(dataset)
     rates = column(dataset, "angular_velocity", 3)
     if radii is None or rates is None or subject.position is not None:

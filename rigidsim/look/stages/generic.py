@@ -1,4 +1,6 @@
-"""Any scene: the body with its momentum and angular velocity, and its track where it moves far."""
+"""Stage of any other scene: the body with its momentum and angular velocity, and its track if it moves
+far.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ TRACK_BODY = 0.08  # reach of the enlarged body in the track view
 
 
 def picture(dataset: Table, subject: Subject) -> Picture:
-    """Of any scene."""
+    """Picture of any scene."""
     arrows, trails, notes = vectors_of(dataset, subject)
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
@@ -30,7 +32,7 @@ def picture(dataset: Table, subject: Subject) -> Picture:
 
 
 def with_track(subject: Subject, body: Stage, notes: list[str]) -> list[Stage]:
-    """The body's stage, moving where it moves a little, and a second one with its track where it moves far.
+    """The body's stage, and a second one with its track if it moves far.
 
     A position that moves by more than `NEAR` reaches can't be shown to the scale of the body: then the body
     stays at the centre of the first stage, and is enlarged on the second.

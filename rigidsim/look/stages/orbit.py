@@ -1,4 +1,4 @@
-"""A body on a free orbit about an attracting point: body, direction to its planet, and the orbit."""
+"""Stage of a body on a free orbit about an attracting point: body, direction to its planet, and the orbit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
-    """Of a body with a position and one attracting point."""
+    """Picture of a body with a position and one attracting point; None for others."""
     listed = surroundings.told(dataset, "attractor")
     if len(listed) != 1 or subject.position is None:
         return None

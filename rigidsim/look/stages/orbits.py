@@ -1,4 +1,6 @@
-"""What satellites and bodies on free orbits share: the local frame, the planet in a picture of the orbit."""
+"""Parts shared by satellites and bodies on free orbits: the local frame, and the planet in a picture of the
+orbit.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,7 @@ def local_frame(position: Array, normal: Array) -> Array:
 
     Args:
         position: (rows, 3) from the attracting body.
-        normal: (3,) or (rows, 3), of the orbit; need not be exactly across the position.
+        normal: (3,) or (rows, 3), the orbit's normal; need not be exactly across the position.
     """
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
     forward = np.cross(np.broadcast_to(normal, position.shape), -down)
@@ -88,7 +90,7 @@ def orbit_stage(subject: Subject, quaternion: Array | None, position: Array, pla
 
 
 def horizon(planet: Globe | None, place: str, *, below: float = 2.2) -> tuple[list[Solid], list[Line]]:
-    """The planet's surface beneath the body, not to scale: a cap of a ball of ten units, z down."""
+    """The planet's surface beneath the body, not to scale: a spherical cap of radius ten units, z down."""
     color = planet.color if planet is not None else GREY
     radius = 9.0
     whole = globe(np.full(3, radius), color)
@@ -102,5 +104,5 @@ def horizon(planet: Globe | None, place: str, *, below: float = 2.2) -> tuple[li
 
 
 def without_axes(stage: Stage) -> Stage:
-    """A stage whose body axes aren't drawn."""
+    """A stage without body axes."""
     return replace(stage, axis_length=0.0)

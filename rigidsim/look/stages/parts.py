@@ -1,4 +1,4 @@
-"""The parts that a stage is made of, as numbers: what is drawn, where, in which unit.
+"""Parts of a stage as numbers: what is drawn, where, in which unit.
 
 The viewer works in float32, so everything is brought to units of order one here, in float64: lengths in units
 of the body's reach (largest distance of a drawn point from the reference point) or of an orbit, arrows by one
@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
 SPACE, BODY, CENTRE = "", "body", "centre"
-"""Where a part is attached: to space, to the body, to its reference point. Frames add names of their own."""
+"""Where a part is attached: to space, to the body, or to its reference point. Frames add names of their
+own.
+"""
 
 ARROW_REACH = 1.6  # length of the longest arrow, in units of the body's reach
 AXIS_REACH = 1.15  # of the body axes
@@ -43,9 +45,9 @@ class Arrow:
     """A vector along time: (rows, 3) in stage units, from the reference point, fixed to space or the body.
 
     Attributes:
-        label: at its tip; none where the legend says enough.
-        words: what it is, for the legend; none where it isn't listed.
-        label_at: of the label, in lengths of the arrow.
+        label: label at its tip; empty if the legend says enough.
+        words: description for the legend; empty if it isn't listed.
+        label_at: position of the label, in lengths of the arrow.
     """
 
     name: str
@@ -60,11 +62,11 @@ class Arrow:
 
 @dataclass(frozen=True)
 class Trail:
-    """A moving point along time: (rows, 3) in stage units; `whole` (points, 3) is it, thinned.
+    """A moving point along time: (rows, 3) in stage units; `whole` (points, 3) is its thinned path.
 
     Attributes:
         line, whole_line: whether neighbours are close enough to be joined.
-        stride: rows from one that is drawn to the next; 1 where the motion needs every one.
+        stride: stride between drawn rows; 1 if the motion needs every one.
         words: what it is, for the legend.
         head: whether the point itself is marked.
     """
@@ -122,7 +124,7 @@ class Vector:
 
 @dataclass(frozen=True)
 class Solid:
-    """A mesh that stands somewhere, in units of the stage."""
+    """A mesh placed on the stage, in its units."""
 
     name: str
     mesh: Mesh
@@ -131,7 +133,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Shell:
-    """An ellipsoid one can look through, with axes along those of its place."""
+    """A translucent ellipsoid, with axes along those of its place."""
 
     name: str
     half_sizes: Array
@@ -145,8 +147,8 @@ class MovingFrame:
     """A frame that moves in space: parts may be attached to it, and a view may look from it.
 
     Attributes:
-        quaternion: (rows, 4) float32 x y z w, or None: it keeps its axes.
-        translation: (rows, 3), or None: it stays at the origin.
+        quaternion: (rows, 4) float32 x y z w, or None if its axes are fixed.
+        translation: (rows, 3), or None if it stays at the origin.
     """
 
     name: str
@@ -156,7 +158,9 @@ class MovingFrame:
 
 @dataclass(frozen=True)
 class Camera:
-    """Where the eye is, what it looks at and what is up, (3,) each, in the frame that is looked from."""
+    """Position of the eye, the point it looks at, and the upward direction, (3,) each, in the frame looked
+    from.
+    """
 
     position: Array
     target: Array
@@ -169,13 +173,13 @@ class Stage:
 
     Attributes:
         unit: metres per unit of length.
-        meshes: of the body, body axes, stage units.
+        meshes: meshes of the body, body axes, stage units.
         points: (P, 3) point masses of the body, to be joined to the reference point.
-        axis_length: of the body axes; 0 for none.
+        axis_length: length of the body axes; 0 for none.
         quaternion: (rows, 4) float32 [x, y, z, w] as the viewer wants it, or None: no attitude.
-        translation: (rows, 3) of the reference point, or None: it stays at the origin.
+        translation: (rows, 3), of the reference point, or None if it stays at the origin.
         origin: whether the origin of space is in the picture and marked.
-        looked_from: name of a frame, or empty for space.
+        looked_from: name of the frame that the camera is in, or empty for space.
         turns_with: root of another stage whose body turns alike about the same point (written once).
         camera: None for the one that suits arrows and path.
     """
@@ -207,10 +211,10 @@ class Plane:
     """A plane figure: a path (rows, 2) with its moving point, or points that stand for themselves.
 
     Attributes:
-        title: with the unit.
+        title: title with the unit.
         moves: whether the rows go along time.
         rings: radii of circles about the origin, with their labels.
-        names: of the two axes.
+        names: names of the two axes.
     """
 
     key: str
@@ -224,14 +228,14 @@ class Plane:
 
 @dataclass(frozen=True)
 class Picture:
-    """All that is drawn of a dataset beside its plots.
+    """Everything drawn of a dataset besides its plots.
 
     Attributes:
-        kind: of the scene, in words.
+        kind: kind of scene, in words.
         stages: the first is the body's.
-        planes: figures beside it.
+        planes: plane figures beside it.
         leading: variables whose plots come first.
-        notes: on scales, for the summary page.
+        notes: notes on scales, for the summary page.
     """
 
     kind: str
@@ -273,7 +277,7 @@ def joined(points: Array) -> bool:
 
 
 def longest(vectors: Array) -> float:
-    """The largest norm of vectors (rows, 3); 0 where none is finite."""
+    """The largest norm of vectors (rows, 3); 0 if none is finite."""
     largest = float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max()))
     if np.isfinite(largest):
         return largest
@@ -282,7 +286,7 @@ def longest(vectors: Array) -> float:
 
 
 def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:
-    """(rows, 4) w x y z of any norm as the viewer takes it: x y z w, unit, float32."""
+    """Quaternions (rows, 4) w x y z of any norm in the viewer's form: x y z w, unit, float32."""
     # Normalised in float64 first: the viewer takes the float32 numbers as they are.
     unit = quaternion / np.sqrt(np.einsum("ij,ij->i", quaternion, quaternion))[:, None]
     return np.ascontiguousarray(unit[:, [1, 2, 3, 0]], dtype=np.float32)

@@ -1,4 +1,4 @@
-"""A planet: its globe, its axes, ecliptic and equator, the circle of its precession, where its source is.
+"""Stage of a planet: its globe and axes, ecliptic and equator, the circle of its precession, and its source.
 
 The pole's motion is far too small for the globe: it is drawn beside it in a plane of its own.
 """
@@ -52,7 +52,7 @@ _LEADING = (
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
-    """Of a large, nearly round body that spins about its figure axis but for a little."""
+    """Picture of a large, nearly round body that spins nearly about its figure axis; None for others."""
     axes = _semi_axes(subject)
     if axes is None or subject.position is not None or not (signals.near_axis(dataset) or _poles(dataset)):
         return None
@@ -108,7 +108,7 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
 
 
 def _known(name: str, radius: float) -> surroundings.Globe | None:
-    """Who it is: by its name, else by its equatorial radius, m."""
+    """The known planet with this name, or else with this equatorial radius (m); None if unknown."""
     if name:
         return next((one for one in surroundings.GLOBES if one.name.lower() == name), None)
     near = min(surroundings.GLOBES, key=lambda one: abs(one.radius - radius))
@@ -116,7 +116,7 @@ def _known(name: str, radius: float) -> surroundings.Globe | None:
 
 
 def _largest_turn(dataset: Table) -> float:
-    """Rotation (rad) from one row to the next, on the mean; 0 where the rate isn't known."""
+    """Mean rotation (rad) from one row to the next; 0 if the rate isn't known."""
     rates, seconds = column(dataset, "angular_velocity", 3), signals.seconds(dataset)
     if rates is None or len(seconds) < 2:
         return 0.0
@@ -148,7 +148,7 @@ def _eye(target: Array, radius: float) -> Camera:
 
 
 def _in_its_own_axes(dataset: Table, stage: Stage, figure: Array, notes: list[str]) -> None:
-    """Figure axis and spin axis, their angle enlarged until it is seen."""
+    """Draw figure axis and spin axis, their angle enlarged until it is visible."""
     notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
     stage.vectors.append(
         Vector("figure_axis", "figure axis", FIGURE, figure, 0.55 * figure, BODY, "figure axis", 0.014)

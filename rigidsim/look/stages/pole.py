@@ -1,4 +1,4 @@
-"""A body of which only axes are known, as of an averaged model: where they point, and how they precess."""
+"""Stage of a body of which only axes are known, as in an averaged model: their directions and precession."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ _COLORS = {"figure": FIGURE, "momentum": MOMENTUM}
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
-    """Of a body without attitude and rates whose figure axis or momentum is known in space.
+    """Picture of a body without attitude and rates whose figure axis or momentum is known in space; None for
+    others.
 
-    With a figure axis the body points along it; one that tumbles isn't drawn: nothing tells how it lies.
+    With a figure axis the body points along it; a tumbling body isn't drawn, as its attitude is unknown.
     """
     if subject.attitude is not None or subject.position is not None or "angular_velocity" in dataset:
         return None

@@ -1,6 +1,6 @@
-"""A pole that precesses: the plane of reference, the circle about its normal, and the motion beside it.
+"""Precession of a pole: the reference plane, the circle about its normal, and the motion beside it.
 
-Where no attitude is known but an axis is (of an averaged model, which has no rotation), a body is drawn that
+If no attitude is known but an axis is (in an averaged model, which has no rotation), a body is drawn that
 points there and doesn't turn.
 """
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 ECLIPTIC: Color = (226, 196, 90)
 PRECESSION: Color = (190, 150, 255)
 POLE_REACH = 1.45
-"""Length of the arrow of a pole."""
+"""Length of a pole's arrow, in units of the body's reach."""
 _UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
 _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
 
@@ -46,7 +46,7 @@ _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source c
 def axis_in_space(dataset: Table, axis: str) -> Array | None:
     """Unit vectors (rows, 3), space axes, of the axis named figure or momentum; None where not all are known.
 
-    As recorded, else from its obliquity and node longitude where these are against the XY plane.
+    As recorded, otherwise from its obliquity and node longitude if these refer to the XY plane.
     """
     found = signals.pole(dataset, axis)
     if found is None and not moving_plane(dataset):
@@ -55,7 +55,7 @@ def axis_in_space(dataset: Table, axis: str) -> Array | None:
 
 
 def moving_plane(dataset: Table) -> bool:
-    """Whether obliquity and node longitude are against another plane than XY of space, which may move."""
+    """Whether obliquity and node longitude refer to a plane other than XY of space, which may move."""
     return bool(read_config(dataset).get("frame", {}).get("reference", "space") != "space")
 
 
@@ -71,13 +71,13 @@ def _against_plane(dataset: Table, axis: str) -> Array | None:
 
 
 def pointed(dataset: Table, subject: Subject, figure: Array, *, plane: bool = False) -> Subject:
-    """The subject with an attitude whose figure axis is the recorded one, and which keeps to its node.
+    """The subject with an attitude whose figure axis is the recorded one, without rotation about it.
 
-    The same subject where no figure axis is known.
+    The subject itself if no figure axis is known.
 
     Args:
         figure: (3,) unit vector of the figure axis, body axes.
-        plane: take the axis against the plane of reference, which may move in space.
+        plane: take the axis relative to the reference plane, which may move in space.
     """
     pole = _against_plane(dataset, "figure") if plane else axis_in_space(dataset, "figure")
     if pole is None or not np.isfinite(pole).all():
@@ -101,9 +101,9 @@ def standing_note(dataset: Table, what: str) -> str:
 
 
 def followed_sources(dataset: Table, subject: Subject, length: float, notes: list[str]) -> list[Arrow]:
-    """Directions of sources that go on so little from row to row that the eye can follow.
+    """Directions of sources that advance so little from row to row that the eye can follow.
 
-    Of the others some would seem to stand still, where samples are whole revolutions apart.
+    Some others would seem to stand still if samples are whole revolutions apart.
     """
     seconds = signals.seconds(dataset)
     step = float(np.abs(np.diff(seconds)).mean()) if len(seconds) > 1 else 0.0
@@ -119,7 +119,7 @@ def followed_sources(dataset: Table, subject: Subject, length: float, notes: lis
 
 
 def reference_plane(stage: Stage) -> None:
-    """The XY plane of space with its normal, put on a stage."""
+    """Put the XY plane of space with its normal on a stage."""
     up = np.array([0.0, 0.0, 1.0])
     stage.lines.extend(
         [
@@ -137,7 +137,7 @@ def reference_plane(stage: Stage) -> None:
 
 
 def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, notes: list[str]) -> None:
-    """The circle that a pole goes about the normal, once in how long, put on a stage.
+    """Put on a stage the circle that a pole describes about the normal, with its period.
 
     Args:
         pole: unit vectors (rows, 3), space axes.
@@ -162,7 +162,7 @@ def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, n
 
 
 def nutation_planes(dataset: Table, axis: str) -> list[Plane]:
-    """An axis in space less its mean motion, where its momentum moves: one plane, or none.
+    """Motion of an axis in space less its mean motion, if its momentum moves: one plane, or none.
 
     Args:
         axis: figure or momentum.

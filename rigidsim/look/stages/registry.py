@@ -22,7 +22,7 @@ KINDS: tuple[Callable[[Table, Subject], Picture | None], ...] = (
     free.picture,
     generic.picture,
 )
-"""Each gives the picture of a scene of its kind, and None for all others; the last takes every one."""
+"""Functions that return the picture of a scene of their kind, or None; the last accepts every scene."""
 
 
 def build_picture(dataset: Table) -> tuple[Picture, Subject]:

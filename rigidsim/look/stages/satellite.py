@@ -1,4 +1,6 @@
-"""A satellite on a prescribed orbit: the body in its local frame, above its planet, and the orbit."""
+"""Stage of a satellite on a prescribed orbit: the body in its local frame, above its planet, and the
+orbit.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ _LEADING = ("libration", "roll_pitch_yaw", "angular_velocity")
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
-    """Of a small body whose one source is on an orbit, its attitude known in space or in the local frame."""
+    """Picture of a small body with a single source on an orbit, its attitude known in space or in the local
+    frame; None for others.
+    """
     listed = [one for one in surroundings.told(dataset, "source") if "orbit" in one]
     if len(listed) != 1 or subject.position is not None or _body_size(subject) > _LARGE:
         return None
@@ -126,7 +130,7 @@ def _in_local_frame(
 
 
 def _lowest_axis(dataset: Table, relative: Array) -> Array:
-    """The principal axis (3,), body axes, that points to the planet on the mean, or the nearest to that."""
+    """Principal axis (3,), body axes, that points to the planet on average, or nearest to that."""
     axes = signals.principal_axes(dataset)
     down = np.nanmean(relative[:, 2, :], axis=0)
     along = axes @ down

@@ -1,4 +1,4 @@
-"""A top: its pivot on a ground, gravity, and the trace of its figure axis, with that seen from above."""
+"""Stage of a top: its pivot on a ground, gravity, and the trace of its figure axis, also seen from above."""
 
 from __future__ import annotations
 
@@ -37,7 +37,9 @@ _SYMMETRIC = 1e-9  # of the moments
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
-    """Of a body about a fixed point off its centre of mass under a uniform gravity."""
+    """Picture of a body about a fixed point off its centre of mass under a uniform gravity; None for
+    others.
+    """
     pull = surroundings.gravity(dataset)
     arm = signals.attribute(dataset, "center_of_mass")
     if pull is None or subject.position is not None or subject.quaternion is None:
@@ -98,7 +100,9 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
 
 
 def _figure(dataset: Table, arm: Array) -> Array:
-    """The axis whose trace is shown: of symmetry where the centre of mass lies on it, else through that."""
+    """The axis whose trace is shown: the symmetry axis if the centre of mass lies on it, else that through
+    the centre of mass.
+    """
     moments = signals.moments(dataset)
     if moments is not None:
         axis = signals.principal_axes(dataset)[signals.figure_index(moments)]
@@ -109,7 +113,7 @@ def _figure(dataset: Table, arm: Array) -> Array:
 
 
 def _symbol(dataset: Table, subject: Subject, arm: Array, axis: Array) -> tuple[Mesh, float] | None:
-    """A toy top (in metres) and its reach where only the moments of a symmetric body are known."""
+    """A toy top (in metres) and its reach, if only the moments of a symmetric body are known; else None."""
     moments = signals.moments(dataset)
     mass = dataset.attrs.get("mass")
     only = len(subject.solids) == 1 and subject.solids[0].get("equivalent")
@@ -129,7 +133,7 @@ def _symbol(dataset: Table, subject: Subject, arm: Array, axis: Array) -> tuple[
 
 
 def _across(axis: Array) -> tuple[Array, Array]:
-    """Two unit vectors that make a right-handed frame with an axis; X and Y for Z."""
+    """Two unit vectors that complete an axis to a right-handed frame; X and Y for Z."""
     first = np.eye(3)[0] if abs(axis[2]) > 0.999 else np.cross(np.array([0.0, 0.0, 1.0]), axis)
     first = first - axis * (first @ axis)
     first /= np.linalg.norm(first)
