@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.look.plots import pretty_unit
 from rigidsim.look.readable_time import TimeWords
-from rigidsim.look.roles import drifts, is_averaged
+from rigidsim.look.roles import drifts, in_words, is_averaged
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable
@@ -118,7 +118,7 @@ def _invariants(thinned: Table) -> list[tuple[str, ...]]:
             value = np.asarray(thinned[base].values[0]).ravel()
             unit = pretty_unit(str(thinned[base].attrs.get("units", "")))
             initial = (", ".join(f"{v:.6g}" for v in value) + f" {unit}").rstrip()
-        rows.append((base.replace("_", " "), initial, f"{largest_drift(drift):.2e}"))
+        rows.append((in_words(base), initial, f"{largest_drift(drift):.2e}"))
     return rows
 
 

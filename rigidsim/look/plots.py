@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.angle_units import angle_unit
-from rigidsim.look.roles import drift_of, is_averaged, put_back_of
+from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
 from rigidsim.look.si_prefixes import si_scale
 from rigidsim.scene.records import dataclass
 
@@ -260,7 +260,7 @@ def _series(variable: Variable, position: int, floor: float) -> Series:
     count = values.shape[1]
     drifting, projected = drift_of(variable), put_back_of(variable)
     if drifting or projected:  # the latter: what the drift would have been
-        labels = [(drifting or f"{projected} put back").replace("_", " ")]
+        labels = [in_words(drifting) if drifting else f"{in_words(str(projected))} put back"]
         values = np.log10(np.maximum(np.abs(values), floor))
     elif variable.ndim == 1:
         labels = [name.replace("_", " ")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable
 
 
+_ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _AVERAGED = ("spin_averaged", "orbit_averaged")
 """Model levels whose datasets have axes but no attitude."""
 
@@ -36,6 +38,12 @@ def drifts(dataset: Table) -> dict[str, Variable]:
 def put_backs(dataset: Table) -> dict[str, Variable]:
     """Corrections put back into projected invariants, by their name."""
     return _by_invariant(dataset, "put_back_of")
+
+
+def in_words(name: str) -> str:
+    """A variable's name as people read it."""
+    orbit = _ORBIT_NORM.fullmatch(name)
+    return f"norm of orbit {orbit[1]}'s cosine and sine" if orbit else name.replace("_", " ")
 
 
 def is_averaged(attributes: Mapping[str, Any]) -> bool:

@@ -120,6 +120,10 @@ def _observables() -> list[Observable]:
     return list(OBSERVABLES.values())
 
 
+_UNIT = "1 by definition: any drift is rounding"
+_WATCHED = {"orthogonality_defect": "0 by definition: any drift is rounding"}
+
+
 def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
     """All invariants of the scene, with the reasons why they are conserved.
 
@@ -147,24 +151,19 @@ def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
                 scale_name,
             )
         )
-    for number, expression in enumerate(norms):
-        found.append(
-            Invariant(f"orbit_norm_{number + 1}", "it is so by definition", "1",
-                      "norm of a cosine and sine that an orbit is carried by", [expression], [0],
-                      m.scene.context.one, "1", numerical=True)
-        )  # fmt: skip
+    one = m.scene.context.one
+    watched: list[tuple[str, str, str, Symbolic]] = [
+        (f"orbit_norm_{number}", _UNIT, "norm of a cosine and sine that an orbit is carried by", expression)
+        for number, expression in enumerate(norms, 1)
+    ]
     if m.attitude is not None and m.attitude.defect is not None:
         name, long_name, expression = m.attitude.defect
-        found.append(
-            Invariant(name, "it is so by definition", "1", long_name, [expression], [0],
-                      m.scene.context.one, "1", numerical=True)
-        )  # fmt: skip
+        watched.append((name, _WATCHED.get(name, _UNIT), long_name, expression))
     if m.attitude is None and m.vertical is not None:
         norm = hy.sqrt(hy.sum([v * v for v in m.vertical]))
-        found.append(
-            Invariant("vertical_norm", "it is so by definition", "1", "norm of the vertical in body axes",
-                      [norm], [0], m.scene.context.one, "1", numerical=True)
-        )  # fmt: skip
+        watched.append(("vertical_norm", _UNIT, "norm of the vertical in body axes", norm))
+    for name, why, long_name, expression in watched:
+        found.append(Invariant(name, why, "1", long_name, [expression], [0], one, "1", numerical=True))
     return found
 
 

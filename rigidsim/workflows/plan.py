@@ -18,6 +18,7 @@ from rigidsim.accuracy.error_law import (
     motion_growth,
 )
 from rigidsim.accuracy.models.level import choose_level
+from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.storage import storage
@@ -87,6 +88,7 @@ def plan(
     plain_error = attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth)
     first = LATE if prepared.holds_late else 0
     held = prepared.holds_invariants and closed is not None and steps > first
+    shared, equations = equation_texts(system.equations, **prepared.precision.options)
     warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene)]
     if room.problem is not None:
         warnings.append(("disk_space", f"the run {room.problem}"))
@@ -102,7 +104,8 @@ def plan(
         "left_out": [{"what": s, "why": w} for s, w in system.requirements.left_out],
         "switching": [{"surface": s.text, "where": s.where} for s in system.plan.surfaces.found],
         "turning": list(system.plan.surfaces.turning),
-        "equations": [f"{v}' = {rhs}" for v, rhs in system.equations],
+        "shared_terms": shared,
+        "equations": equations,
         "internal_units": {
             "time_s": math.ldexp(1.0, system.scaling.time),
             "inertia_kg_m2": math.ldexp(1.0, system.scaling.inertia),

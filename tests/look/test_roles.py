@@ -9,7 +9,7 @@ import pytest
 
 import rigidsim
 from rigidsim.look.plots import DRIFTS, plan_plots
-from rigidsim.look.roles import drifts, put_backs
+from rigidsim.look.roles import drifts, in_words, put_backs
 from rigidsim.look.thinning import thin
 from rigidsim.store.variables import parts_in
 
@@ -41,3 +41,8 @@ def test_drifts_and_what_was_put_back_go_by_their_invariant(
         (drift,) = [s for p in plan_plots(thin(dataset, 10)) if p.key == "drift" for s in p.series]
         assert {"energy", "energy put back"} <= set(drift.labels)
         assert len(drift.labels) == len(drift.colors) == drift.values.shape[1]
+
+
+def test_an_orbits_norm_says_whose_it_is() -> None:
+    assert in_words("orbit_norm_2") == "norm of orbit 2's cosine and sine"
+    assert in_words("quaternion_norm") == "quaternion norm"

@@ -6,6 +6,7 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
+from rigidsim.cli.screens.equations import print_equations
 from rigidsim.cli.screens.models import interpolated, print_levels, print_modelling
 from rigidsim.cli.screens.page import Page, Styled, page
 from rigidsim.cli.screens.understood import understood
@@ -42,7 +43,8 @@ def _scales(invariants: dict[str, InvariantDrift]) -> str:
     names: dict[str, list[str]] = {}
     for name, row in invariants.items():
         names.setdefault(row.scale_name, []).append(name)
-    return "; ".join(f"{scale} ({', '.join(of)})" for scale, of in names.items())
+    words = {"1": "nothing, being 1 or 0 by definition"}  # norms, and what vanishes for a rotation
+    return "; ".join(f"{words.get(scale, scale)} ({', '.join(of)})" for scale, of in names.items())
 
 
 def _drift(value: float | None) -> str:
@@ -223,9 +225,7 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     reasons: list[list[Styled]] = [[row["states"], row["why"]] for row in plan["reasons"]]
     reasons += [[(f"no {row['what']}", "dim"), (row["why"], "dim")] for row in plan["left_out"]]
     on.table(["states", "carried because"], reasons)
-    on.say(("equations (internal units: powers of two)", "bold"))
-    for line in plan["equations"]:
-        on.say("  " + line, whole=True)
+    print_equations(plan["shared_terms"], plan["equations"], on)
     on.table(["invariant", "holds because"], [[row["name"], row["why"]] for row in plan["invariants"]])
     on.line("recorded", ", ".join(plan["recorded"]))
     predicted, pilot = plan["predicted"], plan["pilot"]
