@@ -101,10 +101,11 @@ class Load(SceneLoad):
         """Whether it has no torque about a symmetry axis of the body (mpf, body axes)."""
         context = m.scene.context
         tiny = negligible(context)
+        none = (hy.expression(0.0), hy.expression(m.number(context.zero)))  # zeros of two types aren't equal
         return all(
             abs(dot(vector, axis)) <= tiny * norm(context, vector)
             for vector, expression in self.torque(m)
-            if expression != hy.expression(0.0)
+            if expression not in none
         )
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:

@@ -218,6 +218,8 @@ class Projection:
         if self._chart not in self._functions:
             self._functions[self._chart] = self._compile()
         self._residuals, self._correction = self._functions[self._chart]
+        compiled: Any = self._correction
+        self._timed = bool(compiled.is_time_dependent)  # by what the equations lack
         self._loaded = self._chart
 
     def project(self, state: np.ndarray, time: Scalar) -> None:
@@ -242,7 +244,8 @@ class Projection:
             self._state[:] = self._widened(state)
             self._clock[:] = self._array(np.array([elapsed, pace]))
             self._remembered[:] = self._array(self._residuals_memory)
-        self._correction(self._in, outputs=self._out)
+        at = {"time": self._array(np.array([now]))[0]} if self._timed else {}
+        self._correction(self._in, outputs=self._out, **at)
         self._result[:] = self._out
         if not self._result[-1] < _LARGEST**2:  # also where it is nan
             times[2] += 1
