@@ -6,7 +6,8 @@ in the median, and 40 % where errors grow by more than time makes them. Times de
 does: compare two states of the code in turn, on the same machine.
 
 Run: python -m experiments.estimate_cost [--full] [--only WORD]
-heyoka's cache of compiled code is an empty one: everything is compiled as for a new scene.
+heyoka's caches of compiled code, in memory and on disk, are emptied before each scene: everything is compiled
+as for a new one. "again" is the same estimate with what it needs compiled, as of a scene that was run before.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pathlib import Path
 if not __package__:  # as a script
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import heyoka
 import numpy as np
 
 import rigidsim
@@ -55,13 +57,15 @@ _SPINNING = "principal_moments = [1, 1.5, 2]", "angular_velocity = [0.02, 0.03, 
 
 @dataclass(frozen=True)
 class Measured:
-    """CPU seconds; ``amplified``: whether errors were found to grow by more than time makes them."""
+    """CPU seconds; ``again``: of the estimate once what it needs is compiled; ``amplified``:
+    whether errors were found to grow by more than time makes them."""
 
     name: str
     steps: int
     build: float
     integration: float
     estimate: float
+    again: float
     announced: float
     amplified: bool
     how: str
@@ -82,7 +86,7 @@ class Measured:
         share = f"{self.estimate / self.run:.1%}" if not self.short else ""
         return (
             f"| {self.name} | {self.steps} | {1e3 * self.build:.0f} | {1e3 * self.integration:.1f} "
-            f"| {1e3 * self.estimate:.1f} | {share} | {self.announced:.1e} |"
+            f"| {1e3 * self.estimate:.1f} | {1e3 * self.again:.1f} | {share} | {self.announced:.1e} |"
         )
 
 
@@ -151,6 +155,8 @@ class _Watched(SampleReceiver):
 def measure(name: str, text: str) -> Measured:
     """Integrate a scene and estimate its errors."""
     prepared = prepare(rigidsim.parse(text))
+    heyoka.llvm_state.clear_memcache()
+    heyoka.llvm_state.clear_diskcache()
     started = time.process_time()
     parts = assemble(prepared)
     watched = _Watched(SampleTrail(prepared.precision))
@@ -161,6 +167,8 @@ def measure(name: str, text: str) -> Measured:
     diagnostics = Diagnostics(prepared, progress, SampleStatistics())
     found = diagnostics.estimated(watched.trail, parts.stepper, parts.corrected.waypoints).estimate
     estimated = time.process_time()
+    diagnostics.estimated(watched.trail, parts.stepper, parts.corrected.waypoints)
+    again = time.process_time()
     assert found is not None
     return Measured(
         name,
@@ -168,6 +176,7 @@ def measure(name: str, text: str) -> Measured:
         built - started,
         ended - built,
         estimated - ended,
+        again - estimated,
         found.leading,
         found.amplification > 1,
         found.how,
@@ -176,15 +185,19 @@ def measure(name: str, text: str) -> Measured:
 
 def table(measured: Sequence[Measured]) -> list[str]:
     """Markdown, and what is wanted."""
-    head = "| scene | steps | build, ms | integration, ms | estimate, ms | of the run | announced, rad |"
-    lines = [head, "| --- " * 7 + "|", *(one.row for one in measured), ""]
+    head = "| scene | steps | build, ms | integration, ms | estimate, ms | again, ms | of the run "
+    head += "| announced, rad |"
+    lines = [head, "| --- " * 8 + "|", *(one.row for one in measured), ""]
     below = [1e3 * one.estimate for one in measured if one.short]
     for title, amplified in (("growing as time makes them", False), ("growing by more", True)):
         above = [one for one in measured if not one.short and one.amplified == amplified]
         if above:
             shares = [f"{x:.1%}" for x in _spread([one.estimate / one.run for one in above])]
             lines.append(f"Above a second, errors {title}: {_words(shares, len(above))}")
+    again = [1e3 * one.again for one in measured if one.short]
     if below:
+        words = _words([f"{x:.0f} ms" for x in _spread(again)], len(again))
+        lines.append(f"The same again, compiled: {words}")
         lines.append(f"Below a second: {_words([f'{x:.0f} ms' for x in _spread(below)], len(below))}")
     return lines
 

@@ -16,9 +16,12 @@ from rigidsim.accuracy.estimates.estimate import estimate_errors
 from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
-from rigidsim.solve.assembly import assemble
+from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.neighbours import lanes
 from rigidsim.solve.problem import prepare
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.trail import Waypoints
 from rigidsim.store.variables import parts_in
 
 COVERED = 3.0  # the campaign's measure (experiments/error_coverage.py): true at most 3 times the announced
@@ -114,6 +117,45 @@ def test_nothing_is_compiled_for_what_is_soon_lost(monkeypatch: pytest.MonkeyPat
         assert found is not None
         assert (found.leading == pytest.approx(np.pi)) == (least == 0)
         assert len(made) == least
+
+
+class Unread(SampleReceiver):
+    """Of samples that nobody wants."""
+
+    def take(self, block: SampleBlock) -> None:
+        pass
+
+
+def test_a_motion_that_is_followed_loosely_is_held_against_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 1e-6, in half the code; at 1e-8 where that has become another motion than the run's."""
+    made: list[float] = []
+    compiled = lanes.BatchLanes.__init__
+
+    def noted(self: lanes.BatchLanes, system: Any, steps: float, tolerance: float) -> None:
+        made.append(tolerance)
+        compiled(self, system, steps, tolerance)
+
+    monkeypatch.setattr(lanes.BatchLanes, "__init__", noted)
+    prepared = prepare(rigidsim.parse(scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "1000", DRIVEN)))
+    parts = assemble(prepared)
+    steps = sampler(prepared, parts, Unread()).run().steps
+    passed = parts.corrected.waypoints
+    elsewhere = Waypoints()
+    for n, point in enumerate(passed.between(0, steps)):
+        elsewhere.note(n, point.steps, point.time, 1.1 * point.state, point.chart)
+    found = {}
+    for name, points in (("run", passed), ("elsewhere", elsewhere), ("unknown", None)):
+        made.clear()
+        estimate = estimate_errors(prepared, steps, 1000.0, waypoints=points)
+        assert estimate is not None
+        assert estimate.share == 1
+        found[name] = (estimate.leading, list(made))
+    assert found["run"][1] == [lanes.LOOSE]
+    assert found["elsewhere"][1] == [lanes.LOOSE, lanes.TOLERANCE]
+    assert found["unknown"][1] == [lanes.TOLERANCE]
+    assert found["elsewhere"][0] == found["unknown"][0]
+    # pushed at other times: the root mean square of three is from a third to 1.6 of what is expected
+    assert 1 / 5 < found["run"][0] / found["unknown"][0] < 5
 
 
 @pytest.mark.slow

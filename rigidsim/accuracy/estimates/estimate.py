@@ -15,9 +15,10 @@ from collections.abc import Callable
 import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
+from rigidsim.accuracy.estimates.carriers import loose
 from rigidsim.accuracy.estimates.course import Course, Followed
 from rigidsim.accuracy.estimates.exact_error import ExactError, exact_error
-from rigidsim.accuracy.estimates.following import follow, leading, loose
+from rigidsim.accuracy.estimates.following import follow, leading
 from rigidsim.accuracy.estimates.growth import exponential_growth, power_of_time
 from rigidsim.accuracy.estimates.margins import MARGINS, Margins
 from rigidsim.scene.records import dataclass

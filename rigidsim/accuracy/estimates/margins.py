@@ -17,12 +17,15 @@ class Margins:
         drifted: growth of a step's error from which a loosely followed motion is another one; ``gone``: over
             what leaves no digit, from which that doesn't matter; ``tight_steps``: of runs that are followed
             tightly at most.
+        strayed: distance from the run's own states, relative to their size, from which a loosely followed
+            motion is another one; every so many ``looks`` waypoints it is looked at, of 16 to 32 in the run.
+        most_anew: steps of a run whose own integrator follows it from then on.
         compared: over the largest difference from a closed form at some samples.
         angles, angle_series, momentum_series: errors of a step in Euler angles over those in quaternions: of
             rounding, and of series that a tolerance cuts off; of the latter with canonical momenta.
         near, very_near: singular factors below which canonical momenta lose more than elsewhere.
         cut_off: of a tolerance, what a step is wrong by in motions with switching surfaces.
-        all_steps: that are followed whatever they cost: some 60 to 250 ms with what is compiled for them;
+        all_steps: that are followed whatever they cost: some 50 to 130 ms with what is compiled for them;
             ``passing_steps``: of flights with close passages, which windows would miss; ``own_steps``: where
             windows can only be looked at by the run's own integrator, at a tenth of that speed;
             ``most_own_steps``: that it takes at most; ``canonical_steps``: likewise of canonical runs that
@@ -53,6 +56,9 @@ class Margins:
     gone: float = 1e6
     tight_steps: int = 50_000
     path: float = 0.5
+    strayed: float = 1e-2
+    looks: int = 4
+    most_anew: int = 10_000
     compared: float = 3.0
     angles: float = 4.0
     angle_series: float = 5.0
@@ -62,7 +68,7 @@ class Margins:
     cut_off: float = 0.1
     all_steps: int = 20_000
     passing_steps: int = 60_000
-    own_steps: int = 3_000
+    own_steps: int = 1_500
     most_own_steps: int = 20_000
     canonical_steps: int = 10_000
     charts: float = 2.5

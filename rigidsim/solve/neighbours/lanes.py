@@ -23,22 +23,28 @@ from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
 
 NEIGHBOURS = 3
-TOLERANCE, TIGHT = 1e-8, 1e-14
-"""Loose and tight tolerance; the tight one is for errors that grow so much that a loosely followed motion
-soon becomes a different one.
+_DOUBLE_ORDER = 20
+"""Of series in double precision at its epsilon; the work of a step goes with its square."""
+LOOSE, TOLERANCE, TIGHT = 1e-6, 1e-8, 1e-14
+"""The loose one, in half the code, while the motion stays near the run's own: over 18,000 steps of a driven
+body it strays by 3e-4, over 30,000 of a fall by 8e-6. The tight one where errors grow so much that a loosely
+followed motion is soon another one.
 """
 _TIGHT_UNTIL = 50_000
-OWN_UNTIL, OWN_FIRST = 7_000, 500
+_OWN_UNTIL, OWN_FIRST = 5_000, 500
 """Steps up to which the run's own integrator, called for each lane, costs less than what is compiled for all;
 and so many that it takes of longer motions, and as many again and again as long as their errors grow
 exponentially, lest code is compiled for one that is soon lost.
 """
-UNROLLED_FROM, OPTIMISED_FROM = 3_000, 300_000
+UNROLLED_FROM, LOOSELY_UNROLLED_FROM, OPTIMISED_FROM = 3_000, 1_500, 300_000
 """Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
 terms of the equations' decomposition, four lanes, tolerance 1e-8: compact 42 and 48 ms, 10 and 22 us a step;
 unrolled 60 and 132 ms, 2.2 and 5.4 us; unrolled and optimised 315 and 860 ms, 1.3 and 3.2 us. An own
 integrator takes 18 and 48 us for four lanes; on a quieter machine 6.6 and 15, where unrolled code takes 45
-and 83 ms to compile and 1.5 and 2.3 us a step.
+and 83 ms to compile and 1.5 and 2.3 us a step. At 1e-6 half of that: of 59, 117 and 167 terms unrolled 29, 67
+and 77 ms, 0.8, 1.7 and 2.2 us a step (42, 107 and 191 ms, 1.2, 2.4 and 3.5 us at 1e-8), compact 29, 47 and
+55 ms, 4, 9 and 14 us. Of these times 6, 12 and 19 ms are no code generation: a batch that was compiled before
+takes so long to make.
 """
 _HOPELESS_STEPS = 32_768
 """Steps within one stretch after which the motion is given up, say on its way to a collision."""
@@ -74,6 +80,11 @@ def borrowed(stepper: Stepper | None) -> Iterator[None]:
     finally:
         log.muted, log.found[:] = muted, found
         stepper.back_to(mark)
+
+
+def own_until(integrator: TaylorEngine) -> float:
+    """Steps of a run up to which its own integrator costs less than code that is compiled for all lanes."""
+    return _OWN_UNTIL * max(1.0, (_DOUBLE_ORDER / int(integrator.order)) ** 2)
 
 
 class Lanes(Protocol):
@@ -134,7 +145,7 @@ class BatchLanes:
 
     def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
         self._system, self.tolerance = system, tolerance
-        self._level = self._level_for(steps)
+        self._level = self._level_for(steps, tolerance)
         self._carried = [i for i, n in enumerate(system.states) if not (n == WORK or n.startswith(TANGENT))]
         equations = [system.equations[i] for i in self._carried]
         initial = np.array([[float(system.initial[i])] for i in self._carried])
@@ -146,13 +157,14 @@ class BatchLanes:
         self._even = _Evenly()
 
     @staticmethod
-    def _level_for(steps: float) -> int:
+    def _level_for(steps: float, tolerance: float) -> int:
         """0 for compact code, 1 for unrolled, 2 for optimised."""
-        return int(steps >= UNROLLED_FROM) + int(steps >= OPTIMISED_FROM)
+        unrolled = LOOSELY_UNROLLED_FROM if tolerance >= LOOSE else UNROLLED_FROM
+        return int(steps >= unrolled) + int(steps >= OPTIMISED_FROM)
 
     def again(self, steps: float) -> Lanes:
         """See ``Lanes``."""
-        if self._level_for(steps) <= self._level:
+        if self._level_for(steps, self.tolerance) <= self._level:
             return self
         return BatchLanes(self._system, steps, self.tolerance)
 
@@ -187,21 +199,26 @@ class OwnLanes:
 
     Args:
         integrator: the system's integrator in double precision, of which a copy is used.
-        loose: whether its states bear a loose tolerance, if many more steps are to be taken.
+        then: tolerance where many more steps are to be taken; None for states that bear no loose one.
+
+    Attributes:
+        until: steps up to which it costs less than compiled code.
     """
 
-    def __init__(self, system: System, integrator: TaylorEngine, *, loose: bool = True) -> None:
-        self._system, self._loose = system, loose
+    def __init__(self, system: System, integrator: TaylorEngine, then: float | None = TOLERANCE) -> None:
+        self._system, self._then = system, then
         self._integrator = copy.deepcopy(integrator)
+        self.until = own_until(integrator)
         self.tolerance = float(integrator.tol)
         self._even = _Evenly()
 
     def again(self, steps: float) -> Lanes:
         """See ``Lanes``."""
-        if steps < OWN_UNTIL - OWN_FIRST:
+        if steps < self.until - OWN_FIRST:
             return self
-        tight = not self._loose and steps < _TIGHT_UNTIL
-        return BatchLanes(self._system, steps, TIGHT if tight else TOLERANCE)
+        if self._then is not None:
+            return BatchLanes(self._system, steps, self._then)
+        return BatchLanes(self._system, steps, TIGHT if steps < _TIGHT_UNTIL else TOLERANCE)
 
     def advance(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int

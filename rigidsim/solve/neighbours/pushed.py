@@ -189,6 +189,18 @@ class Neighbours:
         return other
 
     @property
+    def time(self) -> float:
+        """That they have come to, internal units."""
+        return self._time
+
+    def away_from(self, state: np.ndarray) -> float:
+        """Distance of the motion from another state (states,) at this time, relative to what is apart."""
+        pair = np.stack([self._states[:, 0], state], axis=1)
+        if angles := self._angles:
+            pair[angles, 1] -= self._turn * np.rint((pair[angles, 1] - pair[angles, 0]) / self._turn)
+        return float(self._distances(pair)[0])
+
+    @property
     def lanes(self) -> Lanes:
         """The lanes that carry the neighbours now."""
         return self._lanes
@@ -254,8 +266,9 @@ class Neighbours:
         self.steps += taken
         self._time = time
         largest = np.maximum(np.abs(before[:, 0]), np.abs(self._states[:, 0]))
-        self._largest = np.maximum(self._largest, largest)
-        self._weigh()
+        if (largest > self._largest).any():
+            self._largest = np.maximum(self._largest, largest)
+            self._weigh()
         moved = before[:, 0] != self._states[:, 0]  # what stands still isn't rounded
         if angles := self._angles:  # which grow, and step control with them
             self._states[angles] -= self._turn * np.rint(self._states[angles, :1] / self._turn)
@@ -323,7 +336,8 @@ class Neighbours:
 
     def _note(self) -> None:
         spread, motion = self.spread, self._states[:, 0]
-        wrong = np.sqrt((((self._states[:, 1:] - motion[:, None]) / self._factor) ** 2).mean(axis=1))
+        apart = (self._states[:, 1:] - motion[:, None]) / self._factor
+        wrong = np.sqrt(np.add.reduce(apart * apart, axis=1) / NEIGHBOURS)
         places, units = self._places, self._units
         rates = places["rates"][:3]
         size = _length(units * motion[rates])
@@ -332,8 +346,11 @@ class Neighbours:
         spread.rates.append(_length(units * wrong[rates]) / size if size > 0 else 0.0)
         turned = 0.0 if self._chords is None else self._chords.between(self._states)
         spread.attitude.append(turned / self._factor)
-        spread.position.append(_length(wrong[places["position"]]))
-        spread.velocity.append(_length(wrong[places["velocity"]]))
-        if places["position"]:
+        if not places["position"]:
+            spread.position.append(0.0)
+            spread.velocity.append(0.0)
+        else:
+            spread.position.append(_length(wrong[places["position"]]))
+            spread.velocity.append(_length(wrong[places["velocity"]]))
             spread.extent = max(spread.extent, _length(motion[places["position"]]))
             spread.fastest = max(spread.fastest, _length(motion[places["velocity"]]))

@@ -1,0 +1,131 @@
+"""What carries a run's neighbours, its own integrator or code compiled for them, and how they are pushed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from rigidsim.accuracy.estimates.course import Course
+from rigidsim.accuracy.estimates.margins import Margins
+from rigidsim.solve.neighbours.lanes import (
+    TIGHT,
+    BatchLanes,
+    Lanes,
+    OwnLanes,
+    SeriesErrors,
+    StepperLanes,
+    own_until,
+)
+from rigidsim.solve.neighbours.pushed import Neighbours, Pushes
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.problem import InitialValueProblem, double_twin
+from rigidsim.solve.stepper import Stepper
+
+
+def same_states(prepared: InitialValueProblem) -> bool:
+    """Whether neighbours have the run's states, which they do unless a loose tolerance would run into
+    singularities of these.
+    """
+    return prepared.system.requirements.formulation not in ("euler_angles", "canonical")
+
+
+def _by_itself(course: Course, own: Stepper, part: float, tolerance: float, margins: Margins) -> bool:
+    """Whether the run's own integrator carries its neighbours, at least at first."""
+    if tolerance <= TIGHT or (part < 1 and not same_states(course.prepared)):
+        return course.steps * part < margins.most_own_steps
+    if course.prepared.system.requirements.formulation == "canonical":
+        return course.steps * part <= margins.canonical_steps
+    return same_states(course.prepared) or course.steps * part < own_until(own.integrator)
+
+
+def neighbours_of(
+    course: Course, part: float, first: float, tolerance: float, margins: Margins
+) -> Neighbours:
+    """Neighbours at the start of a run.
+
+    Args:
+        part, first: parts of the run to be followed, in all and from its start on.
+    """
+    steps = course.steps * part
+    prepared, own = course.prepared, course.own
+    precision, system = prepared.precision, prepared.system
+    series: SeriesErrors | None = None
+    stand_in = False
+    follows = tolerance > TIGHT or not loose(prepared)  # it is as loose as the run
+    if own is not None and own.careful:
+        lanes: Lanes = StepperLanes(system, course.start, course.end, course.steps, own)
+    elif own is not None and follows and _by_itself(course, own, part, tolerance, margins):
+        lanes = OwnLanes(system, own.integrator, tolerance if same_states(prepared) else None)
+        series = (
+            SeriesErrors(system, prepared.effective_tolerance, own.integrator) if loose(prepared) else None
+        )
+    else:
+        same = same_states(prepared)
+        system = system.rounded(precision_of("double").number) if same else double_twin(prepared)
+        stand_in = not same and prepared.system.partner is None
+        if system.stepwise:
+            lanes = StepperLanes(system, course.start, course.end, course.steps)
+        else:
+            lanes = BatchLanes(system, steps, tolerance)
+        if loose(prepared) and not system.stepwise:
+            series = SeriesErrors(system, prepared.effective_tolerance)
+    rounded = np.array([precision.exact(precision.number(x)) != x for x in system.initial])
+    pushes = _pushes(course, stand_in, margins)
+    return Neighbours(
+        system,
+        lanes,
+        course.start,
+        course.at(first),
+        course.steps * first,
+        pushes,
+        float(precision.epsilon),
+        rounded,
+        series,
+    )
+
+
+def loose(prepared: InitialValueProblem) -> bool:
+    """Whether the tolerance allows larger step errors than rounding causes."""
+    return prepared.effective_tolerance > 2 * float(prepared.precision.epsilon)
+
+
+def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
+    """Errors of a step.
+
+    Args:
+        stand_in: whether quaternions take the place of the run's states.
+    """
+    prepared = course.prepared
+    plain, formulation = Pushes(), prepared.system.requirements.formulation
+    if prepared.system.stepwise and loose(prepared):
+        plain = replace(
+            plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
+        )
+    if formulation not in ("euler_angles", "canonical"):
+        return plain
+    angles = replace(plain, own=plain.own * margins.angles, series=margins.angle_series)
+    if formulation == "euler_angles":
+        return angles
+    # momenta: the nearer the singularity, the more do they lose in passing it
+    more = min(max(margins.near / max(course.nearest, 1e-150), 1.0), margins.angles)
+    more *= max(1.0, min(margins.very_near / max(course.nearest, 1e-150), 10.0))
+    carried = replace(angles, own=plain.own * more)
+    if not stand_in:
+        return carried
+    return replace(carried, shared=plain.own * _condition(course), series=margins.momentum_series)
+
+
+def _condition(course: Course) -> float:
+    """Amplification of a rounding error by canonical momenta, root mean square over the steps.
+
+    Rates are I^-1 K^T p: a rounded momentum is of the size of the largest moment and is divided by the
+    smallest, and K has the inverse of the singular factor s in it. In passing the singularity the rates that
+    remain are of the order s, and their derivatives lose as much once more: some steps that lose s^-2, among
+    all others that lose little.
+    """
+    moments = [float(m) for m in course.prepared.scene.body.principal_moments if m != 0]
+    nearest = max(course.nearest, 1e-150)
+    passing = math.sqrt(1.0 + 1 / nearest**2 / nearest**2 / max(course.steps, 1))
+    return max(moments) / min(moments) * min(passing, 1 / nearest)
