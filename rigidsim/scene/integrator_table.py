@@ -31,7 +31,7 @@ class Integrator(ConfigTable):
     tolerance: Literal["auto"] | Dimensionless = Field(
         default="auto",
         description="error tolerance of each step, relative to the largest component of the state; auto "
-        "is epsilon in double precision, and an eighth of it in others, where epsilon would "
+        "is epsilon in double precision, and an eighth of it in most others, where epsilon would "
         "truncate the series slightly too early",
         examples=["auto", 1e-12],
         json_schema_extra={"x-above": 0, "x-at-most": 1},
