@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from rigidsim.errors import RunFolderError
 from rigidsim.solve.checkpoint import Checkpoint
-from rigidsim.solve.checkpoint_arrays import unpack_checkpoint, unpack_events
+from rigidsim.solve.checkpoint_arrays import (
+    refuse_other_late_projection,
+    unpack_checkpoint,
+    unpack_events,
+)
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.projection import LATE
 from rigidsim.store import netcdf
 from rigidsim.store.segments import Chain, root_attributes
 
@@ -33,6 +38,8 @@ def restore(
         recorded = [variable.name for variable in prepared.system.recorded]
         start = corrected.boundary()
         checkpoint = unpack_checkpoint(arrays, prepared.precision, names, recorded, start)
+        if prepared.holds_late and checkpoint.position.boundary.mark.steps > LATE:
+            refuse_other_late_projection(arrays)
         for path in chain.paths:
             if "previous_seal" in root_attributes(path):
                 saved = netcdf.read_group(path, "events")

@@ -24,6 +24,10 @@ Arrays = dict[str, np.ndarray]
 """Float64 or int64 arrays by name."""
 
 _STEP = 512  # a power of two that every type holds
+_LATE_PROJECTION = 1
+"""How ``hold_invariants = "auto"`` projects: 0 (where it is missing) compiled a second integrator whose
+coefficients have two parts; 1 adds at each correction what the coefficients lack.
+"""
 
 
 def pack(values: np.ndarray, precision: Precision, name: str) -> Arrays:
@@ -95,6 +99,7 @@ def pack_checkpoint(
     if boundary.angles.turns:
         arrays["rhythm_chart_changes"] = np.array([boundary.chart_changes], dtype=np.int64)
     arrays["rhythm_held"] = boundary.projection
+    arrays["late_projection"] = np.array([_LATE_PROJECTION], dtype=np.int64)
     arrays["rhythm_switching"] = np.array(mark.switching)
     arrays["rhythm_tiny"] = np.array([mark.tiny], dtype=np.int64)
     arrays["joined_turns"] = continuity.turns
@@ -116,6 +121,19 @@ def pack_checkpoint(
     arrays["effort"] = np.array([counted.wall_seconds, counted.cpu_seconds, counted.integration_seconds])
     arrays["sessions"] = np.array([counted.sessions, counted.redone_steps], dtype=np.int64)
     return arrays
+
+
+def refuse_other_late_projection(arrays: Mapping[str, np.ndarray]) -> None:
+    """Look whether a run that projects late was projected as it would be now.
+
+    Raises:
+        ValueError: an earlier version began it, whose bits can't be had again.
+    """
+    if int(arrays.get("late_projection", np.zeros(1))[0]) != _LATE_PROJECTION:
+        raise ValueError(
+            "an earlier version of rigidsim began it, which projected "
+            'hold_invariants = "auto" in another way; resume it with that version, or begin a new run'
+        )
 
 
 def unpack_checkpoint(

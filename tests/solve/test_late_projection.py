@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
+import h5py
 import heyoka as hy
 import numpy as np
 import pytest
 from support import IMPATIENT, angle_between, bits, cases, config, law, run_text, same_bits
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -20,6 +22,7 @@ from rigidsim.solve.correction import lacking_rates
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.projection import LATE
+from rigidsim.store import seal
 from rigidsim.workflows.recorded_then import as_begun
 
 EPS = 2.0**-52
@@ -72,6 +75,18 @@ def test_a_run_that_is_prolonged_past_the_count_is_the_run_in_one_go(
         later = rigidsim.resume(run.folder.path, until=str(2 * whole))  # from beyond the count
         same_bits(later.dataset, run_text(text(2 * whole, '"auto"', samples=33)).dataset)
         assert rigidsim.verify(later.folder.path).identical
+        as_by_an_earlier_version(later.folder.path / "checkpoint.h5")
+        with pytest.raises(RunFolderError, match="an earlier version of rigidsim began it"):
+            rigidsim.resume(later.folder.path, until=str(3 * whole))
+
+
+def as_by_an_earlier_version(checkpoint: Path) -> None:
+    """Take away what says how it projects, and seal it again."""
+    content = checkpoint.read_bytes()
+    checkpoint.write_bytes(content[: -len(seal.sealed(io.BytesIO()))])
+    with h5py.File(checkpoint, "r+") as file:
+        del file["checkpoint/late_projection"]
+    seal.seal(checkpoint)
 
 
 def test_samples_move_no_bit_across_the_count() -> None:
