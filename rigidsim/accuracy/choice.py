@@ -41,9 +41,9 @@ class ChoiceMargins:
 
     Attributes:
         safety: ratio of the accuracy to the largest acceptable forecast.
-        hope: of the accuracy: worth a try where the next precision costs ten times as much; hope_long: the
-            same of a long run, which mostly does better than forecast from its beginning.
-        progress: of the error forecast of a setting that failed: what the next must promise.
+        hope, hope_long: ratio of forecast to accuracy up to which a setting is tried if the next precision
+            costs ten times as much; for a long run, which mostly does better than its beginning forecasts.
+        progress: ratio to a failed setting's forecast that the next one must promise.
     """
 
     safety: float = 3.0

@@ -42,18 +42,19 @@ class Policy:
     runs were certified as they asked (``experiments/accuracy_certificates.py``).
 
     Attributes:
-        times, wide_times: compared at most; the latter of a closed form, which takes milliseconds a sample.
-        extended_steps: past which steps in extended precision (a second) are not the first choice.
-        wide_steps: past which steps in quadruple precision (a minute) are not taken.
-        safety, picked_safety: over the largest difference found, where all samples were compared, and where
-            the fastest of each stretch were, since errors along the motion are largest where it is fastest.
-        peer_safety: where the reference is no better than the run, but independent of it.
-        clearly: of the accuracy, or of the run's errors per step: what a reference with many digits keeps.
-        scatter: between errors of two settings over the ratio of their errors per step.
-        scatter_of_series: the same for each square root of a step, where errors of series add up while those
-            of rounding walk at random.
-        much_better: than the run, per step: references whose own error hardly matters.
-        as_bad: times the difference: what a reference no better than the run may be wrong by.
+        times, wide_times: largest number of times compared; the latter for a closed form, which takes
+            milliseconds per sample.
+        extended_steps: steps past which extended precision (a second) isn't the first choice.
+        wide_steps: steps past which quadruple precision (a minute) isn't used.
+        safety, picked_safety: factors on the largest difference if all samples were compared, and if only the
+            fastest of each stretch, since errors along the motion are largest where it is fastest.
+        peer_safety: the factor if the reference is no better than the run, but independent of it.
+        clearly: error of a reference with many digits, over the accuracy or the run's errors per step.
+        scatter: ratio of two settings' errors over the ratio of their errors per step.
+        scatter_of_series: the same per square root of the steps, if truncation errors add up while rounding
+            errors walk at random.
+        much_better: ratio of errors per step to the run's below which a reference's own error hardly matters.
+        as_bad: error of a reference no better than the run, over the difference.
     """
 
     times: int = 4096

@@ -31,7 +31,7 @@ class SpectralLine:
         frequency_error: one standard deviation, from what is left of the signal beside the line.
         amplitude: A, in the signal's unit; mpf.
         phase: at time zero of the scene, rad within +-pi; mpf.
-        phase_error: of the phase in the middle of the samples, rad.
+        phase_error: error of the phase in the middle of the samples, rad.
         label, mismatch: its label, and the distance from the labelled frequency, rad/s.
     """
 

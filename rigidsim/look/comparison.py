@@ -42,7 +42,7 @@ def write_comparison(named: Sequence[tuple[str, AnyTable]], path: Path, *, rows:
         The number of rows written.
 
     Raises:
-        ValueError: another number of datasets, or as of ``timeline.write_timeline``.
+        ValueError: another number of datasets, or as for ``timeline.write_timeline``.
         OSError: the file can't be written, or there is no room for it.
     """
     if not 2 <= len(named) <= MOST:

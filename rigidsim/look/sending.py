@@ -19,17 +19,17 @@ from rigidsim.scene.records import dataclass
 
 @dataclass(frozen=True)
 class _Times:
-    """Some rows of a time column."""
+    """Some rows of a time column, for Arrow."""
 
     name: str
     rows: pa.Array
 
     def timeline_name(self) -> str:
-        """Of the timeline."""
+        """Name of the timeline."""
         return self.name
 
     def as_arrow_array(self) -> pa.Array:
-        """Its integers."""
+        """The column's integers."""
         return self.rows
 
 
@@ -41,7 +41,7 @@ class _Component(rr.ComponentColumn):
         self._rows = rows
 
     def as_arrow_array(self) -> pa.Array:
-        """A list for each row."""
+        """The component's values, a list for each row."""
         return self._rows
 
 

@@ -25,7 +25,7 @@ class ProjectedScalar:
 
     Attributes:
         name: name of the invariant that it belongs to.
-        expression: of the states, internal units.
+        expression: expression of the states, internal units.
         scale: size that its drift is relative to, internal units (mpf).
     """
 

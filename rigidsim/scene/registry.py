@@ -32,7 +32,7 @@ class Surroundings:
         number: place of the load in the config, counted from 0.
         context: the scene's arithmetic.
         parameters: named constants for expressions.
-        center_of_mass: of the body, from its reference point, body axes, m (mpf).
+        center_of_mass: from the body's reference point to its centre of mass, body axes, m (mpf).
         free_flight: whether the body has a position.
         axes: what the space axes are, if the config says so.
         epoch: date of the scene's time 0, if the config says so.

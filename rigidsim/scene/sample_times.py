@@ -57,7 +57,7 @@ class SampleTimes:
 
     @property
     def largest_spacing(self) -> float:
-        """Of neighbouring samples, s."""
+        """Largest spacing of neighbouring samples, s."""
         if self.times is None:
             return float(self.step)
         return max((float(b - a) for a, b in pairwise(self.times)), default=0.0)

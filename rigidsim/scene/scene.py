@@ -29,7 +29,7 @@ class Scene:
         angular_velocity: initial angular velocity, body axes, rad/s.
         quaternion: initial unit quaternion, body to space.
         euler_angles: as given in ``euler_sequence`` (radians), or None if given otherwise.
-        position, velocity: of the centre of mass, space axes; None unless the body moves freely.
+        position, velocity: those of the centre of mass, space axes; None unless the body moves freely.
         gravity: sum of all uniform fields, space axes, m/s^2; None without such a load.
         loads: the others, without those that are always zero.
         events: crossings that are recorded, or end the run.

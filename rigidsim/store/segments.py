@@ -58,7 +58,7 @@ class Chain:
         run: the run's identity; empty without segments.
         seal: seal of the last segment.
         damage: what is wrong with the first segment that doesn't belong, or None.
-        spoiled: that one and all after it.
+        spoiled: that segment and all after it.
     """
 
     paths: list[Path] = field(default_factory=list)

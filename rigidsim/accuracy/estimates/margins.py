@@ -13,42 +13,44 @@ class Margins:
     (``experiments/error_coverage.py``).
 
     Attributes:
-        safety: over the root mean square of three neighbours; ``path``: of it, for position and velocity.
-        drifted: growth of a step's error from which a loosely followed motion is another one; ``gone``: over
-            what leaves no digit, from which that doesn't matter; ``tight_steps``: of runs that are followed
-            tightly at most.
-        strayed: distance from the run's own states, relative to their size, from which a loosely followed
-            motion is another one; every so many ``looks`` waypoints it is looked at, of 16 to 32 in the run.
-        most_anew: steps of a run whose own integrator follows it from then on.
-        compared: over the largest difference from a closed form at some samples.
-        angles, angle_series, momentum_series: errors of a step in Euler angles over those in quaternions: of
-            rounding, and of series that a tolerance cuts off; of the latter with canonical momenta.
+        safety, path: factor on the root mean square of three neighbours; further factor for position and
+            velocity.
+        drifted, gone, tight_steps: growth of a step's error from which a loosely followed motion becomes a
+            different one; growth, over that which leaves no digit, from which this doesn't matter; largest
+            number of steps of a run that is followed tightly.
+        strayed, looks: distance from the run's own states, relative to their size, from which a loosely
+            followed motion counts as a different one; it is checked at every so many of the 16 to 32 waypoints.
+        most_anew: largest number of steps of a run that its own integrator follows from then on.
+        compared: factor on the largest difference from a closed form at some samples.
+        angles, angle_series, momentum_series: errors of a step in Euler angles, over those in quaternions:
+            rounding; truncation at a tolerance; truncation with canonical momenta.
         near, very_near: singular factors below which canonical momenta lose more than elsewhere.
-        cut_off: of a tolerance, what a step is wrong by in motions with switching surfaces.
-        all_steps: that are followed whatever they cost: some 50 to 130 ms with what is compiled for them;
-            ``passing_steps``: of flights with close passages, which windows would miss; ``own_steps``: where
-            windows can only be looked at by the run's own integrator, at a tenth of that speed;
-            ``most_own_steps``: that it takes at most; ``canonical_steps``: likewise of canonical runs that
-            are followed whole, since what momenta lose beside the singularity isn't known well elsewhere.
-        charts: steps in Euler angles and their momenta over those of quaternions, by which such runs are
-            followed.
-        uneven: longest step of a flight over its shortest, from which it passes something closely.
-        share: of the run's cost that may be spent, where errors grow as those of stable motions do.
-        lane: cost of a step of all neighbours, unrolled, over one of the run in double precision;
-            ``unrolling``: of compiling that, in such steps.
-        stage: steps of a run that is to be followed whole after all, before it is seen whether all is lost.
-        switching_steps, switching_share: of a motion with switching surfaces, whose neighbours cost as much
-            as itself each: steps that are followed whatever they cost, and share of the run's.
-        dearer: a step in other precisions than one in double precision, roughly.
-        windows: through the rest of the run, at most; ``window``: steps of each at least; ``beginning``:
-            part of the steps that are followed from the start on, where there are windows.
-        between_windows: by how much more errors grow at least where states have singularities, which may be
-            passed between windows.
-        stable: amplification up to which a motion is as stable as the law of rounding takes it to be.
-        wary_power: of time that errors grow with in the beginning, from which runs of ``wary_steps`` at most
-            are followed whole.
-        power, most_power: of time that errors grow with, at least and at most, where no more was followed.
-        exponential: power of time past which growth is none.
+        cut_off: a step's error, over the tolerance, in motions with switching surfaces.
+        all_steps: steps that are followed whatever they cost: some 50 to 130 ms, compiling included.
+        passing_steps: the same for flights with close passages, which windows would miss.
+        own_steps, most_own_steps: the same, and the largest number, if only the run's own integrator can
+            follow windows, at a tenth of the speed.
+        canonical_steps: the same for canonical runs that are followed whole, since the loss of momenta near
+            the singularity isn't known well elsewhere.
+        charts: ratio of steps in Euler angles and their momenta to those in quaternions, with which such runs
+            are followed.
+        uneven: ratio of a flight's longest step to its shortest from which it has close passages.
+        share: share of the run's cost that may be spent if errors grow as in stable motions.
+        lane, unrolling: cost of a step of all neighbours, unrolled, over one of the run in double precision;
+            cost of compiling that, in such steps.
+        stage: steps after which a run that must be followed whole is checked for having lost all digits.
+        switching_steps, switching_share: for a motion with switching surfaces, each of whose neighbours costs
+            as much as itself: steps that are followed whatever they cost, and share of the run's.
+        dearer: approximate cost ratio of a step in other precisions to one in double precision.
+        windows, window, beginning: largest number of windows through the rest of the run; least number of
+            steps of each; share of the steps that are followed from the start if there are windows.
+        between_windows: least extra growth assumed if states have singularities, which may be passed between
+            windows.
+        stable: amplification up to which a motion is as stable as the round-off law assumes.
+        wary_power, wary_steps: power of time of the errors' growth in the beginning from which runs of at
+            most so many steps are followed whole.
+        power, most_power: least and largest power of time by which errors are extrapolated.
+        exponential: power of time past which growth counts as exponential.
     """
 
     safety: float = 3.0

@@ -82,7 +82,7 @@ def beginning(axes: Axes, shown: Shown) -> float:
     """Seconds that hold `_CYCLES` swings of a panel's curves if the run has many more; otherwise 0.
 
     Args:
-        axes: of the panel, drawn from `shown.start`.
+        axes: axes of the panel, drawn from `shown.start`.
     """
     seconds, whole = signals.seconds(shown.start), signals.seconds(shown.rows)
     length, span = float(seconds[-1] - seconds[0]), float(whole[-1] - whole[0])

@@ -74,7 +74,7 @@ class Steady:
     Attributes:
         rates: rate of each angle as an expression of the state, rad per internal unit of time.
         uncertainty: by how much the rates may change between samples, rad/s.
-        excursion: by which the angles may be off besides, rad. Both count for an angle whose sine and cosine
+        excursion: additional deviation of the angles, rad. Both count for an angle whose sine and cosine
             have size 1, and are divided by a smaller one.
     """
 

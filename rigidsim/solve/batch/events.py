@@ -55,7 +55,7 @@ class EventExpressions:
         """Parameters of the events, (2 * events, members).
 
         Args:
-            initial: of the motion, (states, members); swept: (parameters, members); start, end: (members,),
+            initial: motion's states, (states, members); swept: (parameters, members); start, end: (members,),
                 internal units.
         """
         members = initial.shape[1]

@@ -1,4 +1,4 @@
-"""How members fared that were taken side by side, where samples go, and when the next one arrives."""
+"""Results of members integrated side by side: where their samples go, and when the next lane finishes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 IDLE = -1
-"""In place of a member, of a lane that has none."""
+"""Marks a lane that has no member."""
 _FIRST_STEPS, _LEAST_STEPS = 64, 8
-"""At once, while nothing is known of a lane's pace, and where one is about to arrive."""
+"""Steps at once while a lane's pace is unknown, and when one is about to arrive."""
 _SHORTLY = 48
-"""Steps that take about as long as what is done between two calls of the integrator."""
+"""Number of steps that takes about as long as the work between two calls of the integrator."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """One crossing: of which event, in which lane, when (internal units) and where."""
+    """One crossing: its event, lane, time (internal units) and state."""
 
     event: int
     lane: int
@@ -26,14 +26,14 @@ class Found:
 
 @dataclass
 class LaneResults:
-    """How members fared.
+    """Results of members integrated side by side.
 
     Attributes:
-        states: (samples, states, members) at the sample times; not numbers from where one ended.
-        finite: whether the state stayed so, (members,).
-        arrived: whether it got to the last sample.
-        steps: that it took.
-        found: crossings on the way, of members that have any.
+        states: (samples, states, members) at the sample times; nan from where a member ended.
+        finite: whether the state stayed finite, (members,).
+        arrived: whether the last sample was reached, (members,).
+        steps: steps taken, (members,).
+        found: crossings on the way, for members that have any.
     """
 
     states: np.ndarray
@@ -44,13 +44,13 @@ class LaneResults:
 
     @classmethod
     def empty(cls, samples: int, states: int, members: int) -> LaneResults:
-        """Before anything ran; states are anything at all."""
+        """Results before anything ran; the states are uninitialised."""
         yes = np.ones(members, dtype=bool)
         table = np.empty((samples, states, members))
         return cls(table, yes, yes.copy(), np.zeros(members, dtype=np.int64))
 
     def put(self, places: np.ndarray, others: LaneResults) -> None:
-        """How some fared, in place of what was known of them."""
+        """Replace the results of some members."""
         self.states[:, :, places] = others.states
         for mine, theirs in (
             (self.finite, others.finite),
@@ -80,7 +80,8 @@ def until_next(
     most_steps: int,
     pace: float,
 ) -> int:
-    """Steps until about the first lane arrives at its pace so far, and those that arrive shortly after.
+    """Steps until about the first lane arrives at its pace so far, together with those that arrive shortly
+    after.
 
     Args:
         pace: steps in a unit of time of the member that arrived last, which one that has just begun is taken

@@ -1,7 +1,7 @@
 """Lanes of one batch integrator: members of a family, several at a time, from their start to the last sample.
 
 A lane's bits depend neither on its neighbours nor on its place, but on the number of lanes, so that this is
-recorded. Where a state is no longer finite heyoka stops all lanes at once: the others are taken again.
+recorded. If a state is no longer finite, heyoka stops all lanes at once: the others are repeated.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
 
 _GRID = 1 << 16
-"""Samples at once; the step before the last of them is shortened, at the same places always."""
+"""Samples at once; the step before the last of them is shortened, always at the same places."""
 
 _GROUPS = 8
-"""That are put in place together: the samples of one lie scattered over all of a block's memory."""
+"""Groups put in place together, since the samples of one are scattered over all of a block's memory."""
 _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
 
 _engines: Kept[Any] = Kept(16)
@@ -31,12 +31,12 @@ _engines: Kept[Any] = Kept(16)
 
 @dataclass(frozen=True)
 class BatchSystem:
-    """What is compiled.
+    """What a batch integrator is compiled from.
 
     Attributes:
-        equations: over heyoka's variables and ``par``.
+        equations: equations over heyoka's variables and ``par``.
         events: expressions of the same, with directions.
-        parameters: how many both read.
+        parameters: number of parameters that both read.
     """
 
     equations: Sequence[tuple[Any, Any]]
@@ -47,14 +47,12 @@ class BatchSystem:
 
 
 def recommended_width() -> int:
-    """Lanes that this processor takes at once in double precision."""
+    """Number of lanes that this processor handles at once in double precision."""
     return int(hy.recommended_simd_size())
 
 
 def _parameters_used(system: BatchSystem) -> int:
-    """How many of the parameters the engine is to have: as far as its equations and events read them. What is
-    recorded may read more.
-    """
+    """Number of parameters that equations and events read; recorded quantities may read more."""
     read = [right for _, right in system.equations] + [expression for expression, _ in system.events]
     return max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
 
@@ -63,7 +61,7 @@ class BatchEngine:
     """A compiled batch integrator.
 
     Args:
-        width: of the batch.
+        width: number of lanes of the batch.
     """
 
     def __init__(self, system: BatchSystem, width: int) -> None:
@@ -115,12 +113,12 @@ class BatchEngine:
         times: np.ndarray,
         most_steps: int,
     ) -> LaneResults:
-        """Take members to their last samples.
+        """Integrate members to their last samples.
 
         Args:
             initial: (states, members); parameters likewise.
             start: (members,), times: (samples, members), internal units.
-            most_steps: that one may take.
+            most_steps: largest number of steps of a member.
         """
         count = initial.shape[1]
         result = LaneResults.empty(len(times), len(initial), count)
@@ -150,7 +148,7 @@ class BatchEngine:
                 )
                 if not lost or len(waiting) == 1:
                     break
-                for member in lost:  # alone, so that it gets as far as it can
+                for member in lost:  # alone, so that it gets as far as possible
                     only = np.full(self.width, member)
                     self._together(
                         result,
@@ -169,7 +167,7 @@ class BatchEngine:
         return result
 
     def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Bounds of members' steps (members,), as all terms of the series at their start allow.
+        """Bounds of members' steps (members,), from all terms of the series at their start.
 
         Args:
             initial: (states, members); parameters likewise; start: (members,), internal units.
@@ -179,7 +177,7 @@ class BatchEngine:
         for first in range(0, count, self.width):
             lanes = np.minimum(np.arange(first, first + self.width), count - 1)
             self._set(initial[:, lanes], parameters[:, lanes], start[lanes])
-            self._integrator.step(np.zeros(self.width), write_tc=True)  # a series, going nowhere
+            self._integrator.step(np.zeros(self.width), write_tc=True)  # compute a series without moving
             found = np.abs(self._integrator.tc).max(axis=0)
             sizes[:, first : first + self.width] = found[:, : count - first]
         self._log.clear()
@@ -194,7 +192,7 @@ class BatchEngine:
         longest: np.ndarray,
         most_steps: int,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """States (states, width) and times (width,) of lanes that are full, so many steps later at most.
+        """States (states, width) and times (width,) of fully used lanes, at most so many steps later.
 
         Args:
             states, parameters: (.., width); begin, end: (width,), internal units.
@@ -220,7 +218,7 @@ class BatchEngine:
         longest: np.ndarray,
         most_steps: int,
     ) -> None:
-        """Run members whose end alone is asked for: whoever arrives makes room for the next in its lane."""
+        """Run members of which only the end is wanted: each that arrives frees its lane for the next."""
         integrator, width, used = self._integrator, self.width, self._used
         state, numbers = integrator.state, integrator.pars
         # one lane at a time below: indices by lists cost ten times
@@ -269,7 +267,7 @@ class BatchEngine:
                 for lane in lanes:
                     member, there = inside[lane], moments[lane] == targets[lane]
                     result.steps[member], result.arrived[member] = taken[lane], there
-                    # of one that didn't arrive nothing is known at the end
+                    # nothing is known at the end about members that didn't arrive
                     result.states[-1, :, member] = state[:, lane] if there else np.nan
                     pace = taken[lane] / (moments[lane] - begun[lane]) if there else pace
             if lanes:
@@ -280,7 +278,7 @@ class BatchEngine:
     def _after_loss(
         result: LaneResults, inside: list[int], taken: list[int], outcomes: Any, waiting: deque[int]
     ) -> None:
-        """A state was lost, and all lanes have stopped: those beside it begin again."""
+        """Restart the other members after a state was lost, which stopped all lanes."""
         for member, steps, outcome in zip(inside, taken, outcomes, strict=True):
             if member == IDLE:
                 continue
@@ -303,8 +301,8 @@ class BatchEngine:
         longest: np.ndarray,
         most_steps: int,
     ) -> list[int]:
-        """Run one group; those members whose state was lost, because of which the others have to be taken
-        again.
+        """Run one group; returns the members whose state was lost, because of which the others must be
+        repeated.
 
         Args:
             states: (samples, states, width), which is filled; each member has the lane of its place.

@@ -74,7 +74,7 @@ class BatchMotion:
             initial: (states, members), tangent vectors included; parameters: (parameters, members), those of
                 events after those of the equations.
             start: (members,), times: (samples, members), internal units.
-            most_steps: that one may take.
+            most_steps: largest number of steps of a member.
 
         Returns:
             the motion's lanes, and the states of motion and tangent vector, (samples, states, members); None

@@ -17,14 +17,15 @@ from rigidsim.solve.neighbours.lanes import NEIGHBOURS
 from rigidsim.solve.neighbours.pushed import Pushes
 
 _STRETCHES, _SHORTEST = 12, 4
-"""Of a run, about, and steps of one at least. Half of a stretch's pushes come before it and half after, so
-that few stretches do for errors that grow as time makes them; where they grow faster these become shorter.
+"""Approximate number of stretches of a run, and least number of steps of one. Half of a stretch's pushes come
+before it and half after, so that few stretches suffice for errors that grow as time makes them; where they
+grow faster, stretches become shorter.
 """
 _FIRST = 2.0**-40
 """Initial distance that stands for one epsilon."""
 _LARGEST, _DRAWN_IN, _SATURATED, _NEARER = 2.0**-24, 2.0**-26, 2.0**-14, 2.0**-8
-"""Distance from which neighbours are drawn in, and to where; one that isn't small any more, so that the
-stretch is gone through once more; and by how much nearer where it can't be shorter.
+"""Distance from which neighbours are drawn in, and to where; distance that is no longer small, so that the
+stretch is repeated; and by how much nearer if it can't be shorter.
 """
 _CALM, _WILD = 8.0, 64.0
 """Growth over a stretch below which stretches may become longer, and above which they become shorter."""

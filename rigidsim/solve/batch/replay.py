@@ -1,4 +1,4 @@
-"""What a graph of traced numbers comes to for many members at once.
+"""Evaluation of a graph of traced numbers for many members at once.
 
 Everything is worked out in two doubles with a bound of its error (``double_double``). Where that leaves open
 how a number is rounded or which way a decision falls, the same operations are done for that member in the
@@ -23,9 +23,7 @@ from rigidsim.solve.precision import precision_of
 
 _MANTISSA, _NORMAL = 53, 2.3e-308  # bits of a double, and about the least that has them all
 _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
-"""Of mpmath, where a number is outside the range of an operation: what the member's own build says of it is
-its own matter.
-"""
+"""Errors of mpmath for numbers outside the range of an operation; the member's own build reports them."""
 _BINARY: dict[str, Callable[[Doubled, Doubled], Doubled]] = {
     "add": dd.add,
     "subtract": dd.subtract,
@@ -35,40 +33,40 @@ _BINARY: dict[str, Callable[[Doubled, Doubled], Doubled]] = {
 
 
 class Distinct:
-    """The values that one swept number takes."""
+    """The distinct values of one swept number."""
 
     def __init__(self, values: Sequence[ExactNumber]) -> None:
         self.values = values
 
     @cached_property
     def doubled(self) -> Doubled:
-        """All of them in two doubles."""
+        """All values in two doubles."""
         return _of_exact(self.values)
 
 
 @dataclass(frozen=True)
 class Swept:
-    """One swept number of all members.
+    """One swept number for all members.
 
     Attributes:
         distinct: the values that it takes.
-        index: which of them each member has, (members,).
+        index: index of each member's value, (members,).
     """
 
     distinct: Distinct
     index: np.ndarray
 
     def of(self, member: int) -> ExactNumber:
-        """The number of one."""
+        """The number of one member."""
         return self.distinct.values[self.index[member]]
 
 
 class Replay:
-    """A graph's numbers for members.
+    """A graph's numbers for some members.
 
     Args:
-        swept: for each column of the graph the numbers of all members of the sweep.
-        members: which of them.
+        swept: for each column of the graph, the numbers of all members of the sweep.
+        members: indices of the members.
     """
 
     def __init__(self, graph: Graph, swept: Sequence[Swept], members: np.ndarray) -> None:
@@ -81,7 +79,7 @@ class Replay:
         self._double = precision_of("double")
 
     def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
-        """Which members decide everything as the representative does, shape (members,)."""
+        """Mask of the members that make all decisions as the representative does, (members,)."""
         found = np.ones(self._count, dtype=bool)
         for guard in guards:
             found &= self._decided(guard) == guard.outcome
@@ -90,7 +88,7 @@ class Replay:
         return found
 
     def doubles(self, node: int) -> np.ndarray:
-        """A number rounded once, shape (members,); not a number where it is outside a double's range."""
+        """A number rounded once, (members,); nan if it is outside a double's range."""
         if node not in self._doubles:
             self._doubles[node] = self._rounded(node)
         return self._doubles[node]
@@ -175,7 +173,9 @@ class Replay:
         return Doubled(1.0, 0.0, 0.0) if found is None else found
 
     def _one_by_one(self, node: int) -> Doubled:
-        """What arrays don't have, such as a sine: once for each combination of the columns that it reads."""
+        """An operation that arrays lack, such as a sine, once for each combination of the columns that it
+        reads.
+        """
         columns = sorted(_columns(self._graph, node))
         codes = np.zeros(self._count, dtype=np.int64)
         for column in columns:
@@ -211,7 +211,7 @@ class Replay:
         return first + self._whole(arguments[1]) if operation == "add" else first * self._whole(arguments[1])
 
     def _exponents(self, node: int, *, above: bool) -> np.ndarray:
-        """The smallest e with abs(x) <= 2**e, or ``above``: < 2**e."""
+        """The smallest e with abs(x) <= 2**e, or with ``above``, abs(x) < 2**e."""
         with np.errstate(all="ignore"):
             number = dd.absolute(self._number(node))
             mantissa, exponent = np.frexp(number.high)
@@ -226,13 +226,13 @@ class Replay:
                 mantissa, power = self._graph.context.frexp(abs(self._exactly(node, member)))
                 exponent[member] = int(power) - (mantissa == 0.5 and not above)
             except _FAILURES:
-                exponent[member] = -(2**40)  # agrees with nobody's
+                exponent[member] = -(2**40)  # agrees with no other
         return exponent
 
     # --- one member -----------------------------------------------------------------------------------------
 
     def _exactly(self, node: int, member: int) -> Any:
-        """A member's number as its own build has it (mpf)."""
+        """A member's number (mpf) exactly as its own build would have it."""
         if (node, member) not in self._exact:
             operation, arguments = self._graph.nodes[node]
             self._exact[node, member] = self._exact_result(operation, arguments, member)
@@ -272,7 +272,7 @@ _EXACT: dict[str, Callable[..., Any]] = {
 
 
 def _parts(value: Any) -> tuple[float, float, float]:
-    """An mpf in two doubles, and what is left."""
+    """An mpf in two doubles, and the remainder."""
     high = float(value)
     rest = value - high
     low = float(rest)

@@ -20,11 +20,12 @@ from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
 _VALUES_AT_ONCE = 2_000_000
-"""Of samples, evaluated together: more take memory that has to be fetched anew for each step of it."""
+"""Sample values evaluated together; more would take memory that has to be fetched anew for each operation."""
 _MOST_STEPS = 10_000
 _STEPS_PER_UNIT = 200.0
 """A natural step is of the order of one internal unit of time. A lane that takes so many more is given up
-here, before it holds the others any longer, and run by itself."""
+here, before it holds the others any longer, and run by itself.
+"""
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class BatchEvents:
     Attributes:
         member: (n,), places in the block.
         time: (n,) seconds.
-        values: of the recorded variables, (n, components), SI.
+        values: recorded variables, (n, components), SI.
     """
 
     name: str
@@ -45,22 +46,22 @@ class BatchEvents:
 
 @dataclass(frozen=True)
 class BatchBlock:
-    """Some members of a family, run.
+    """Results of some members of a family.
 
     Attributes:
-        members: which of the sweep's they are, (m,).
-        places: of these in the numbers that they were run from, (m,).
+        members: indices of the members in the sweep, (m,).
+        places: their places in the numbers from which they were run, (m,).
         times: seconds, (samples,).
         start: (m,), moments: of the samples, (samples, m), each member's internal unit of time.
-        states: of the motion, (samples, states, m), internal units.
-        values: of the recorded variables, (samples, m, components), SI; NaN from where a member ended.
-        drifts: by the names of the invariants, (samples, m).
+        states: states of the motion, (samples, states, m), internal units.
+        values: recorded variables, (samples, m, components), SI; NaN from where a member ended.
+        drifts: relative drifts by the names of the invariants, (samples, m).
         status: how each ended, (m,) objects; None where a lane gave up and the member is to be run by itself.
         reached: samples that each got to, (m,).
-        steps: (m,).
+        steps: steps taken, (m,).
         drift_bound: relative drift that rounding alone explains, (m,).
-        radians_between: by how much each body turns between neighbouring samples at most, (m,).
-        events: one for each event.
+        radians_between: largest angle by which each body turns between neighbouring samples, (m,).
+        events: crossings of each event.
         width: lanes of the integrator, on which the last bits depend.
     """
 
@@ -82,11 +83,11 @@ class BatchBlock:
 
 
 class BatchRun:
-    """What a family's members are run with, compiled once.
+    """Runs members of a family with integrators and functions compiled once.
 
     Args:
         width: lanes of the integrator; by default what the processor takes at once.
-        unfelt: of tangent vectors, as of ``BatchMotion``.
+        unfelt: largest component of tangent vectors, see ``BatchMotion``.
     """
 
     def __init__(self, family: Family, width: int | None = None, unfelt: float = UNFELT) -> None:
@@ -101,15 +102,15 @@ class BatchRun:
         self._outputs = BatchOutputs(family.traced)
 
     def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:
-        """Run members, as many at a time as memory takes.
+        """Run members, as many at a time as fit into memory.
 
         Args:
-            numbers: of members of this family.
+            numbers: numbers of members of this family.
         """
         samples = self._traced.prepared.clock.count
         each = samples * (len(self._system.states) + len(self._system.outputs))
         most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
-        # those that take about as many steps side by side: none waits for long
+        # members with about as many steps run side by side, so that none waits for long
         order = np.argsort(numbers.doubles(self._system.rate_bound), kind="stable")
         for first in range(0, len(order), most):
             yield self._block(numbers, order[first : first + most])
@@ -211,7 +212,7 @@ class BatchRun:
         return events
 
     def _ended_by_events(self, block: BatchBlock) -> None:
-        """A crossing that ends the motion: later samples and crossings are no part of it."""
+        """End motions at the first crossing that stops them; later samples and crossings are dropped."""
         stops = [e for e, c in zip(block.events, self._system.crossings, strict=True) if c.stop]
         first = np.full(len(block.members), math.inf)
         for event in stops:
@@ -228,7 +229,7 @@ class BatchRun:
                 block.events[n] = BatchEvents(event.name, event.member[kept], event.time[kept], values)
 
     def _ended_by_drift(self, block: BatchBlock) -> None:
-        """The guard max_drift: the first sample beyond it is the last."""
+        """Apply the guard max_drift: the first sample beyond it is the last."""
         limit = self._traced.prepared.scene.config.limits.max_drift
         if limit is None or not block.drifts:
             return
@@ -239,7 +240,7 @@ class BatchRun:
 
 
 def _reached(lanes: LaneResults) -> np.ndarray:
-    """Samples that each member got to, (members,)."""
+    """Number of samples that each member reached, (members,)."""
     found = np.full(len(lanes.arrived), len(lanes.states))
     short = np.flatnonzero(~lanes.arrived)
     finite = np.isfinite(lanes.states[:, :, short]).all(axis=1)

@@ -110,7 +110,7 @@ def trace(
     Args:
         representative: the member.
         keys: keys of its numbers that differ between members, such as ``initial.angular_velocity[2]``.
-        numbers: what it has there.
+        numbers: the member's numbers for these keys.
         drive: estimated effect of loads of unknown size, if there are any: a power of two in the
             units, which has to be the same whoever is the representative.
 

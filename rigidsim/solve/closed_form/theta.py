@@ -78,7 +78,7 @@ class Theta:
 
     Attributes:
         kind: 1 to 4.
-        hyperbolic: which of the two.
+        hyperbolic: whether the series is hyperbolic.
         per_turn: the variable z over the number of turns x / 2K, or over x itself on the separatrix.
         orders: k_n.
         weights: a_n, b_n; without the power of the nome where hyperbolic.

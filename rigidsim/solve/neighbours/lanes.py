@@ -24,17 +24,17 @@ from rigidsim.solve.steppers import stepper_of
 
 NEIGHBOURS = 3
 _DOUBLE_ORDER = 20
-"""Of series in double precision at its epsilon; the work of a step goes with its square."""
+"""Order of the series in double precision at its epsilon; the work of a step grows as its square."""
 LOOSE, TOLERANCE, TIGHT = 1e-6, 1e-8, 1e-14
-"""The loose one, in half the code, while the motion stays near the run's own: over 18,000 steps of a driven
-body it strays by 3e-4, over 30,000 of a fall by 8e-6. The tight one where errors grow so much that a loosely
-followed motion is soon another one.
+"""Tolerances. The loose one, with half the code, serves while the motion stays near the run's own: over 18,000
+steps of a driven body it strays by 3e-4, over 30,000 of a fall by 8e-6. The tight one serves if errors grow so
+much that a loosely followed motion soon becomes a different one.
 """
 _TIGHT_UNTIL = 50_000
 _OWN_UNTIL, OWN_FIRST = 5_000, 500
-"""Steps up to which the run's own integrator, called for each lane, costs less than what is compiled for all;
-and so many that it takes of longer motions, and as many again and again as long as their errors grow
-exponentially, lest code is compiled for one that is soon lost.
+"""Steps up to which the run's own integrator, called for each lane, costs less than code compiled for all;
+and the steps that it takes of longer motions, repeatedly as long as their errors grow exponentially, so that
+no code is compiled for a motion that is soon lost.
 """
 UNROLLED_FROM, LOOSELY_UNROLLED_FROM, OPTIMISED_FROM = 3_000, 1_500, 300_000
 """Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
@@ -58,12 +58,12 @@ _LEAST_TOLERANCE, _LEAST_WIDE_TOLERANCE = 1e-11, 1e-15
 of smaller ones are taken in proportion.
 """
 _ONE_ORDER = math.exp(2.0)
-"""What one order more gains in general, which is the tolerance's own step from order to order (Jorba & Zou
-2005); by how much proportions can be missed.
+"""Typical gain of one more order, which is the tolerance's own step from order to order (Jorba & Zou 2005);
+the factor by which proportions can be wrong.
 """
 
 _PARTS = 4
-"""Of a step, whose errors are a thousandth of its own or less: the power of 4 that is the series' order."""
+"""Parts of a step, whose errors are at most a thousandth of its own: 4 to the power of the series' order."""
 
 
 @contextmanager
