@@ -19,7 +19,7 @@ class Margins:
             different one; growth, over that which leaves no digit, from which this doesn't matter; largest
             number of steps of a run that is followed tightly.
         strayed, looks: distance from the run's own states, relative to their size, from which a loosely
-            followed motion counts as a different one; it is checked at every so many of the 16 to 32 waypoints.
+            followed motion counts as different; it is checked at every so many of the 16 to 32 waypoints.
         most_anew: largest number of steps of a run that its own integrator follows from then on.
         compared: factor on the largest difference from a closed form at some samples.
         angles, angle_series, momentum_series: errors of a step in Euler angles, over those in quaternions:

@@ -26,9 +26,9 @@ NEIGHBOURS = 3
 _DOUBLE_ORDER = 20
 """Order of the series in double precision at its epsilon; the work of a step grows as its square."""
 LOOSE, TOLERANCE, TIGHT = 1e-6, 1e-8, 1e-14
-"""Tolerances. The loose one, with half the code, serves while the motion stays near the run's own: over 18,000
-steps of a driven body it strays by 3e-4, over 30,000 of a fall by 8e-6. The tight one serves if errors grow so
-much that a loosely followed motion soon becomes a different one.
+"""Tolerances. The loose one, with half the code, serves while the motion stays near the run's own: over
+18,000 steps of a driven body it strays by 3e-4, over 30,000 of a fall by 8e-6. The tight one serves if errors
+grow so much that a loosely followed motion soon becomes a different one.
 """
 _TIGHT_UNTIL = 50_000
 _OWN_UNTIL, OWN_FIRST = 5_000, 500
