@@ -190,11 +190,13 @@ class Neighbours:
 
     @property
     def time(self) -> float:
-        """That they have come to, internal units."""
+        """Time that the neighbours have reached, internal units."""
         return self._time
 
     def away_from(self, state: np.ndarray) -> float:
-        """Distance of the motion from another state (states,) at this time, relative to what is apart."""
+        """Distance of the motion from another state (states,) at this time, relative to the size of the
+        states.
+        """
         pair = np.stack([self._states[:, 0], state], axis=1)
         if angles := self._angles:
             pair[angles, 1] -= self._turn * np.rint((pair[angles, 1] - pair[angles, 0]) / self._turn)
@@ -281,8 +283,8 @@ class Neighbours:
         return True
 
     def _advance(self, states: np.ndarray, time: float, most: int) -> tuple[int, float] | None:
-        """Advance all lanes by at most ``most`` steps of the motion; returns the steps taken and the time
-        reached, or None if a state isn't finite.
+        """Take at most ``most`` steps; returns their number and the time reached, None if a state isn't
+        finite.
         """
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # neighbours' lasts for the stretch
@@ -296,9 +298,7 @@ class Neighbours:
         return max(taken, 1), reached
 
     def _push(self, own: float, sizes: np.ndarray, moved: np.ndarray, taken: int = 0) -> None:
-        """Add errors to the neighbours: ``own`` relative to each size, and truncation errors of the steps
-        taken.
-        """
+        """Add errors to the neighbours: ``own`` relative to each size, and truncation of ``taken`` steps."""
         normal = self._random.standard_normal((len(sizes), NEIGHBOURS))
         pushed = own * sizes[:, None] * normal
         pushed[~moved] = 0.0
@@ -328,9 +328,7 @@ class Neighbours:
         return found
 
     def _weigh(self) -> None:
-        """Update the weights of squared differences in squared distances; states that never moved get
-        none.
-        """
+        """Update the weights of squared differences; states that never moved get none."""
         sizes = (self._members * self._largest).max(axis=1, keepdims=True)
         self._weights = np.where(sizes > 0, self._members / np.maximum(sizes, 1e-150) ** 2, 0.0)
 
