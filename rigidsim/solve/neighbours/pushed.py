@@ -194,9 +194,7 @@ class Neighbours:
         return self._time
 
     def away_from(self, state: np.ndarray) -> float:
-        """Distance of the motion from another state (states,) at this time, relative to the size of the
-        states.
-        """
+        """Distance of the motion from another state (states,) at this time, relative to its size."""
         pair = np.stack([self._states[:, 0], state], axis=1)
         if angles := self._angles:
             pair[angles, 1] -= self._turn * np.rint((pair[angles, 1] - pair[angles, 0]) / self._turn)
@@ -283,9 +281,7 @@ class Neighbours:
         return True
 
     def _advance(self, states: np.ndarray, time: float, most: int) -> tuple[int, float] | None:
-        """Take at most ``most`` steps; returns their number and the time reached, None if a state isn't
-        finite.
-        """
+        """Take at most ``most`` steps: their number and the time reached, or None if not finite."""
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # neighbours' lasts for the stretch
         steps = min(most, self._steps_at_once * _LONGER * (time - self._time) / self._longest)
@@ -298,7 +294,7 @@ class Neighbours:
         return max(taken, 1), reached
 
     def _push(self, own: float, sizes: np.ndarray, moved: np.ndarray, taken: int = 0) -> None:
-        """Add errors to the neighbours: ``own`` relative to each size, and truncation of ``taken`` steps."""
+        """Add errors: ``own`` relative to each size, and the truncation of ``taken`` steps."""
         normal = self._random.standard_normal((len(sizes), NEIGHBOURS))
         pushed = own * sizes[:, None] * normal
         pushed[~moved] = 0.0
