@@ -1,6 +1,8 @@
-"""Writes mars_secular.csv: the orbit of Mars over the next 10 million years, for mars_obliquity.toml.
+"""Writes mars_secular.csv: the orbit of Mars over the next 10 million years, for mars_obliquity.toml; and
+earth_secular.csv: that of the Earth with its Moon over a million years, for experiments/earth_obliquity.py.
 
     python configs/tables/mars_secular.py          # some fifteen minutes; takes numba (rigidsim[peers])
+    python configs/tables/mars_secular.py earth    # some two
 
 The eight planets as points under each other's gravity, with the relativistic advance of the perihelia as of a
 potential (Nobili & Roxburgh 1986), from their places at J2000 (VSOP2013, Simon et al. 2013, as heyoka has the
@@ -24,10 +26,11 @@ GAUSS = 0.01720209895  # sqrt(G M) of the Sun, au^(3/2) / day
 LIGHT = 173.1446326847  # au / day
 INVERSE_MASSES = [6023600, 408523.71, 328900.56, 3098708, 1047.3486, 3497.898, 22902.98, 19412.24]
 """Of the Sun over Mercury ... Neptune with their moons (IAU 2009)."""
-MARS = 3
+PLANETS = {"mars": (3, 10_000_000, 4000), "earth": (2, 1_000_000, 2000)}
+"""Number, years of the table, and years from one row to the next."""
 STEP = 8.0  # days
 YEAR = 365.25
-SPAN, EVERY, WINDOW = 10_000_000, 4000, 1000  # years
+WINDOW = 1000  # years
 SEEN = 37  # steps between two looks within a window
 
 
@@ -119,10 +122,10 @@ def advance(x, v, gm, sun, step, count):
         kick(x, v, gm, sun, step / 2)
 
 
-def elements(x: np.ndarray, v: np.ndarray, gm: np.ndarray, sun: float) -> np.ndarray:
-    """k, h, q, p and the semi-major axis of Mars, heliocentric and osculating."""
+def elements(planet: int, x: np.ndarray, v: np.ndarray, gm: np.ndarray, sun: float) -> np.ndarray:
+    """k, h, q, p and the semi-major axis of a planet, heliocentric and osculating."""
     moving = v + (gm @ v) / sun  # the Sun's own velocity taken off
-    place, speed, mu = x[MARS], moving[MARS], sun + gm[MARS]
+    place, speed, mu = x[planet], moving[planet], sun + gm[planet]
     momentum = np.cross(place, speed)
     normal = momentum / np.linalg.norm(momentum)
     r = np.linalg.norm(place)
@@ -134,7 +137,7 @@ def elements(x: np.ndarray, v: np.ndarray, gm: np.ndarray, sun: float) -> np.nda
     return np.array([e @ f, e @ g, q, p, 1 / (2 / r - speed @ speed / mu)])
 
 
-def rows(last: float) -> list[tuple[float, np.ndarray]]:
+def rows(planet: int, last: float, every: int) -> list[tuple[float, np.ndarray]]:
     """Years and averaged elements."""
     x, v = start()
     sun = GAUSS**2
@@ -144,12 +147,12 @@ def rows(last: float) -> list[tuple[float, np.ndarray]]:
     advance(x, v, gm, sun, -STEP, half * SEEN)
     weights = np.cos(np.pi * np.arange(-half, half + 1) / (2 * half + 2)) ** 2
     weights /= weights.sum()
-    between = round(EVERY * YEAR / STEP)
+    between = round(every * YEAR / STEP)
     found, year = [], 0.0
     while year <= last:
         mean = np.zeros(5)
         for weight in weights:
-            mean += weight * elements(x, v, gm, sun)
+            mean += weight * elements(planet, x, v, gm, sun)
             advance(x, v, gm, sun, STEP, SEEN)
         found.append((year, mean))
         advance(x, v, gm, sun, STEP, between - len(weights) * SEEN)
@@ -158,12 +161,13 @@ def rows(last: float) -> list[tuple[float, np.ndarray]]:
 
 
 def main() -> None:
-    """Write the table beside this file; an argument is the span in years."""
-    span = float(sys.argv[1]) if len(sys.argv) > 1 else SPAN
-    found = rows(span)
+    """Write a planet's table beside this file; Mars' unless another is named."""
+    name = sys.argv[1] if len(sys.argv) > 1 else "mars"
+    found = rows(*PLANETS[name])
     axis = np.mean([row[4] for _, row in found])
     lines = [
-        "# Mars, secular: the eight planets integrated with the relativistic advance of perihelia, averaged",
+        f"# {name.title()}, secular: the eight planets integrated with the relativistic advance of "
+        "perihelia, averaged",
         "# over 1000 years; ecliptic and equinox of J2000, time from J2000. Written by mars_secular.py.",
         f"# The mean of the semi-major axis is {axis:.7f} au.",
         "time [yr], eccentricity, inclination [deg], ascending_node [deg], longitude_of_periapsis [deg]",
@@ -172,7 +176,7 @@ def main() -> None:
         angles = (2 * math.asin(math.hypot(q, p)), math.atan2(p, q), math.atan2(h, k))
         degrees = ", ".join(f"{math.degrees(x):.6f}" for x in angles)
         lines.append(f"{year:.0f}, {math.hypot(k, h):.8f}, {degrees}")
-    Path(__file__).with_name("mars_secular.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    Path(__file__).with_name(f"{name}_secular.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
