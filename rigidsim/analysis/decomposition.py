@@ -250,8 +250,7 @@ def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int
     sizes.
 
     Of neighbouring points the largest is kept, so that no line is lost. For a real signal, sizes are
-    amplitudes of
-    the cosine.
+    amplitudes of the cosine.
     """
     secular = replace(found.sum, frequencies=(), amplitudes=())
     left = remainder(replace(samples, parts=samples.parts[:1], bits=53), secular)

@@ -149,8 +149,7 @@ class Load(SceneLoad):
         switch.
 
         They are dimensionless expressions of ``seconds(m)`` and the states. Steps chosen by the motion alone
-        would
-        pass over such a zero; with them they shorten on the way there.
+        would pass over such a zero; with them they shorten on the way there.
         """
         return []
 

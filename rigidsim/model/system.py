@@ -89,8 +89,8 @@ class System:
         """The same system in the chart that a run changes to near the singularity; None without a chart.
 
         Its states are the same but for the angles. Its recorded Euler angles are those of this system's
-        sequence, on
-        the branch given by the parameter after the invariants' (see ``rigidsim.model.euler_charts``).
+        sequence, on the branch given by the parameter after the invariants' (see
+        ``rigidsim.model.euler_charts``).
         """
         if self.requirements.formulation != "euler_angles" or self._asked_sequence is not None:
             return None

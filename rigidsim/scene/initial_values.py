@@ -58,8 +58,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
     """Refuse expressions that read Euler angles if the start is given by the other triple.
 
     Every attitude has two triples of Euler angles; expressions use the one whose middle angle is in its
-    range, which
-    other formulations find as well.
+    range, which other formulations find as well.
     """
     expressions = [e for load in scene.loads for _, e in load.formulas()]
     expressions += [event.expression for event in scene.events]

@@ -25,8 +25,7 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
     """Settings that would have given a far better attitude at the same cost or less, the best last.
 
     Only what was measured is promised: projecting invariants removes the errors of integrable motions (those
-    with a
-    closed form), whose frequencies depend on the projected invariants alone.
+    with a closed form), whose frequencies depend on the projected invariants alone.
     """
     prepared, estimate, cheaper = found.prepared, found.estimate, found.cheaper
     if estimate is not None and cheaper is not None:

@@ -90,8 +90,7 @@ class Guards:
     """The checks between chunks; ``wall_time`` starts anew in each session of a run.
 
     The loop itself enforces ``max_steps``, and the recorder checks each sample's drift; here the drifts of an
-    earlier
-    session are checked.
+    earlier session are checked.
     """
 
     def __init__(

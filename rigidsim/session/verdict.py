@@ -42,8 +42,7 @@ def verdict_on(summary: Summary) -> RunVerdict:
     """The worst that can be said of a run: drifts that rounding does not explain, then lost digits.
 
     A motion may amplify errors whatever its drifts. For projected invariants the corrections put back count,
-    since
-    they are the drift that would have been.
+    since they are the drift that would have been.
     """
     checked = {name: row for name, row in summary.invariants.items() if not row.numerical}
     shares = {

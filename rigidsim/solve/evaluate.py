@@ -240,8 +240,7 @@ class Evaluator:
         """All variables at states that aren't among the samples.
 
         Nothing is joined to them later, and angles that aren't states are within one turn, since the motion
-        between
-        two of them isn't known.
+        between two of them isn't known.
         """
         before = copy.deepcopy(self.continuity)
         self.continuity.wrapped_from = -math.inf

@@ -166,8 +166,7 @@ class IntegrationLoop:
         """Hand over what is collected; False if the receiver ended the run at one of the samples.
 
         Also False if Ctrl-C came while something that samples need was being compiled; samples not taken are
-        left to the
-        next session.
+        left to the next session.
         """
         try:
             refused = self.buffer.hand_over(patiently=patiently)

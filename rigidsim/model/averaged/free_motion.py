@@ -74,10 +74,8 @@ class FreeMotion:
         """Moment that sets how far the third axis stands off from L under a steady torque N.
 
         The offset is that moment times (s x N) / L^2 (see ``offset``), for rotations near that axis. The
-        moment is A
-        for a symmetric body; otherwise it follows from I1 w1' = (I2 - I3) w2 w3 + N1 and so on, with a torque
-        that
-        turns backwards in the body, averaged over the turn.
+        moment is A for a symmetric body; otherwise it follows from I1 w1' = (I2 - I3) w2 w3 + N1 and so on,
+        with a torque that turns backwards in the body, averaged over the turn.
         """
         a, b, c = self.moments
         if a == b:

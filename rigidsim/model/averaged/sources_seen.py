@@ -43,8 +43,7 @@ class SourcesSeen(Mechanics):
         """See ``Kinematics``; here a function of time, without states.
 
         The digits that the phase loses as time goes on shift the direction only in proportion to the
-        nutation, and a
-        torque without states of its own allows steps twice as long.
+        nutation, and a torque without states of its own allows steps twice as long.
         """
         at = self._place(orbit)
         if orbit.circular:

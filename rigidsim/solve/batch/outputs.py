@@ -24,8 +24,7 @@ class BatchOutputs:
     """Recorded variables and drifts of a traced system.
 
     The growth of tangent vectors has a function of its own, of states that the motion alone lacks; together
-    with it
-    the code of the others would be compiled differently.
+    with it the code of the others would be compiled differently.
     """
 
     def __init__(self, traced: TracedSystem) -> None:

@@ -106,8 +106,7 @@ class AsymmetricFree(Motion):
         """Mean rate of axis 3 about L.
 
         Precession and spin add up to s, and the spin of L about axis 3 makes one turn per period: backwards
-        where I3 is
-        the largest.
+        where I3 is the largest.
         """
         sense = 1 if self.moments[2] > self.moments[0] else -1
         return 2 * self.rate + (2 * self.step + sense * self.lattice.context.pi) * self.argument.turn_rate
