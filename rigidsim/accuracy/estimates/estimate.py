@@ -20,15 +20,11 @@ from rigidsim.accuracy.estimates.course import Course, Followed
 from rigidsim.accuracy.estimates.exact_error import ExactError, exact_error
 from rigidsim.accuracy.estimates.following import follow, leading
 from rigidsim.accuracy.estimates.growth import exponential_growth, power_of_time
-from rigidsim.accuracy.estimates.margins import MARGINS, Margins
+from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.trail import SampleTrail, Waypoints
-
-_LAST_BITS = 0.5  # of a recorded value, rounded
-_LABEL = 0.25  # of a sample's time, rounded: what is recorded belongs to another moment
-_AS_LARGE = 4.0  # the whole way: bound for a position that can't be predicted
 
 
 @dataclass(frozen=True)
@@ -131,7 +127,7 @@ def _by_comparison(
     prepared: InitialValueProblem, found: ExactError, law: float, seconds: float, margins: Margins
 ) -> Estimate:
     """Estimate from the errors found, with a margin for the times between the samples compared."""
-    bits, label = _LAST_BITS * float(prepared.precision.epsilon), label_rounding(prepared, seconds)
+    bits, label = LAST_BITS * float(prepared.precision.epsilon), label_rounding(prepared, seconds)
     rate = float(prepared.system.rate_bound)
     extent, speed = _size(prepared.scene.position), _size(prepared.scene.velocity)
 
@@ -155,7 +151,7 @@ def _by_comparison(
 def label_rounding(prepared: InitialValueProblem, seconds: float) -> float:
     """Rounding error of sample times, s."""
     late = max(abs(float(prepared.scene.start)), abs(float(prepared.scene.start) + seconds))
-    return _LABEL * float(prepared.precision.epsilon) * late
+    return LABEL * float(prepared.precision.epsilon) * late
 
 
 def _size(vector: object) -> float:
@@ -190,15 +186,15 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
         further = (moved if name in ("position", "velocity") else turned) * followed.more.get(name, 1.0)
         found = float(max(getattr(spread, name))) * level * margins.safety * further
         known = spread.whole and math.isfinite(found)
-        return float(min(found + _LAST_BITS * level * size + label * pace, most)) if known else most
+        return float(min(found + LAST_BITS * level * size + label * pace, most)) if known else most
 
     lead = at_end("attitude" if carried else "rates", 1.0, sys.float_info.max, rate)
     law = round_off_law(level, steps, float(system.rate_bound), duration)
     amplification = lead / law if law > 0 else 1.0
     growth, horizon = exponential_growth(times, errors, exponent, margins.power, margins.exponential)
     scaling, size, speed = system.scaling, spread.extent, spread.fastest
-    place = margins.path * at_end("position", size, _AS_LARGE * size, speed)
-    pace = margins.path * at_end("velocity", speed, _AS_LARGE * speed)
+    place = margins.path * at_end("position", size, AS_LARGE * size, speed)
+    pace = margins.path * at_end("velocity", speed, AS_LARGE * speed)
     return Estimate(
         attitude=min(lead, math.pi) if carried else None,
         rates=at_end("rates", 1.0, 2.0),

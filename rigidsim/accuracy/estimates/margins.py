@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from rigidsim.scene.records import dataclass
 
+LAST_BITS = 0.5
+"""Epsilons by which a recorded value is wrong at most because it is rounded."""
+LABEL = 0.25
+"""Epsilons by which a sample's time is taken to be rounded: what is recorded belongs to another moment."""
+AS_LARGE = 4.0
+"""Bound for the error of a position that can't be predicted, over the size of the path: the whole way."""
+
 
 @dataclass(frozen=True)
 class Margins:

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigidsim.accuracy.estimates.growth import UNCERTAIN
-from rigidsim.accuracy.estimates.margins import MARGINS, Margins
+from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.neighbour_lanes import NeighbourLanes
@@ -26,8 +26,8 @@ from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.neighbours.pushed import Pushes
 
 LOOSE = 1e-8
-"""Tolerance of the lanes, as of single runs. At 1e-6, whose steps cost half, errors beside a separatrix were
-announced ten times larger.
+"""Tolerance of the lanes. At 1e-6, whose steps cost half, errors beside a separatrix were announced ten times
+larger; single runs use it, since they can compare with states of their own.
 """
 _DRIFTED = 1e-2
 """Tolerance times growth from which a motion followed so loosely becomes a different one."""
@@ -36,9 +36,6 @@ _BY_CHANCE = 8.0
 _TIGHTER = 2.0**-10
 """Factor on the tolerance of a run that counts as exact, as far as errors of the tolerance go."""
 _MORE_STEPS = 4
-_LAST_BITS = 0.5  # of a recorded value, rounded
-_LABEL = 0.25  # of a sample's time, rounded
-_AS_LARGE = 4.0  # the whole way: bound for a position that can't be predicted
 
 
 @dataclass(frozen=True)
@@ -113,7 +110,7 @@ class MemberEstimates:
         by_chance = self._by_chance
         spreads = self._followed(starts) if by_chance else self._compared(block, some, starts)
         level = float(self._prepared.precision.epsilon)
-        label = _LABEL * level * np.maximum(abs(begin_seconds), np.abs(seconds))
+        label = LABEL * level * np.maximum(abs(begin_seconds), np.abs(seconds))
         pace = numbers.doubles(self._system.rate_bound)[places]
         margin = level * (self._margins.safety if by_chance else self._margins.compared)
         with np.errstate(over="ignore"):
@@ -122,14 +119,14 @@ class MemberEstimates:
                 whole = spreads.whole & np.isfinite(spread)
                 return np.where(whole, np.minimum(margin * spread + size, most), most)
 
-            last = _LAST_BITS * level
+            last = LAST_BITS * level
             attitude = at_end(spreads.attitude, last + label * pace, math.pi)
             rates = at_end(spreads.rates, last, 2.0)
             extent, fastest = spreads.extent, spreads.fastest
             moved = last * extent + np.ldexp(label, -units) * fastest
             path = self._margins.path if by_chance else 1.0
-            position = path * at_end(spreads.position, moved, _AS_LARGE * extent)
-            velocity = path * at_end(spreads.velocity, last * fastest, _AS_LARGE * fastest)
+            position = path * at_end(spreads.position, moved, AS_LARGE * extent)
+            velocity = path * at_end(spreads.velocity, last * fastest, AS_LARGE * fastest)
         length, speed = (numbers.whole_numbers(e)[places] for e in (scaling.length, scaling.speed))
         return np.array([attitude, rates, np.ldexp(position, length), np.ldexp(velocity, speed)])
 
