@@ -258,6 +258,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error(f"--rows: {', '.join(unknown)}: allowed are {', '.join(known)}")
     if arguments.into is not None:
         replaced(arguments.into.read_text(), "")  # before anything is measured
+    if arguments.scratch is not None:
+        arguments.scratch.mkdir(parents=True, exist_ok=True)
     measured: list[Result] = []
     for row in rows(quick=arguments.quick):
         if row.key in wanted:
