@@ -626,7 +626,7 @@ def test_the_summary_fits_eighty_columns(tables: dict[str, str], config: Config)
         assert f"{row['final_drift']:.2e}" in line
     text = " ".join(" ".join(lines).split())
     for row in summary["invariants"].values():
-        scale = "nothing, being 1 or 0 by definition" if row["scale_name"] == "1" else row["scale_name"]
+        scale = "absolute" if row["scale_name"] == "1" else row["scale_name"]
         assert f"{scale} (" in text
     assert "folder   runs/[bold]free" in lines  # a path is no markup
 

@@ -43,7 +43,7 @@ def _scales(invariants: dict[str, InvariantDrift]) -> str:
     names: dict[str, list[str]] = {}
     for name, row in invariants.items():
         names.setdefault(row.scale_name, []).append(name)
-    words = {"1": "nothing, being 1 or 0 by definition"}  # norms, and what vanishes for a rotation
+    words = {"1": "absolute"}  # norms, and what vanishes for a rotation
     return "; ".join(f"{words.get(scale, scale)} ({', '.join(of)})" for scale, of in names.items())
 
 
