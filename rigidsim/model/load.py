@@ -42,7 +42,7 @@ class Load(SceneLoad):
         masses_beside: whether its source is one of the point masses besides the body.
         has_source: whether the direction to its source is known, from which nadir, roll and libration count.
         gradient_alone: whether it is just the gravity gradient of a distant body; ``gradient_source`` tells
-            where that body is, unless it moves beside this one.
+            where that body is, if this one is at a known place.
         attracting_point: centre (mpf, m, space axes) to which its force always points, or None.
         without_plane: why its source has an orbit, but no known ``plane``.
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
@@ -49,6 +50,10 @@ class PointMasses:
         if self.full and self.host is not None and mass is not None:
             return self.strengths[self.host] / mass
         return context.mpf(GRAVITATIONAL_CONSTANT)
+
+    def moved(self, positions: tuple[Vector, ...], velocities: tuple[Vector, ...]) -> PointMasses:
+        """The same masses elsewhere."""
+        return replace(self, positions=positions, velocities=velocities)
 
     def encounter(self, context: Any, one: int, other: int) -> tuple[Any, Any]:
         """See ``closest``, for two of the masses."""

@@ -108,6 +108,10 @@ class SceneLoad:
             ConfigError: says what to do instead.
         """
 
+    def among(self, masses: PointMasses) -> SceneLoad:
+        """The load where the point masses are elsewhere: itself, unless its source is one of them."""
+        return self
+
     def pictured(self) -> dict[str, Any] | None:
         """The load's depiction as plain JSON values (see ``rigidsim.look.surroundings``); None if it isn't
         drawn.

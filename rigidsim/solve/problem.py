@@ -139,7 +139,8 @@ def prepare_scene(
             what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'
             raise ConfigError(Problem("[model] level", what))
         system = build_system(scene, precision.number, loads)
-        if system.plan.average is not None and asked == "auto" and tolerance is None:
+        averaged = system.plan.average is not None and scene.bodies is None  # orbits need all digits
+        if averaged and asked == "auto" and tolerance is None:
             step_control = _auto_of_averages(precision)
         _refuse_spectrum(system)
         _refuse_spectrum_by_table(system)

@@ -84,6 +84,8 @@ def side_by_side(
     exponent = prepared.system.scaling.momentum
     count = _sample_count(average, end - begin)
     scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
+    if begin != float(prepared.scene.start):
+        scene = _with_bodies(scene, prepared, states)
     back = average.resonance is None  # whether what averaging removed can be added back
     names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
     full = _followed(prepared, scene, FULL, True, names, go_on)
@@ -155,6 +157,20 @@ def _starting(
         turn = [context.zero, *cross(before, other)]
     quaternion = attitude.product(attitude.unit_quaternion(context, turn), list(scene.quaternion))
     return replace(moved, quaternion=attitude.unit_quaternion(context, quaternion), euler_angles=None)
+
+
+def _with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[Any]) -> Scene:
+    """The scene with its point masses where the averaged motion's states have them."""
+    if scene.bodies is None:
+        return scene
+    system, context = prepared.system, scene.context
+    names, exponents = system.states, system.state_exponents
+    held = {n: context.ldexp(x, e) for n, x, e in zip(names, states, exponents, strict=True)}
+    masses = scene.bodies.moved(
+        tuple([held[f"{name}_{x}"] for x in "xyz"] for name in scene.bodies.names),
+        tuple([held[f"{name}_v{x}"] for x in "xyz"] for name in scene.bodies.names),
+    )
+    return replace(scene, bodies=masses, loads=tuple(load.among(masses) for load in scene.loads))
 
 
 class _AsDoubles(SampleReceiver):

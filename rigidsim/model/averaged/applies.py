@@ -9,6 +9,7 @@ momentum by U / (L nu) elsewhere.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -37,6 +38,10 @@ of second order in it, and beyond it a percent of the precession would be the be
 """
 _ASKS = re.compile(": (leave it out|set it to false|remove them)$")
 _WEAK = 1e-7  # of the largest harmonic
+PASSING = -math.log(_WEAK)
+"""Least ratio of the body's frequencies to the angular rate of a source that passes by: its torque has less
+than a weak harmonic's part at them.
+"""
 
 
 def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
@@ -55,7 +60,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     elif max(scene.body.principal_moments) == min(scene.body.principal_moments):
         against = "no gradient has a torque on a body whose moments are all the same"
     elif strange := [load.title for load in loads if load.gradient_source is None]:
-        against = f"{strange[0]} is no gravity gradient of a source with elements, a place or an ephemeris"
+        against = f"{strange[0]} is no gravity gradient of a source with elements, a place or an ephemeris, "
+        against += "nor of one of [[bodies]]"
     elif all(w == 0 for w in scene.angular_velocity):
         against = "the body starts at rest"
     elif integrator.formulation != "auto":
@@ -72,8 +78,16 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "[[events]] read the full state: remove them"
     elif config.output.lyapunov:
         against = "[output] lyapunov is of the full motion: set it to false"
+    elif scene.bodies is not None and scene.bodies.full:
+        against = 'coupling = "full" makes the bodies feel every rotation of this one'
+        raise _refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
     elif level == ORBIT_AVERAGED:
         sources = [load.gradient_source for load in loads]
+        if beside := [source.pair.name for source in sources if source is not None and source.pair]:
+            against = f'the orbit of the point mass "{beside[0]}" is integrated, so that there is no '
+            against += "ellipse to average over"
+            remedy = 'choose "spin_averaged", or write the elements of the orbit into a table '
+            raise _refused(level, against, remedy + '(orbit = {table = "elements.csv"})')
         if any(source is not None and source.ephemeris for source in sources):
             against = "the source of an ephemeris has no elements to average over"
             raise _refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
@@ -90,6 +104,8 @@ def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[S
     Raises:
         ConfigError: names a resonance that no average can keep, or what is too fast.
     """
+    for source in sources:
+        _refuse_passing(scene, spectrum, source)
     found = [_refuse_resonance(scene, spectrum, source) for source in sources]
     kept = [resonance for resonance in found if resonance is not None]
     if len(kept) > 1:
@@ -107,6 +123,18 @@ def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[S
         for source in sources:
             _refuse_slow_orbit(scene, spectrum, source)
     return kept[0] if kept else None
+
+
+def told_of_resonances(sources: Sequence[Source]) -> str:
+    """How resonances with point masses were looked for; empty without point masses."""
+    bound = [source.pair.name for source in sources if source.pair and source.motion > 0]
+    passing = [source.pair.name for source in sources if source.pair and source.motion == 0]
+    told = []
+    if bound:
+        told.append(f"with the osculating orbits of the start for {', '.join(bound)}")
+    if passing:
+        told.append(f"not for {', '.join(passing)}, not bound to the body and slower than all of its rates")
+    return f"; resonances were looked for {', '.join(told)}" if told else ""
 
 
 def separatrix_refused(level: str) -> ConfigError:
@@ -144,7 +172,7 @@ def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> R
     width = 2 * np.sqrt((np.abs(i) + np.abs(j))[:, None] ** 2 * energy / least)
     rate = np.abs(np.abs(body[:, None]) - k[None, :] * source.motion)
     swing = energy / (float(spectrum.motion.momentum) * np.maximum(rate, 1e-300))
-    slow = LIBRATION * width + 2 * source.slow_rate
+    slow = LIBRATION * width + 2 * source.slow_rate + 2 * source.uncertainty * k[None, :]
     kept = _offered(scene, spectrum, source)
     own = np.zeros(rate.shape, dtype=bool)
     if kept is not None:
@@ -166,12 +194,33 @@ def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> R
         raise _refused(
             scene.config.model.level,
             f"{_combination(spectrum, at, float(body[worst[0]]))} of the body's precession g and wobble l "
-            f"and of the mean motion n of [[loads]] number {source.number} is only "
+            f"and of the mean motion n of [[loads]] {source.name} is only "
             f"{float(rate[worst]):.3g} rad/s, once in {_period(float(rate[worst]))}, where its angle "
             f"librates within {float(width[worst]):.3g} rad/s: a resonance, which no average may pass over",
             remedy,
         )
     return kept if met else None
+
+
+def _refuse_passing(scene: Scene, spectrum: BodySpectrum, source: Source) -> None:
+    """Refuse a point mass that passes by so fast that it sees single rotations.
+
+    The torque of a source that passes at the angular rate w has a continuous spectrum that falls like
+    exp(-nu / w), since its singularities in complex time are within 1 / w of the real axis.
+    """
+    if source.osculating is None or source.motion > 0:
+        return
+    sizes = np.abs(spectrum.harmonics)
+    seen = spectrum.oscillating & (sizes > _WEAK * max(float(x) for x in spectrum.motion.moments))
+    rates = np.append(np.abs(spectrum.frequencies[seen]), abs(spectrum.rates[0]))
+    most = PASSING * source.osculating.passing_rate
+    if rates.min() < most:
+        raise _refused(
+            scene.config.model.level,
+            f"the point mass of [[loads]] {source.name} isn't bound to the body and passes it, by their "
+            f"motion at the start, at {source.osculating.passing_rate:.3g} rad/s, which the body's slowest "
+            f"frequency, {rates.min():.3g} rad/s, has to exceed by a factor of {PASSING:.0f}",
+        )
 
 
 def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance | None:
@@ -212,7 +261,7 @@ def _refuse_forced(scene: Scene, spectrum: BodySpectrum, source: Source) -> None
     if forced[most] > SWING:
         raise _refused(
             scene.config.model.level,
-            f"the torque of [[loads]] number {source.number} bends the rotation by {forced[most]:.2g} rad, "
+            f"the torque of [[loads]] {source.name} bends the rotation by {forced[most]:.2g} rad, "
             f"since the body precesses freely at {g:.3g} rad/s and the source goes round at "
             f"{source.motion:.3g} rad/s; up to {SWING} rad is allowed",
         )

@@ -49,8 +49,13 @@ TOLD = (
     "declination",
     "obliquity",
     "node_longitude",
+    "point_mass_position",
+    "point_mass_velocity",
+    "orbital_energy",
+    "orbital_angular_momentum",
+    "orbital_linear_momentum",
 )
-"""Observables that an averaged motion can provide."""
+"""Observables that an averaged motion can provide, as far as the scene has them."""
 
 
 @dataclass(frozen=True)

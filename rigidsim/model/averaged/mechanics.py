@@ -12,6 +12,7 @@ from rigidsim.model.averaged.orbit_terms import Ellipse, nutation, second_order
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.sources_seen import SourcesSeen
 from rigidsim.model.load import Load, Term
+from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, dot
@@ -117,6 +118,8 @@ class AveragedMechanics(SourcesSeen):
         orbit = source.orbit
         if orbit is not None:
             return self._pull_in_plane(source, orbit, s)
+        if source.pair is not None:
+            return self._pull_of_mass(source, source.pair, s)
         direction, inverse = self._seen(source)
         factor = self._strength(source) * dot(direction, s)
         if inverse is not None:
@@ -141,6 +144,17 @@ class AveragedMechanics(SourcesSeen):
         along, up = factor * x, factor * y
         level = tilt_c * up
         return [node_c * along - node_s * level, node_s * along + node_c * level, tilt_s * up]
+
+    def _pull_of_mass(self, source: Source, pair: PointMassPair, s: list[Symbolic]) -> list[Symbolic]:
+        """The same pull of a point mass beside the body, k a^3 (s . x) x / |x|^5."""
+        context, scaling = self.scene.context, self.scaling
+        states = self.carried(self.point_masses)
+        ends = min(pair.host, pair.number), max(pair.host, pair.number)  # either direction will do
+        place, inverse = states.between(*ends), states.inverse_distances[ends]
+        rate = self.of.rate(source) * source.of.distance(context) ** 3
+        size = as_factor(self.number(context.ldexp(rate, scaling.time - 3 * scaling.length)))
+        factor = size * (dot(place, s) * (inverse * inverse * inverse * (inverse * inverse)))
+        return [factor * x for x in place]
 
     def _offset(self, s: list[Symbolic], turning: list[Symbolic]) -> list[Symbolic]:
         """Offset of the circled axis from the momentum, rad; ``turning`` is s' per internal unit of time."""

@@ -1,4 +1,6 @@
-"""Sources of averaged torques: on Kepler or tabulated orbits, at fixed positions, or from an ephemeris."""
+"""Sources of averaged torques: on Kepler or tabulated orbits, at fixed positions, from an ephemeris, or point
+masses beside the body.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +20,7 @@ from rigidsim.model.averaged.orbit_terms import (
 from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.load import Load
+from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
@@ -26,8 +29,40 @@ from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _DAY = 86400.0
+_ALMOST_PARABOLIC = 0.99  # a larger eccentricity's harmonics, of which a few thousand are told, hardly differ
 _SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
 """Sidereal period (days) and eccentricity, used to judge whether averages over the Earth's spin apply."""
+
+
+@dataclass(frozen=True)
+class Osculating:
+    """Motion of a point mass as seen from the body, from the osculating orbit of the start.
+
+    Attributes:
+        motion: mean motion, rad/s; 0 if it isn't bound to the body.
+        eccentricity: 0 if it isn't.
+        perturbed: accelerations of the relative motion by the other masses over the mutual one.
+        nearest: (a/r)^3 at the closest approach.
+        passing_rate: angular rate there, rad/s.
+    """
+
+    motion: float
+    eccentricity: float
+    perturbed: float
+    nearest: float
+    passing_rate: float
+
+    @classmethod
+    def of(cls, context: Any, pair: PointMassPair) -> Osculating:
+        """That of a pair at the start."""
+        least, rate = pair.encounter(context)
+        perturbed = pair.perturbation(context)
+        if (axis := pair.semi_major_axis(context)) is None:
+            return cls(0.0, 0.0, perturbed, 1.0, float(rate))
+        # what the others do to axis and eccentricity is of the size of their share in the acceleration
+        closer = float(least / axis) * max(1 - 2 * perturbed, 0.5)
+        e = min(pair.eccentricity(context) + 2 * perturbed, _ALMOST_PARABOLIC)
+        return cls(pair.mean_motion(context), e, perturbed, closer**-3, float(rate))
 
 
 @dataclass(frozen=True)
@@ -37,12 +72,14 @@ class Source:
     Attributes:
         number: position of its ``[[loads]]`` table, from 1.
         of: its orbit, table, position or ephemeris.
-        strength: 3 G M / a^3 (mpf, 1/s^2), a being the semi-major axis or the (mean) distance.
+        strength: 3 G M / a^3 (mpf, 1/s^2), a being ``GradientSource.distance``.
+        osculating: how a point mass moves against the body; None for any other source.
     """
 
     number: int
     of: GradientSource
     strength: Any
+    osculating: Osculating | None = None
 
     @property
     def orbit(self) -> KeplerOrbit | None:
@@ -55,13 +92,25 @@ class Source:
         return self.of.table
 
     @property
+    def pair(self) -> PointMassPair | None:
+        """Point mass that the source is, and the one that the body is, or None."""
+        return self.of.pair
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"number {self.number}" if self.pair is None else f'number {self.number} ("{self.pair.name}")'
+
+    @property
     def has_elements(self) -> bool:
         """Whether the source has an orbit to average over."""
         return self.orbit is not None or self.table is not None
 
     @property
     def motion(self) -> float:
-        """Mean motion, rad/s; 0 for a source at rest."""
+        """Mean motion, rad/s; 0 for a source at rest, or a point mass that passes by."""
+        if self.osculating is not None:
+            return self.osculating.motion
         if self.of.ephemeris is not None:
             return 2 * math.pi / (_SERIES[self.of.ephemeris][0] * _DAY)
         if self.table is not None:
@@ -71,6 +120,8 @@ class Source:
     @property
     def eccentricity(self) -> float:
         """Eccentricity of the source's orbit, the largest in a table; 0 for a source at rest."""
+        if self.osculating is not None:
+            return self.osculating.eccentricity
         if self.of.ephemeris is not None:
             return _SERIES[self.of.ephemeris][1]
         if self.table is not None:
@@ -79,12 +130,21 @@ class Source:
 
     @property
     def slow_rate(self) -> float:
-        """Bound of the rate of node and periapsis together, rad/s."""
+        """Bound of the rate of node and periapsis together, rad/s; an estimate for a point mass."""
+        if self.osculating is not None:
+            return self.uncertainty
         if self.table is not None:
             return float(self.table.normal_drift + self.table.shape_drift)
         if self.orbit is None:
             return 0.0
         return abs(float(self.orbit.node_rate)) + abs(float(self.orbit.periapsis_rate))
+
+    @property
+    def uncertainty(self) -> float:
+        """By how much the mean motion may be another than ``motion``, rad/s: that of a point mass is taken
+        from its osculating orbit.
+        """
+        return 0.0 if self.osculating is None else self.osculating.perturbed * self.osculating.motion
 
     @property
     def harmonics(self) -> np.ndarray:
@@ -94,6 +154,8 @@ class Source:
     @property
     def nearest(self) -> float:
         """(a/r)^3 at the closest approach."""
+        if self.osculating is not None:
+            return self.osculating.nearest
         if self.table is not None:
             return float(self.table.semi_major_axis / self.table.pericentre) ** 3
         return float((1 - self.eccentricity) ** -3)
@@ -161,7 +223,13 @@ class Source:
         return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *turned(axes, turn))
 
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
-        """(a/r)^3 r r^T, (3, 3), at a time; None if only an ephemeris gives it."""
+        """(a/r)^3 r r^T, (3, 3), at a time, the start for a point mass; None if only an ephemeris gives
+        it.
+        """
+        if self.pair is not None:
+            length = norm(context, self.pair.place)
+            direction = np.array([float(x / length) for x in self.pair.place])
+            return np.outer(direction, direction) * float(self.of.distance(context) / length) ** 3
         if self.of.position is not None:
             length = norm(context, self.of.position)
             direction = np.array([float(x / length) for x in self.of.position])
@@ -185,7 +253,8 @@ def sources_of(scene: Scene, loads: Sequence[Load]) -> list[Source]:
         source = load.gradient_source
         if source is not None:
             strength = 3 * source.gravitational_parameter / source.distance(context) ** 3
-            found.append(Source(number, source, strength))
+            seen = None if source.pair is None else Osculating.of(context, source.pair)
+            found.append(Source(number, source, strength, seen))
     return found
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.averaged.applies import told_of_resonances
 from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
 from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
@@ -58,7 +59,8 @@ def _resonant_states(
     )
     why += "over rotation and orbits"
     exponents = [0] * 4 + [scaling.momentum]
-    return m, [StateBlock(SLOW, m.slow_derivatives, initial, exponents=exponents, why=why)]
+    slow = StateBlock(SLOW, m.slow_derivatives, initial, exponents=exponents, why=why)
+    return m, [slow, *_point_masses(m)]
 
 
 def refuse_untold(average: Average, record: Sequence[str] | None) -> None:
@@ -113,10 +115,16 @@ def averaged_states(
         scene, scaling, numbers, s, attitude, None, None, None, number, orbit_tags, tables=tables,
         loads=list(loads), average=average,
     )  # fmt: skip
-    blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=WHY[average.level])]
+    why = WHY[average.level] + told_of_resonances(average.sources)
+    blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=why)]
     for orbit in tables:
         what = "elements of" if average.over_orbits else "where"
         which = "the source's orbit" if average.over_orbits else "the source is"
         block = m.table_block(orbit)
         blocks.append(replace(block, why=f'gravity_gradient: {what} {which}, by "{orbit.name}"'))
-    return m, blocks
+    return m, blocks + _point_masses(m)
+
+
+def _point_masses(m: AveragedMechanics) -> list[StateBlock]:
+    states = m.point_masses
+    return [] if states is None else [states.block()]

@@ -9,16 +9,19 @@ without the first term if the body itself is one of the point masses, whose mutu
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import gradient_terms, tidal_range
+from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.orbit_planes import OrbitPlane
+from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
@@ -55,6 +58,13 @@ class MovingSource(Load):
         return not self.pulls
 
     @property
+    def gradient_source(self) -> GradientSource | None:  # type: ignore[override]
+        """The mass as the source of a gradient alone; None for a body that flies by itself."""
+        if self.masses.host is None:
+            return None
+        return GradientSource(self.strength, pair=PointMassPair(self.masses, self.number))
+
+    @property
     def described(self) -> str:  # type: ignore[override]
         """See ``SceneLoad``."""
         return f"a {self.title} load"
@@ -85,6 +95,10 @@ class MovingSource(Load):
         if not self.pulls and self.masses.host is None and self.masses.full:
             what = 'given "gravity_gradient" for a body that flies by itself under coupling = "full"; give '
             raise ConfigError(Problem(where, what + '"central_gravity", whose force the bodies feel'))
+
+    def among(self, masses: PointMasses) -> MovingSource:
+        """See ``SceneLoad``."""
+        return replace(self, masses=masses)
 
     # --- equations ---------------------------------------------------------------------------------------
 

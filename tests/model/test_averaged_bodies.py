@@ -1,0 +1,197 @@
+"""Averages over the rotation under point masses that are integrated beside the body."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from support import run_text
+
+import rigidsim
+from rigidsim.accuracy.models import modelling
+from rigidsim.errors import ConfigError
+from rigidsim.model.averaged.sources import Osculating
+from rigidsim.model.orbits.point_mass_pair import PointMassPair
+from rigidsim.scene.config import parse
+from rigidsim.scene.scene import build_scene
+from rigidsim.solve.problem import prepare
+
+AU, SUN, EARTH, MOON = 149597870700.0, 1.32712440018e20, 3.986004418e14, 4.9028e12
+DAY = 86400.0
+SPIN = 3600.0  # deg a day
+SCENE = """
+name = "planet"
+[body]
+principal_moments = ["8.010e37 kg m^2", "8.012e37 kg m^2", "8.0365e37 kg m^2"]
+mass = "5.97219e24 kg"
+%s
+[initial]
+euler_angles = [0, "23.44 deg", 0]
+angular_velocity = [0, 0, "%s deg/day"]
+%s
+[time]
+end = "60 day"
+samples = 31
+[model]
+level = "%s"
+[output]
+record = ["momentum_axis", "point_mass_position", "orbital_energy"]
+"""
+SUN_AND_EARTH = f"""
+[[bodies]]
+name = "sun"
+gravitational_parameter = {SUN!r}
+[[bodies]]
+name = "earth"
+gravitational_parameter = {EARTH!r}
+orbit = {{about = "sun", semi_major_axis = "1 au", eccentricity = 0.3, inclination = "7 deg"}}
+"""
+THE_MOON = f"""
+[[bodies]]
+name = "moon"
+gravitational_parameter = {MOON!r}
+orbit = {{about = "earth", semi_major_axis = "384400 km", eccentricity = 0.0549, inclination = "5.145 deg"}}
+"""
+PASSING = """
+[[bodies]]
+name = "passing"
+gravitational_parameter = 4e14
+position = [1.6e11, 1e10, 0]
+velocity = [0, "-40 km/s", 0]
+"""
+
+
+def gradient(name: str) -> str:
+    return f'[[loads]]\nkind = "gravity_gradient"\norbit = {{body = "{name}"}}\n'
+
+
+def scene(
+    level: str, *names: str, spin: float = SPIN, coupling: str = "one_way", beside: str = THE_MOON
+) -> str:
+    masses = SUN_AND_EARTH + beside + "".join(gradient(name) for name in names or ("sun", "moon"))
+    return SCENE % (f'host = "earth"\ncoupling = "{coupling}"', spin, masses, level)
+
+
+@pytest.fixture(scope="module")
+def full() -> rigidsim.Run:
+    return run_text(scene("full"))
+
+
+@pytest.fixture(scope="module")
+def averaged() -> rigidsim.Run:
+    return run_text(scene("spin_averaged"), estimate=True)
+
+
+def apart(one: rigidsim.Run, other: rigidsim.Run, name: str = "momentum_axis") -> float:
+    return float(np.abs(one.dataset[name].values - other.dataset[name].values).max())
+
+
+def nodding() -> float:
+    """Rate of the momentum's direction that the Moon and the Sun can drive, over the spin."""
+    shape = 1 - 8.011 / 8.0365
+    spin = math.radians(SPIN) / DAY
+    drive = 3 * shape / spin * (SUN / (0.7 * AU) ** 3 + MOON / (0.92 * 384.4e6) ** 3)
+    return drive / spin
+
+
+def test_the_momentum_is_that_of_every_rotation(full: rigidsim.Run, averaged: rigidsim.Run) -> None:
+    moved = full.dataset.momentum_axis.values
+    path = float(np.linalg.norm(moved - moved[0], axis=1).max())
+    assert path > 1e-6
+    # what goes round with the rotation, to first order subtracted at the start: nodding, and of its second
+    # order along the path
+    assert apart(full, averaged) < nodding() + 10 * nodding() * path
+    assert averaged.summary["cost"]["steps"] * 20 < full.summary["cost"]["steps"]
+
+
+def test_the_orbits_are_the_same_states(full: rigidsim.Run, averaged: rigidsim.Run) -> None:
+    places = full.dataset.point_mass_position.values
+    # both round positions of an astronomical unit at each of their steps; velocities carry it on
+    steps = full.summary["cost"]["steps"]
+    assert apart(full, averaged, "point_mass_position") < 2.0**-52 * np.abs(places).max() * 8 * math.sqrt(
+        steps
+    )
+    for name in ("energy", "angular_momentum", "linear_momentum"):
+        invariant = averaged.summary["invariants"][f"orbital_{name}"]
+        assert invariant["largest_drift"] < invariant["bound"]
+
+
+def test_the_announced_error_covers_the_true_one(full: rigidsim.Run, averaged: rigidsim.Run) -> None:
+    found = averaged.summary["modelling"]
+    assert found["whole"]
+    true = np.linalg.norm(
+        full.dataset.momentum_axis.values - averaged.dataset.momentum_axis.values, axis=1
+    ).max()
+    assert true <= found["momentum_axis"] <= 10 * true
+
+
+def test_windows_start_where_the_bodies_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The Moon goes round in 27 days: a window that began with it elsewhere would err by its precession."""
+    monkeypatch.setattr(modelling, "_ORBITS", 0.02)
+    monkeypatch.setattr(modelling, "_FEWEST_ORBITS", 0.01)
+    monkeypatch.setattr(modelling, "_LEAST_ROTATIONS", 0)
+    run = run_text(scene("spin_averaged"), estimate=True)
+    found = run.summary["modelling"]
+    assert not found["whole"]
+    assert [window["start"] / DAY for window in found["windows"]] == pytest.approx([0, 30, 54], abs=4)
+    assert all(window["momentum_axis"] < 2 * nodding() for window in found["windows"])
+
+
+def test_two_masses_are_a_kepler_orbit() -> None:
+    """The Sun as the planet sees it: the same average by elements."""
+    run = run_text(scene("spin_averaged", "sun", beside=""))
+    period = 2 * math.pi * math.sqrt(AU**3 / (SUN + EARTH))
+    orbit = (
+        f'{{semi_major_axis = "1 au", eccentricity = 0.3, inclination = "7 deg", periapsis = {math.pi!r}, '
+    )
+    orbit += f"period = {period!r}}}"
+    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = {SUN!r}\norbit = {orbit}\n'
+    axes = 'output.record=["momentum_axis"]'
+    kepler = run_text(SCENE % ("", SPIN, load, "spin_averaged"), axes)
+    path = np.linalg.norm(run.dataset.momentum_axis.values[-1] - run.dataset.momentum_axis.values[0])
+    assert path > 5e-7
+    assert apart(run, kepler) < 2.0**-42  # the tolerance of averaged motions on Kepler orbits, 1024 epsilon
+
+
+def test_the_osculating_orbit_of_a_pair() -> None:
+    """Against the elements that the masses were placed by, and the Sun's tide on the Moon."""
+    made = build_scene(parse(scene("spin_averaged")))
+    assert made.bodies is not None
+    seen = [Osculating.of(made.context, PointMassPair(made.bodies, n)) for n in (0, 2)]
+    assert seen[0].motion == pytest.approx(math.sqrt((SUN + EARTH) / AU**3), rel=1e-12)
+    assert seen[1].motion == pytest.approx(math.sqrt((EARTH + MOON) / 384.4e6**3), rel=1e-12)
+    # at both pericentres, the Moon between Sun and Earth or beyond: the tide is 2 G M d / R^3
+    ratio = 2 * SUN * (0.9451 * 384.4e6) ** 3 / ((EARTH + MOON) * (0.7 * AU) ** 3)
+    assert seen[1].perturbed == pytest.approx(ratio, rel=0.05)
+    assert seen[1].eccentricity == pytest.approx(0.0549 + 2 * ratio, rel=0.05)
+    passing = build_scene(parse(scene("spin_averaged", "passing", beside=PASSING)))
+    assert passing.bodies is not None
+    assert Osculating.of(passing.context, PointMassPair(passing.bodies, 2)).motion == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            scene("orbit_averaged"),
+            'orbit of the point mass "sun" is integrated.*choose "spin_averaged", or wr',
+        ),
+        (
+            scene("spin_averaged", coupling="full"),
+            r'set \[body\] coupling to "one_way", or choose level = "f',
+        ),
+        (scene("spin_averaged", spin=13.176), r'n of \[\[loads\]\] number 2 \("moon"\).*a resonance'),
+        (scene("spin_averaged", "passing", beside=PASSING, spin=0.01), "isn't bound to the body and passes"),
+    ],
+    ids=["orbit_averaged", "full coupling", "resonance", "a slow body passed by"],
+)
+def test_what_has_no_average_is_refused(text: str, said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        prepare(parse(text))
+
+
+def test_the_plan_says_how_resonances_were_looked_for() -> None:
+    system = prepare(parse(scene("spin_averaged", "sun", "passing", beside=PASSING))).system
+    why = dict(system.reasons)["sx sy sz"]
+    assert "with the osculating orbits of the start for sun, not for passing, not bound" in why
