@@ -109,9 +109,8 @@ def test_the_orbits_are_the_same_states(full: rigidsim.Run, averaged: rigidsim.R
     places = full.dataset.point_mass_position.values
     # both round positions of an astronomical unit at each of their steps; velocities carry it on
     steps = full.summary["cost"]["steps"]
-    assert apart(full, averaged, "point_mass_position") < 2.0**-52 * np.abs(places).max() * 8 * math.sqrt(
-        steps
-    )
+    rounding = 2.0**-52 * np.abs(places).max() * 8 * math.sqrt(steps)
+    assert apart(full, averaged, "point_mass_position") < rounding
     for name in ("energy", "angular_momentum", "linear_momentum"):
         invariant = averaged.summary["invariants"][f"orbital_{name}"]
         assert invariant["largest_drift"] < invariant["bound"]
