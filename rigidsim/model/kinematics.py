@@ -5,7 +5,7 @@ One object serves all of them, in internal units; what a scene doesn't carry is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -17,7 +17,7 @@ from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
 from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.table_states import TablePlace, table_states
-from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply
+from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, transpose
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector, dot, negligible
@@ -62,6 +62,7 @@ class Kinematics:
     _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
         default_factory=dict, init=False, repr=False
     )
+    _seen_vectors: list[list[Symbolic]] = field(default_factory=list, init=False, repr=False)
 
     @cached_property
     def sides(self) -> Mapping[Node, Symbolic]:
@@ -101,6 +102,17 @@ class Kinematics:
         """Rotation matrix R, body to space axes."""
         assert self.attitude is not None
         return self.attitude.matrix
+
+    def seen(self, space: list[Symbolic]) -> list[Symbolic]:
+        """A vector of space axes that doesn't depend on how the body turns, in body axes."""
+        found = apply(transpose(self.matrix), space)
+        self._seen_vectors.append(found)
+        return found
+
+    @property
+    def seen_so_far(self) -> Sequence[list[Symbolic]]:
+        """Results of ``seen``; some may be there several times."""
+        return self._seen_vectors
 
     @cached_property
     def rotational_energy(self) -> Symbolic:

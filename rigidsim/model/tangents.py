@@ -79,26 +79,89 @@ def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
     # what the offset doesn't reach is constant for it: an orbit's position, numbers that differ between
     # members
     places = [n for n, name in enumerate(whole.names) if name in moving]
-    others = sorted({name for n in places for name in reads[whole.names[n]]} - moving)
-    constants = {hy.make_vars(name): hy.par[n] for n, name in enumerate(others)}
-    rights = [whole.derivatives[n] for n in places]
-    rights = hy.subs(rights, constants) if constants else rights
-    # the derivative by one initial value obeys the equations that any tangent vector does
-    equations = [(variables[n], right) for n, right in zip(places, rights, strict=True)]
-    varied = hy.var_ode_sys(equations, [variables[whole.names.index(own[0])]]).sys[len(places) :]
     names = [whole.names[n] for n in places]
-    to: dict[Symbolic, Symbolic] = {
-        old: hy.make_vars(TANGENT + name) for (old, _), name in zip(varied, names, strict=True)
-    }
-    to |= {constant: variable for variable, constant in constants.items()}
+    rights = [whole.derivatives[n] for n in places]
+    rates = _of_a_turn(m, names, rights)
+    if rates is None:
+        along = [hy.make_vars(TANGENT + name) for name in names]
+        rates = _varied([variables[n] for n in places], rights, along)
     start = _direction(m, own)
     return StateBlock(
         [TANGENT + name for name in names],
-        [hy.subs(right, to) for _, right in varied],
+        rates,
         [start.get(name, m.scene.context.zero) for name in names],
         exponents=[e for name, e in zip(whole.names, whole.unit_exponents, strict=True) if name in moving],
         why=f"{GROWTH}: a displacement, so small that no step of the motion knows of it",
     )
+
+
+def _varied(
+    states: Sequence[Symbolic], rights: Sequence[Symbolic], along: Sequence[Symbolic]
+) -> list[Symbolic]:
+    """Rates of a tangent vector of x' = f(x): the derivatives of f along it.
+
+    Args:
+        states, rights: x and f; whatever else f contains counts as constant.
+        along: components of the vector, in the order of the states.
+    """
+    others = sorted({name for right in rights for name in hy.get_variables(right)} - set(map(str, states)))
+    constants = {hy.make_vars(name): hy.par[n] for n, name in enumerate(others)}
+    rights = hy.subs(list(rights), constants) if constants else list(rights)
+    # the derivative by one initial value obeys the equations that any tangent vector does
+    equations = list(zip(states, rights, strict=True))
+    varied = hy.var_ode_sys(equations, [states[0]]).sys[len(equations) :]
+    to: dict[Symbolic, Symbolic] = {old: new for (old, _), new in zip(varied, along, strict=True)}
+    to |= {constant: variable for variable, constant in constants.items()}
+    return [hy.subs(right, to) for _, right in varied]
+
+
+def _of_a_turn(m: Mechanics, names: Sequence[str], rights: Sequence[Symbolic]) -> list[Symbolic] | None:
+    """Rates of the tangent vector of a planar motion whose torque depends on its angle only through vectors
+    of space seen from the body; None for any other motion.
+
+    Seen from a body that turns about its axis k, such a vector c has dc/d(angle) = -k x c: its components are
+    its own derivatives. Written with them, the derivative of a gravity gradient's torque takes four products
+    of series instead of nine.
+    """
+    about = _axis_of_turn(m) if list(names) == [ANGLE, SPIN] else None
+    if about is None or m.attitude is None:
+        return None
+    axis, sign = about
+    components: dict[Symbolic, Symbolic] = {}
+    slopes: list[Symbolic] = []
+    for vector in m.seen_so_far:
+        pair = [vector[(axis + 1) % 3], vector[(axis + 2) % 3]]
+        if pair[0] in components or not any(ANGLE in hy.get_variables(x) for x in pair):
+            continue
+        across = [hy.make_vars(f"seen_{len(components) + n}") for n in range(2)]
+        components |= dict(zip(pair, across, strict=True))
+        slopes += [across[1], -across[0]] if sign > 0 else [-across[1], across[0]]
+    torque = hy.subs(rights[1], components)
+    if not components or ANGLE in hy.get_variables(torque):
+        return None
+    tangent_angle, tangent_spin, spin, turned = hy.make_vars(TANGENT + ANGLE, TANGENT + SPIN, SPIN, "turned")
+    states = [*components.values(), turned]
+    slope = _varied(states, [*slopes, torque], [*slopes, turned])[-1]
+    slope = hy.subs(slope, {new: old for old, new in components.items()})
+    rate = slope * (2.0**m.attitude.angle_unit * tangent_angle)
+    if SPIN in hy.get_variables(torque):
+        rate = rate + hy.diff(rights[1], spin) * tangent_spin
+    return [hy.subs(rights[0], {spin: tangent_spin}), rate]
+
+
+def _axis_of_turn(m: Mechanics) -> tuple[int, int] | None:
+    """The body axis that a planar motion turns about, and its sign; None if it is none of the three, or if
+    the motion isn't planar.
+    """
+    if m.attitude is None or m.attitude.kind != "planar":
+        return None
+    one = {hy.make_vars(SPIN): hy.expression(1.0)}
+    try:
+        along = [float(str(hy.subs(rate, one))) for rate in m.rates]
+    except ValueError:  # an axis that differs between members of a sweep
+        return None
+    axis = max(range(3), key=lambda n: abs(along[n]))
+    return (axis, int(along[axis])) if sorted(map(abs, along)) == [0.0, 0.0, 1.0] else None
 
 
 def _weights(m: Mechanics, names: Sequence[str]) -> list[int]:

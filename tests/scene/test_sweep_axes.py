@@ -120,6 +120,22 @@ def test_draws_have_the_distribution_asked_for() -> None:
     assert abs(below - count / 2) < 5 * sqrt(count) / 2
 
 
+def test_many_draws_at_once_are_the_draws_one_by_one() -> None:
+    table = 'mode = "zip"\n'
+    table += 'axes."initial.angular_velocity" = {normal = [[1, 0, -2], [0.1, 1, "1/3"]], count = 9}\n'
+    table += 'axes."time.end" = {uniform = ["3 min", "5 min"], count = 9}\n'
+    table += 'axes."initial.quaternion" = {uniform = [["0 deg", 0, 0, 0], ["1 deg", 1, 1, 1]], count = 9}'
+    vectors, times, turned = swept(table).axes
+    for axis in (vectors, times):
+        assert axis.values.ratios is not None
+        some = [7, 0, 3]
+        found = axis.values.ratios(some)
+        for component, (numerators, below) in enumerate(found):
+            expected = [axis.exact(index)[component].rational for index in some]
+            assert [Fraction(above, below) for above in numerators] == expected
+    assert turned.values.ratios is None  # multiples of pi aren't quotients
+
+
 def test_directions_lie_on_the_sphere_and_cover_it() -> None:
     table = 'axes."initial.angular_velocity" = {sphere = "2 rad/s", %s}'
     for how, count in (("count = 600", 600), ("grid = [20, 30]", 600)):

@@ -14,26 +14,28 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool, _ResultItem
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import h5py
+import heyoka as hy
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import rigidsim
 from rigidsim.cli.app import app
-from rigidsim.errors import ConfigError, RunFolderError
+from rigidsim.errors import ConfigError, Problem, RunFolderError
 from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.sweeps.sweep import Axis
+from rigidsim.scene.sweeps.sweep import Axis, Sweep
 from rigidsim.solve.batch.members import AxisNumbers, Members
+from rigidsim.solve.compiled import CodeStore, Kept, kept_in
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Work, ranges_of
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweeps.members import run_members, sweep_of
+from rigidsim.workflows.sweeps.members import get_ready, run_members, sweep_of
 from rigidsim.workflows.sweeps.sweep import resume_sweep, scanned
 from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep
@@ -524,6 +526,64 @@ def test_no_tile_is_lost_to_a_pool_that_breaks(folder: Path) -> None:
     (generation,) = SweepFolder(open_sweep(folder).folder.path).generations()
     tiles = range(generation.tiles)
     assert sorted(tile for tile, _ in Breaking(2).images(generation, tiles)) == list(tiles)
+
+
+def test_workers_get_ready_before_the_check_and_end_with_a_refusal(tmp_path: Path) -> None:
+    """What they compile takes as long as the check; no process and no folder is left of a refused sweep."""
+    done: list[str] = []
+
+    class Pool:
+        def submit(self, function: Callable[..., Any], *of: object) -> Future[Any]:
+            done.append(function.__name__)
+            made: Future[Any] = Future()
+            made.set_result(function(*of))
+            return made
+
+        def shutdown(self, **_: object) -> None:
+            done.append("shutdown")
+
+    class Noted(Workers):
+        places: ClassVar[list[Path]] = []
+
+        def _pool(self, count: int, between: Path) -> Pool:  # type: ignore[override]
+            done.append(f"pool of {count}")
+            self.places.append(between)
+            return Pool()
+
+    def checked(sweep: Sweep, **_: object) -> None:
+        done.append("check")
+        if "tile = 7" in sweep.experiment.text:
+            raise ConfigError(Problem("a key", "bad"))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rigidsim.workflows.sweeps.sweep.check_sweep", checked)
+        patch.setattr("rigidsim.workflows.sweeps.sweep.Workers", Noted)
+        assert swept(tmp_path, workers=2).finished
+        tiles = ["leave_tile"] * 3
+        begun = ["get_imported"] * min(2, os.cpu_count() or 1)
+        assert done == ["pool of 2", *begun, "get_ready", "get_ready", "check", *tiles, "shutdown"]
+        done.clear()
+        with pytest.raises(ConfigError, match="bad"):
+            swept(tmp_path, CONFIG + SWEEP.replace("tile = 2", "tile = 7"), workers=9, force=True)
+        begun = ["get_imported"] * min(9, os.cpu_count() or 1)
+        assert done == ["pool of 9", *begun, *["get_ready"] * 6, "check", "shutdown"]
+        assert not any(place.exists() for place in Noted.places)
+
+
+def test_a_worker_that_got_ready_compiles_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+    text = PLANAR_MAP.replace("SAMPLES", "2").replace('["final"]', '["final", "megno"]  # ready')
+    monkeypatch.setattr("rigidsim.solve.batch.lanes._engines", Kept(4))
+    with kept_in(CodeStore()):
+        for name in ("taylor_adaptive_batch", "cfunc"):
+            real = getattr(hy, name)
+            monkeypatch.setattr(hy, name, lambda *a, _n=name, _r=real, **o: (made.append(_n), _r(*a, **o))[1])
+        get_ready(text)
+        assert made.count("taylor_adaptive_batch") >= 2  # with the tangent vector and without
+        made.clear()
+        sweep = sweep_of(text)
+        assert run_members(sweep, range(sweep.count), sweep.table.keep).engines
+        assert not made
 
 
 def test_what_a_worker_sends_back_is_one_write(folder: Path, tmp_path: Path) -> None:

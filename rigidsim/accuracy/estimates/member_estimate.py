@@ -71,6 +71,12 @@ class MemberEstimates:
         self._system, self._prepared = family.traced.system, family.traced.prepared
         self._lanes: dict[float | None, NeighbourLanes] = {}
 
+    def compile(self) -> None:
+        """Compile beforehand what most members need."""
+        self._through(LOOSE)
+        if not self._by_chance:
+            self._through(self._prepared.effective_tolerance * _TIGHTER)
+
     def of(self, numbers: Numbers, block: BatchBlock) -> MemberErrors:
         """Errors of a block's members.
 

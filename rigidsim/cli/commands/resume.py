@@ -53,11 +53,14 @@ def resume(
 
 
 def _resume_sweep(path: Path, workers: int, as_json: bool) -> NoReturn:
-    from rigidsim.cli.screens.sweeps import observer, print_sweep
-    from rigidsim.workflows.sweeps.sweep import resume_sweep
+    from rigidsim.workflows.sweeps.workers import started
 
-    with observer() as watching:
-        result = resume_sweep(path, workers=workers, observer=watching)
+    with started(workers) as processes:
+        from rigidsim.cli.screens.sweeps import observer, print_sweep
+        from rigidsim.workflows.sweeps.sweep import resume_sweep
+
+        with observer() as watching:
+            result = resume_sweep(path, workers=processes, observer=watching)
     if as_json:
         print(json.dumps(result.summary))
     else:

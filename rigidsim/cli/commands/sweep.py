@@ -43,18 +43,21 @@ def sweep(
 
     Example: rigidsim sweep configs/sweeps/first_flip.toml --workers 2
     """
-    from rigidsim.cli.screens.sweeps import observer, print_sweep
-    from rigidsim.workflows.read import load
-    from rigidsim.workflows.sweeps.sweep import sweep as run_all
-
     share = None if tiles is None else _share(tiles)
     if scheduler is not None and workers > 1:
         raise RigidsimError("--workers are processes of this machine, --scheduler has its own: give one")
-    with observer() as watching:
-        result = run_all(
-            load(config, overrides=overrides or []), out=out, force=force, workers=workers,
-            scheduler=scheduler, tiles=share, observer=watching,
-        )  # fmt: skip
+    from rigidsim.workflows.sweeps.workers import started
+
+    with started(workers) as processes:  # import while this one does
+        from rigidsim.cli.screens.sweeps import observer, print_sweep
+        from rigidsim.workflows.read import load
+        from rigidsim.workflows.sweeps.sweep import sweep as run_all
+
+        with observer() as watching:
+            result = run_all(
+                load(config, overrides=overrides or []), out=out, force=force, workers=processes,
+                scheduler=scheduler, tiles=share, observer=watching,
+            )  # fmt: skip
     if as_json:
         print(json.dumps(result.summary))
     else:

@@ -16,7 +16,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.orbits.ephemeris import SourcePosition, source_position
-from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
@@ -167,15 +167,15 @@ class GravityGradient(Load):
         if m.attitude is not None and m.attitude.orbital is not None:
             return m.attitude.orbital.direction
         if self.orbit is not None:
-            return apply(transpose(m.matrix), m.orbit(self.orbit).direction)
+            return m.seen(m.orbit(self.orbit).direction)
         if self.table is not None:
-            return apply(transpose(m.matrix), m.table(self.table).direction)
+            return m.seen(m.table(self.table).direction)
         if self.ephemeris is not None:
-            return apply(transpose(m.matrix), self._source(m).direction)
+            return m.seen(self._source(m).direction)
         assert self.position is not None
         length = norm(m.scene.context, self.position)
         fixed = [as_factor(m.number(x / length)) for x in self.position]
-        return apply(transpose(m.matrix), fixed)
+        return m.seen(fixed)
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
         """G M / R^3 in internal units: the value at a constant distance (mpf), and the factor by which it

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, dot, negligible, norm
 from rigidsim.scene.exact import ExactNumber
@@ -119,7 +119,7 @@ class MagneticDipole(Load):
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
         """Unit vector to the centred dipole, body axes."""
-        return None if self.orbit is None else apply(transpose(m.matrix), m.orbit(self.orbit).direction)
+        return None if self.orbit is None else m.seen(m.orbit(self.orbit).direction)
 
     def _size(self, scene: Scene) -> Any:
         """Size of the field, T; with an orbit, its size at the semi-major axis over the source's equator."""
@@ -133,13 +133,13 @@ class MagneticDipole(Load):
         length = norm(m.scene.context, self.source)
         unit = [as_factor(m.number(x / length)) for x in self.source]
         if self.orbit is None:
-            return apply(transpose(m.matrix), unit)
+            return m.seen(unit)
         place = m.orbit(self.orbit)
         c = place.direction
         along = 3.0 * hy.sum([e * x for e, x in zip(unit, c, strict=True)])
         falling = place.inverse_distance**3
         space = [falling * (along * x - e) for e, x in zip(unit, c, strict=True)]
-        return apply(transpose(m.matrix), space)
+        return m.seen(space)
 
     def _moment(self, m: Kinematics) -> Vector:
         """m times the field's size, internal units of energy."""

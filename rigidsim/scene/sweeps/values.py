@@ -6,29 +6,23 @@ is prolonged keeps those that it had, random ones included, which depend on seed
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from statistics import NormalDist
 from typing import Any
 
 import mpmath
 
 from rigidsim.scene.exact import ExactNumber, decimal_text, fraction_of, in_its_unit, with_unit
 from rigidsim.scene.sweep_table import LARGEST_AXIS, AxisTable
+from rigidsim.scene.sweeps import draws
+from rigidsim.scene.units import UnitError, to_si
 from rigidsim.scene.validation_messages import shown
 
 DIGITS = 40
 """Significant decimal digits of values that aren't rational: of logspace, and on a sphere."""
-_DRAWN = 10**14
-"""Draws from the normal distribution are rounded to this fraction of the deviation: fewer digits than double
-precision has, so that mathematical libraries that differ in the last bit give the same draws.
-"""
-_PLACES = 10**18
-"""Number of equal parts into which uniform draws divide the interval from 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +85,7 @@ def _is_number(text: str) -> bool:
 
 
 Entry = tuple[Written, ...]
+Ratios = Callable[[Sequence[int]], list[tuple[list[int], int]]]
 
 
 @dataclass(frozen=True)
@@ -102,12 +97,15 @@ class AxisValues:
         components: components of each value; 0 for plain numbers, and for values that aren't numbers.
         entry: function that gives the numbers of a value; None if values aren't numbers.
         word: function that gives the TOML text of a value that isn't a number; None for numbers.
+        ratios: function that gives many values at once, SI, for each component numerators and their common
+            denominator, in a fraction of the time; None where they aren't such quotients.
     """
 
     count: int
     components: int
     entry: Callable[[int], Entry] | None
     word: Callable[[int], str] | None = None
+    ratios: Ratios | None = None
 
     def text(self, index: int) -> str:
         """A value as written in a config, which identifies it."""
@@ -250,24 +248,6 @@ _UNIT, _WIDE = 10**DIGITS, 10 ** (DIGITS + 5)
 # --- random values ------------------------------------------------------------------------------------------
 
 
-def _uniform(seed: int, key: str, index: int, component: int) -> int:
-    """Uniform draw between 0 and 1, both excluded, in units of ``1 / (2 _PLACES)``."""
-    name = f"{seed}\n{key}\n{index}\n{component}".encode()
-    drawn = int.from_bytes(hashlib.blake2b(name, digest_size=8).digest(), "big")
-    return 2 * (drawn * _PLACES >> 64) + 1
-
-
-_quantile = NormalDist().inv_cdf  # Wichura 1988, algorithm AS 241
-
-
-def _normal(seed: int, key: str, index: int, component: int) -> int:
-    """Normal draw of mean 0 and deviation 1, in units of ``1 / _DRAWN``."""
-    share = _uniform(seed, key, index, component)
-    below = share < _PLACES
-    size = round(_quantile((share if below else 2 * _PLACES - share) / (2 * _PLACES)) * _DRAWN)
-    return size if below else -size
-
-
 def _random(way: str, given: Sequence[Any], count: int, key: str, seed: int, length: int) -> AxisValues:
     vectors = [value for value in given if isinstance(value, list)]
     components = len(vectors[0]) if vectors else 0
@@ -285,22 +265,40 @@ def _random(way: str, given: Sequence[Any], count: int, key: str, seed: int, len
         raise ValueError("a standard deviation of zero or more is allowed")
 
     uniform = way == "uniform"
-    draw, units = (_uniform, 2 * _PLACES) if uniform else (_normal, _DRAWN)
-    lines = [(*_line(a[0], (b[0] - a[0] if uniform else b[0]) / units), a[1], a[2]) for a, b in pairs]
+    drawn, parts = (draws.uniform, 2 * draws.PLACES) if uniform else (draws.normal, draws.DRAWN)
+    lines = []
+    for k, (a, b) in enumerate(pairs):
+        step = (b[0] - a[0] if uniform else b[0]) / parts
+        lines.append((draws.Line.of(drawn(seed, key, k), a[0], step), a[1], a[2]))
 
     def entry(index: int) -> Entry:
         return tuple(
-            Written(ExactNumber(Fraction(first + step * draw(seed, key, index, k), below), power), unit)
-            for k, (first, step, below, power, unit) in enumerate(lines)
+            Written(ExactNumber(Fraction(line.numerator(index), line.below), power), unit)
+            for line, power, unit in lines
         )
 
-    return AxisValues(count, components, entry)
+    return AxisValues(count, components, entry, ratios=_ratios_of(lines))
 
 
-def _line(first: Fraction, step: Fraction) -> tuple[int, int, int]:
-    """Both as numerators of one denominator: sums of fractions take four times as long as one of integers."""
-    below = math.lcm(first.denominator, step.denominator)
-    return int(first * below), int(step * below), below
+def _ratios_of(lines: Sequence[tuple[draws.Line, int, str]]) -> Ratios | None:
+    """See ``AxisValues``."""
+    made = []
+    for line, power, unit in lines:
+        try:
+            factor, turns = to_si(unit) if unit else (Fraction(1), 0)
+        except UnitError:  # told when a value is asked for
+            return None
+        if power + turns:
+            return None
+        up, down = factor.numerator, factor.denominator
+        made.append(
+            (draws.Line(line.draw, line.first * up, line.step * up, line.below * down), line.below * down)
+        )
+
+    def ratios(indices: Sequence[int]) -> list[tuple[list[int], int]]:
+        return [(line.numerators(indices), below) for line, below in made]
+
+    return ratios
 
 
 _SUCH_AS = {"normal": "[[0, 0, 1], [0.1, 0.1, 0.1]]", "uniform": "[[0, 0, 0], [1, 1, 1]]"}
@@ -309,8 +307,10 @@ _SUCH_AS = {"normal": "[[0, 0, 1], [0.1, 0.1, 0.1]]", "uniform": "[[0, 0, 0], [1
 def _random_directions(radius: Written, key: str, seed: int, length: int) -> Callable[[int], Entry]:
     """Random points of uniform density on a sphere: normal draws scaled to its radius."""
 
+    normals = [draws.normal(seed, key, component) for component in range(length)]
+
     def entry(index: int) -> Entry:
-        whole = [_normal(seed, key, index, component) for component in range(length)]
+        whole = [draw(index) for draw in normals]
         norm = math.isqrt(sum(n * n for n in whole) * _WIDE**2)
         unit = [Fraction((2 * n * _WIDE * _UNIT + norm) // (2 * norm), _UNIT) for n in whole]
         return _scaled(radius, unit)

@@ -60,6 +60,11 @@ class BatchMotion:
         )
         return BatchEngine(described, self._width)
 
+    def compile(self) -> None:
+        """Compile the integrators that ``run`` uses."""
+        for engine in ("_plain", "_along") if self._tangents else ("_plain",):
+            getattr(self, engine)
+
     def run(
         self,
         initial: np.ndarray,

@@ -53,14 +53,25 @@ class BatchOutputs:
         growth = [x for row, x in outputs if row in self._growth]
         return [row for row, _ in of_motion], [x for _, x in of_motion], growth
 
+    @cached_property
+    def _components(self) -> list[Any]:
+        return [x for invariant in self._system.invariants for x in invariant.expressions]
+
+    def compile(self) -> None:
+        """Compile the functions that ``begun`` and ``at`` call."""
+        _, of_motion, growth = self._parts
+        for expressions in filter(None, (self._components, of_motion)):
+            self._compiled(expressions, self._traced.moving)
+        if growth:
+            self._compiled(growth, len(self._system.states))
+
     def begun(self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Initial values of the invariants' components, (components, m).
 
         Args:
             initial: initial states of the motion, (states, m).
         """
-        components = [x for invariant in self._system.invariants for x in invariant.expressions]
-        return self._evaluated(components, initial[None], swept, start[None])[:, 0]
+        return self._evaluated(self._components, initial[None], swept, start[None])[:, 0]
 
     def at(
         self,

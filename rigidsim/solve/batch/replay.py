@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -33,15 +33,23 @@ _BINARY: dict[str, Callable[[Doubled, Doubled], Doubled]] = {
 
 
 class Distinct:
-    """The distinct values of one swept number."""
+    """The distinct values of one swept number.
 
-    def __init__(self, values: Sequence[ExactNumber]) -> None:
+    Args:
+        values: the values, which may be worked out when they are asked for.
+        doubled: the same in two doubles, where they are known already.
+    """
+
+    def __init__(self, values: Sequence[ExactNumber], doubled: Doubled | None = None) -> None:
         self.values = values
+        self._doubled = doubled
 
-    @cached_property
+    @property
     def doubled(self) -> Doubled:
         """All values in two doubles."""
-        return _of_exact(self.values)
+        if self._doubled is None:
+            self._doubled = in_two_doubles(self.values)
+        return self._doubled
 
 
 @dataclass(frozen=True)
@@ -284,23 +292,42 @@ def _doubled(value: Any) -> Doubled:
     return Doubled(*_parts(value))
 
 
-def _of_exact(values: Sequence[ExactNumber]) -> Doubled:
+def in_two_doubles(values: Sequence[ExactNumber]) -> Doubled:
     """Exact numbers in two doubles."""
-    parts = np.array([_parts_of_exact(value) for value in values], dtype=np.float64)
-    high, low, error = parts.reshape(-1, 3).T.copy()
+    return _columns_of([_parts_of_exact(value) for value in values])
+
+
+def quotients_in_two_doubles(numerators: Sequence[int], below: int) -> Doubled:
+    """Quotients of whole numbers with a common denominator, in two doubles."""
+    try:
+        return _columns_of([_parts_of_quotient(above, below) for above in numerators])
+    except OverflowError:
+        return in_two_doubles([ExactNumber(Fraction(above, below)) for above in numerators])
+
+
+def _columns_of(parts: Sequence[tuple[float, float, float]]) -> Doubled:
+    high, low, error = np.array(parts, dtype=np.float64).reshape(-1, 3).T.copy()
     return Doubled(high, low, error)
 
 
 def _parts_of_exact(value: ExactNumber) -> tuple[float, float, float]:
-    """An exact number as ``_parts`` has it; quotients of whole numbers are rounded once by Python."""
-    above, below = value.rational.numerator, value.rational.denominator
+    """An exact number as ``_parts`` has it."""
     try:
         if value.pi_power:
             raise OverflowError
-        high = above / below
+        return _parts_of_quotient(value.rational.numerator, value.rational.denominator)
     except OverflowError:
         high, low, error = _parts(value.at(context_for(34)))
         return high, low, error + abs(high) * 2.0**-200
+
+
+def _parts_of_quotient(above: int, below: int) -> tuple[float, float, float]:
+    """The same of a quotient of whole numbers, which Python rounds once.
+
+    Raises:
+        OverflowError: it is outside a double's range.
+    """
+    high = above / below
     up, down = high.as_integer_ratio()
     rest, under = above * down - up * below, below * down
     if not rest:

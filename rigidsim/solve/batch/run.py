@@ -101,6 +101,11 @@ class BatchRun:
         self._motion = BatchMotion(family.traced, self._crossings, self.width, unfelt)
         self._outputs = BatchOutputs(family.traced)
 
+    def compile(self) -> None:
+        """Compile integrators and functions now rather than when the first members need them."""
+        self._motion.compile()
+        self._outputs.compile()
+
     def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:
         """Run members, as many at a time as fit into memory.
 

@@ -37,6 +37,7 @@ from rigidsim.store.variables import Variable
 
 _ONE_BY_ONE = ("frequencies",)
 """Items that only single runs can provide."""
+_TRIED, _MOST_AHEAD = 16, 4  # members looked at, and families compiled, before the first tile
 
 
 @dataclass
@@ -76,19 +77,33 @@ class BatchTiles:
 
     Args:
         hidden: variables recorded only for indicators.
+
+    Attributes:
+        axes: values of the sweep's axes.
     """
 
     def __init__(self, sweep: Sweep, hidden: Sequence[str]) -> None:
         self._sweep = sweep
         self._hidden = hidden
-        self._axes = AxisNumbers(sweep)
+        self.axes = AxisNumbers(sweep)
         self._known: list[Family] = []
         self._runs: dict[int, tuple[BatchRun, list[Variable]]] = {}
         self._estimates: dict[int, MemberEstimates] = {}
 
+    def compile(self) -> None:
+        """Trace and compile what members from all over the sweep need."""
+        some = range(0, self._sweep.count, -(-self._sweep.count // _TRIED))
+        families = Families(Members.of(self._sweep, some, self.axes))
+        families.known = self._known
+        for family, numbers in families.sort().groups[:_MOST_AHEAD]:
+            run, _ = self._run_of(family, some[int(numbers.members[0])])
+            run.compile()
+            if self._estimated:
+                self._estimate_of(family, run).compile()
+
     def run(self, members: Sequence[int], keep: Sequence[str]) -> Batched:
         """Run all members that can be run together."""
-        families = Families(Members.of(self._sweep, members, self._axes))
+        families = Families(Members.of(self._sweep, members, self.axes))
         families.known = self._known
         found = families.sort()
         done = Batched([], [], sorted(found.alone), "")
@@ -118,7 +133,7 @@ class BatchTiles:
             What is wrong with each, and whether any member shares its equations with others; nothing is
             known about members that don't.
         """
-        families = Families(Members.of(self._sweep, members, self._axes), most)
+        families = Families(Members.of(self._sweep, members, self.axes), most)
         families.known = self._known
         found = families.sort()
         return {int(members[place]): error for place, error in found.refused.items()}, bool(found.groups)

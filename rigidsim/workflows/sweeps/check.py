@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.initial_values import check_start
@@ -23,16 +23,19 @@ corners, and all members by their numbers alone if these decide.
 _OF_AN_AXIS = 400
 _MOST_CORNERS = 64
 _MOST_TOLD = 10
-_AT_ONCE = 16_384
+_AT_ONCE = 4096
 QUICK = 1_000_000
 """Up to this many members are all checked for a plan; a sweep checks all."""
+Share = tuple[list[int], bool]
+Each = Callable[[Callable[[tuple[str, int, int]], Share], list[tuple[str, int, int]]], Iterable[Share]]
 
 
-def check_sweep(sweep: Sweep, *, every: bool = True) -> InitialValueProblem:
+def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> InitialValueProblem:
     """Refuse a sweep with a member that can't be run; returns the first member, prepared.
 
     Args:
         every: check each member's numbers even if there are more than ``_ALL``: 20 s per million members.
+        each: like ``map``; may have others look at shares of the members meanwhile.
 
     Raises:
         ConfigError: names members and keys.
@@ -44,6 +47,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True) -> InitialValueProblem:
         refuse_taken_names(first)
     except ConfigError as error:
         raise sweep.blamed(0, error) from None
+    shares = _of_families(sweep, each) if every and sweep.count > _ALL else []
     problems: list[Problem] = []
     for member in _tried(sweep):
         try:
@@ -53,23 +57,40 @@ def check_sweep(sweep: Sweep, *, every: bool = True) -> InitialValueProblem:
             problems += sweep.blamed(member, error).problems
             if len(problems) >= _MOST_TOLD:
                 break
-    if not problems and every and sweep.count > _ALL:
-        problems = _of_families(sweep)
+    if not problems:
+        problems = _found(sweep, shares)
     if problems:
         raise ConfigError(problems, sweep.experiment.source)
     return first
 
 
-def _of_families(sweep: Sweep) -> list[Problem]:
-    """Problems of any member, if members share equations so that their numbers alone tell."""
+def _of_families(sweep: Sweep, each: Each) -> Iterable[Share]:
+    """Which members no run accepts, if members share equations so that their numbers alone tell."""
     if why_alone(sweep, ()) not in ("", "wall_time", "asked"):
         return []
-    batches = batches_of(sweep.experiment.text)
-    for begin in range(0, sweep.count, _AT_ONCE):
-        refused, shared = batches.refused(range(begin, min(begin + _AT_ONCE, sweep.count)), _MOST_TOLD)
+    edges = [*range(0, sweep.count, _AT_ONCE), sweep.count]
+    return each(refused_of, [(sweep.experiment.text, *ends) for ends in itertools.pairwise(edges)])
+
+
+def refused_of(share: tuple[str, int, int]) -> Share:
+    """Members of a share of a sweep that no run accepts, at most ``_MOST_TOLD``, and whether any member of it
+    shares its equations with others.
+
+    Args:
+        share: the sweep's config, the first member, and the one after the last.
+    """
+    config, begin, end = share
+    refused, shared = batches_of(config).refused(range(begin, end), _MOST_TOLD)
+    return sorted(refused)[:_MOST_TOLD], shared
+
+
+def _found(sweep: Sweep, shares: Iterable[Share]) -> list[Problem]:
+    """Problems of the first share that has any."""
+    for refused, shared in shares:
         if refused:
-            errors = [sweep.blamed(member, refused[member]) for member in sorted(refused)]
-            return [problem for error in errors for problem in error.problems]
+            errors, _ = batches_of(sweep.experiment.text).refused(refused)
+            told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
+            return [problem for error in told for problem in error.problems]
         if not shared:
             break
     return []

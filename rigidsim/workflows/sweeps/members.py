@@ -120,6 +120,13 @@ def batches_of(config: str) -> BatchTiles:
     return BatchTiles(sweep, hidden_of(sweep))
 
 
+def get_ready(config: str) -> None:
+    """Trace and compile in this process what most members of a config's sweep need; nothing is integrated."""
+    sweep = sweep_of(config)
+    if not why_alone(sweep, sweep.table.keep):
+        batches_of(config).compile()
+
+
 def single_member(experiment: Experiment, member: int) -> Experiment:
     """A member of a config's ``[sweep]`` as a run of its own, named after the sweep and its number.
 

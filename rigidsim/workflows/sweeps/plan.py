@@ -14,7 +14,11 @@ from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import QUICK, check_sweep
 from rigidsim.workflows.sweeps.members import alone, batches_of, recording
 
-_SECONDS_OF_A_TILE = 10.0
+_SECONDS_OF_A_TILE, _LEAST_SECONDS = 5.0, 2.0
+_SHARE_OF_A_TILE = 32
+"""A tile takes at most this part of a sweep (or ``_LEAST_SECONDS``): at the end of a sweep workers wait for
+whoever has the last one. A tile itself, with its file, costs about 10 ms.
+"""
 _LARGEST_TILE = 8192
 _FEW = 64
 _TILES_OF_FEW = 16
@@ -56,7 +60,8 @@ def _side_by_side(sweep: Sweep) -> bool:
 
 def _length(sweep: Sweep, seconds: float, size: float) -> int:
     """Tile length for members that take so many seconds and bytes each."""
-    most = min(_SECONDS_OF_A_TILE / seconds, _LARGEST_TILE_BYTES / size)
+    longest = min(max(seconds * sweep.count / _SHARE_OF_A_TILE, _LEAST_SECONDS), _SECONDS_OF_A_TILE)
+    most = min(longest / seconds, _LARGEST_TILE_BYTES / size)
     length = 8
     while length < _LARGEST_TILE and 2 * length <= most and 32 * length < sweep.count:
         length *= 2

@@ -23,10 +23,11 @@ from rigidsim.store.sweeps.sources import sources_of
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.check import check_sweep
-from rigidsim.workflows.sweeps.members import recording, sweep_of
+from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
 from rigidsim.workflows.sweeps.plan import tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
 from rigidsim.workflows.sweeps.ways import OneProcess, Way
+from rigidsim.workflows.sweeps.workers import Workers
 
 
 class SweepObserver:
@@ -54,7 +55,7 @@ def sweep(
     changes: dict[str, Any] | None = None,
     out: str | Path = "runs",
     force: bool = False,
-    workers: int = 1,
+    workers: int | Workers = 1,
     scheduler: str | None = None,
     tiles: tuple[int, int] | None = None,
     observer: SweepObserver | None = None,
@@ -68,7 +69,7 @@ def sweep(
         experiment: from ``load`` or ``Experiment.from_dict``, the path of a config, or a dictionary.
         changes: values to replace, as for ``Experiment.replace``.
         force: replace whatever run or sweep is there.
-        workers: number of processes on this machine.
+        workers: number of processes on this machine, or such processes started already.
         scheduler: address of a Dask scheduler whose workers run the members; needs ``rigidsim[cluster]``.
         tiles: first and stop of the share of tiles computed by this one of several processes on the folder.
         observer: receives the sweep's progress.
@@ -117,7 +118,11 @@ def scanned(experiment: Experiment, scan: Sequence[str]) -> Experiment:
 
 
 def resume_sweep(
-    path: str | Path, *, workers: int = 1, scheduler: str | None = None, observer: SweepObserver | None = None
+    path: str | Path,
+    *,
+    workers: int | Workers = 1,
+    scheduler: str | None = None,
+    observer: SweepObserver | None = None,
 ) -> SavedSweep:
     """Complete a sweep that was interrupted or killed.
 
@@ -134,16 +139,14 @@ def resume_sweep(
     )  # fmt: skip
 
 
-def _way(workers: int, scheduler: str | None) -> Way:
+def _way(workers: int | Workers, scheduler: str | None) -> Way:
     if scheduler is not None:
         from rigidsim.workflows.sweeps.cluster import Cluster
 
         return Cluster(scheduler)
-    if workers > 1:
-        from rigidsim.workflows.sweeps.workers import Workers
-
-        return Workers(workers)
-    return OneProcess()
+    if isinstance(workers, Workers):
+        return workers
+    return Workers(workers) if workers > 1 else OneProcess()
 
 
 def run_sweep(
@@ -159,20 +162,20 @@ def run_sweep(
     if share is not None and force:
         raise RunFolderError(f"{FORCE} is for a sweep as a whole, and its tiles are computed by others, too")
     observer.checking(wanted)
-    complete = _complete(wanted, folder) and not force
-    if not complete:
-        check_sweep(wanted, every=not _known(wanted, folder))
     began, cpu = time.perf_counter(), time.process_time()
-    with folder.locked(shared=share is not None):
-        if complete:
+    if _complete(wanted, folder) and not force:
+        with folder.locked(shared=share is not None):
             observer.nothing_left()
             return open_sweep(folder.path)
-        if share is None:
-            folder.begin(force=force)
-        _refuse_other(wanted, folder)
-        generation = _generation(wanted, folder, exclusive=share is not None)
-        interrupted = _run_tiles(folder, generation, way, share, observer)
-        all_there = bool(folder.present(generation).all())
+    with way.ready_for(wanted):
+        check_sweep(wanted, every=not _known(wanted, folder), each=way.each)
+        with folder.locked(shared=share is not None):
+            if share is None:
+                folder.begin(force=force)
+            _refuse_other(wanted, folder)
+            generation = _generation(wanted, folder, exclusive=share is not None)
+            interrupted = _run_tiles(folder, generation, way, share, observer)
+            all_there = bool(folder.present(generation).all())
     if interrupted is not None:
         raise interrupted
     if not all_there:
@@ -290,7 +293,8 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
         "mixed_provenance": summary["mixed_provenance"] or "",
         **summary["provenance"],
     }
-    digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
+    labels = batches_of(wanted.experiment.text).axes.nearest
+    digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes, labels)
     summary["dataset_sha256"] = digest
     folder.write_summary(summary)
     return SavedSweep(folder, {"kind": "sweep", **summary})

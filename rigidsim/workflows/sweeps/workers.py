@@ -15,17 +15,21 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rigidsim.errors import StoppedError
-from rigidsim.store.sweeps.generation import Generation
-from rigidsim.workflows.sweeps.members import tile_image
-from rigidsim.workflows.sweeps.ways import task
 
+if TYPE_CHECKING:
+    from rigidsim.scene.sweeps.sweep import Sweep
+    from rigidsim.store.sweeps.generation import Generation
+
+S = TypeVar("S")
+T = TypeVar("T")
 _MOST_DEATHS = 5
 """Deaths of workers after which a tile is given up; each counts against all tiles in work."""
 _WATCH_SECONDS = 1.0
@@ -34,12 +38,56 @@ _WATCH_SECONDS = 1.0
 class Workers:
     """Worker processes that compute tiles, which this process saves.
 
+    They are started as soon as the context is entered, and import, trace and compile while this process still
+    imports, reads and checks; this module itself imports next to nothing.
+
     Args:
         count: number of processes.
     """
 
     def __init__(self, count: int) -> None:
-        self._count = count
+        self.count = count
+        self._ended = ExitStack()
+        self._between: Path | None = None
+        self._ahead: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Workers:
+        folder = tempfile.TemporaryDirectory(prefix="rigidsim-tiles-")
+        self._between = Path(self._ended.enter_context(folder))
+        self._ahead = self._pool(self.count, self._between)
+        self._ended.callback(self._end_unused)
+        self._submit_ahead(min(self.count, os.cpu_count() or 1), get_imported)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.close()
+        self._between = None
+
+    def _submit_ahead(self, times: int, function: Callable[..., None], *of: Any) -> None:
+        """Have each worker do what tiles will need; whatever goes wrong is told when they need it."""
+        with suppress(BrokenProcessPool):
+            for _ in range(times):
+                if self._ahead is not None:
+                    self._ahead.submit(function, *of)
+
+    def _end_unused(self) -> None:
+        pool, self._ahead = self._ahead, None
+        if pool is not None:
+            _end(pool)
+
+    @contextmanager
+    def ready_for(self, sweep: Sweep) -> Iterator[None]:
+        """See ``Way``."""
+        with nullcontext() if self._between is not None else self:
+            self._submit_ahead(min(self.count, sweep.count), get_ready, sweep.experiment.text)
+            yield
+
+    def each(self, function: Callable[[S], T], tasks: Sequence[S]) -> Iterable[T]:
+        """See ``Way``; answers have to be short, see the module."""
+        given: Iterable[T] = ()
+        with suppress(BrokenProcessPool):
+            given = self._ahead.map(function, tasks) if self._ahead is not None else ()
+        return _rest_here(function, tasks, given)
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
         """See ``Way``.
@@ -47,20 +95,23 @@ class Workers:
         Raises:
             StoppedError: workers die repeatedly at the same tile.
         """
-        with tempfile.TemporaryDirectory(prefix="rigidsim-tiles-") as between:
-            yield from self._images(generation, tiles, Path(between))
+        with nullcontext() if self._between is not None else self:
+            assert self._between is not None
+            yield from self._images(generation, tiles, self._between)
 
     def _images(
         self, generation: Generation, tiles: Sequence[int], between: Path
     ) -> Iterator[tuple[int, bytes]]:
+        from rigidsim.workflows.sweeps.ways import task
+
         waiting = list(reversed(tiles))
         deaths: Counter[int] = Counter()
         while waiting:
-            pool = self._pool(len(waiting), between)
+            pool, self._ahead = self._ahead or self._pool(min(self.count, len(waiting)), between), None
             running: dict[Future[int], int] = {}
             try:
                 while waiting or running:
-                    while waiting and len(running) < 2 * self._count:  # one task ahead for each worker
+                    while waiting and len(running) < 2 * self.count:  # one task ahead for each worker
                         tile = waiting[-1]  # keeps waiting if the pool broke just now and takes no more
                         file = between / str(tile)
                         running[pool.submit(leave_tile, file, *task(generation, tile))] = tile
@@ -82,17 +133,46 @@ class Workers:
             finally:
                 _end(pool)
 
-    def _pool(self, tiles: int, between: Path) -> ProcessPoolExecutor:
+    def _pool(self, count: int, between: Path) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(
-            min(self._count, tiles),
+            count,
             mp_context=multiprocessing.get_context("spawn"),
             initializer=_begin_worker,
             initargs=(os.getpid(), between),
         )
 
 
+def _rest_here(function: Callable[[S], T], tasks: Sequence[S], given: Iterable[T]) -> Iterator[T]:
+    """What others found, and of tasks whose worker died the rest."""
+    known = 0
+    with suppress(BrokenProcessPool):
+        for found in given:
+            yield found
+            known += 1
+    yield from map(function, tasks[known:])
+
+
+def started(count: int) -> AbstractContextManager[Workers | int]:
+    """Workers that are started already, for commands that have yet to import; 1 if one process is enough."""
+    return Workers(count) if count > 1 else nullcontext(1)
+
+
+def get_imported() -> None:
+    """Import what tiles need."""
+    import rigidsim.workflows.sweeps.members  # noqa: F401
+
+
+def get_ready(config: str) -> None:
+    """Trace and compile what tiles need (see ``rigidsim.workflows.sweeps.members.get_ready``)."""
+    from rigidsim.workflows.sweeps import members
+
+    members.get_ready(config)
+
+
 def leave_tile(file: Path, *of: Any) -> int:
     """Compute a tile (see ``tile_image``) and leave it in a file; returns its size in bytes."""
+    from rigidsim.workflows.sweeps.members import tile_image
+
     return file.write_bytes(tile_image(*of))
 
 
