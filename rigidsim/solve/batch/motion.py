@@ -2,8 +2,10 @@
 
 The motion's numbers are always those of an integrator without tangent vectors. Compiled with them, its
 equations may be rounded otherwise; where a system is small they aren't, and one integrator does for both:
-some lanes of each block are taken by both, and where these differ in any bit, or a vector has grown so far
-that steps would know of it, the motion is taken from the integrator without.
+some lanes are taken by both, and where these differ in any bit, or a vector has grown so far that steps would
+know of it, the motion is taken from the integrator without. How an operation is rounded is a matter of the
+compiled code, not of the numbers, so that a difference shows in the first lanes that are compared: these are
+some of the first block and of every ``_EVERY``-th after it.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ from rigidsim.solve.batch.tracing import TracedSystem
 UNFELT = float(np.exp(LARGEST - SMALL * np.log(2.0)))
 """Largest component of a tangent vector that no step control notices."""
 
+_EVERY = 16
+
 
 class BatchMotion:
     """Integrators of a traced system.
@@ -38,6 +42,7 @@ class BatchMotion:
         self._traced, self._crossings, self._width, self._unfelt = traced, crossings, width, unfelt
         self._tangents = len(traced.system.states) > traced.moving
         planar = traced.system.requirements.formulation == "planar"
+        self._runs = 0
         self._may_share = self._tangents and planar and not traced.system.crossings
 
     @cached_property
@@ -100,12 +105,17 @@ class BatchMotion:
         along = self._along.run(initial, read, start, times, most_steps)
         if not self._may_share:
             return plain(everybody), along.states
-        tried = np.unique(np.linspace(0, len(everybody) - 1, self._width).astype(np.int64))
         motion = replace(along, states=along.states[:, :moving])
-        if not _same_bits(plain(tried), motion, tried):
+        felt = ~(np.abs(along.states[:, moving:]) < self._unfelt).all(axis=(0, 1))
+        felt |= ~along.arrived | ~along.finite
+        again, unfelt = np.flatnonzero(felt), np.flatnonzero(~felt)
+        if len(unfelt):
+            if self._runs % _EVERY == 0:
+                tried = unfelt[np.unique(np.linspace(0, len(unfelt) - 1, self._width).astype(np.int64))]
+                self._may_share = _same_bits(plain(tried), motion, tried)
+            self._runs += 1
+        if not self._may_share:
             return plain(everybody), along.states
-        large = ~(np.abs(along.states[:, moving:]) < self._unfelt).all(axis=(0, 1))
-        again = np.flatnonzero(large | ~along.arrived | ~along.finite)
         if len(again):
             motion = replace(motion, states=motion.states.copy())
             motion.put(again, plain(again))
