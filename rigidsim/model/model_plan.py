@@ -61,7 +61,10 @@ class ModelPlan:
     @property
     def wide(self) -> bool:
         """Whether the equations are too long to be compiled unrolled."""
-        return any(load.wide for load in self.loads)
+        summed = (
+            self.average is not None and self.average.driven is not None and self.average.driven.course.nodes
+        )
+        return bool(summed) or any(load.wide for load in self.loads)
 
 
 def plan_model(
@@ -138,9 +141,10 @@ def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
 def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
     """Plan a motion averaged over its rotation, and possibly over its sources' orbits."""
     from rigidsim.model.averaged.average import average_of
-    from rigidsim.model.averaged.states import WHY, refuse_untold
+    from rigidsim.model.averaged.states import WHY, WHY_DRIVEN, refuse_untold
 
-    average = average_of(scene, loads)
+    scaling = replace(choose_scaling(scene), rates=(0, 0, 0))
+    average = average_of(scene, loads, scaling)
     record = scene.config.output.record
     refuse_untold(average, record)
     refuse_without_plane(scene, loads)
@@ -152,8 +156,9 @@ def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
         why = (
             f"the body keeps pace with its source, {average.resonance.name}: the commensurable angle is kept"
         )
+    elif average.driven is not None:
+        why = WHY_DRIVEN
     requirements = Requirements(average.level, False, False, record, {"attitude": why}, left_out)
-    scaling = replace(choose_scaling(scene), rates=(0, 0, 0))
     return ModelPlan(
         scene,
         loads,

@@ -19,7 +19,8 @@ class Model(ConfigTable):
     level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = Field(
         default="full",
         description="full resolves every rotation; spin_averaged follows the direction of the angular "
-        "momentum under torques averaged over the body's free rotation; orbit_averaged "
+        "momentum, and its size and energy under torques that do work, averaged over the body's free "
+        "rotation; orbit_averaged "
         "averages over the sources' orbits as well; auto is the cheapest level that keeps "
         "[integrator] accuracy_axis",
     )

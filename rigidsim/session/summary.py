@@ -271,6 +271,8 @@ def _modelling(found: Diagnostics) -> Modelling | None:
         short_period=average.short_period,
         momentum_axis=known.momentum,
         figure_axis=known.figure,
+        angular_momentum_norm=known.changes.get("angular_momentum_norm"),
+        energy=known.changes.get("energy"),
         growth=known.growth,
         oscillation=known.oscillation,
         whole=known.whole,

@@ -187,6 +187,8 @@ class Modelling(SummaryPart):
         short_period: whether what averaging removed is added back in what is recorded.
         momentum_axis, figure_axis: largest distances of the directions recorded from the full model's, until
             the end of the run, rad; None if not measured, or if the figure axis has no mean direction.
+        angular_momentum_norm, energy: largest errors of the momentum's size and the energy of rotation,
+            relative to their values; None where averaging keeps them.
         growth, oscillation: secular growth of the distance, rad/s, and its oscillating part, rad.
         whole: whether the full model was followed to the end.
         requested: largest error that was asked for, rad.
@@ -197,6 +199,8 @@ class Modelling(SummaryPart):
     short_period: Annotated[StrictBool, Claim()]
     momentum_axis: FiniteNumber | None = None
     figure_axis: FiniteNumber | None = None
+    angular_momentum_norm: FiniteNumber | None = None
+    energy: FiniteNumber | None = None
     growth: FiniteNumber | None = None
     oscillation: FiniteNumber | None = None
     whole: StrictBool = False

@@ -11,17 +11,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.models.side_by_side import Window, rotation_rates, side_by_side
+from rigidsim.accuracy.models.side_by_side import (
+    ENERGY,
+    SIZE,
+    Window,
+    motion_at,
+    rotation_rates,
+    side_by_side,
+)
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import Average
+from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.scene.records import dataclass
-from rigidsim.scene.scene import Scene
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.trail import SampleTrail
 
@@ -49,6 +56,7 @@ class ModellingError:
         whole: whether the full model was followed to the end.
         how: description of the measurement.
         cpu_seconds: CPU time of the measurement, s.
+        changes: relative errors until the end of quantities that change: ``SIZE`` and ``ENERGY``.
     """
 
     level: str
@@ -60,6 +68,7 @@ class ModellingError:
     how: str
     cpu_seconds: float
     windows: Sequence[Window] = field(default_factory=list)
+    changes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def worst(self) -> float:
@@ -84,14 +93,15 @@ def measure_modelling(
     started = time.process_time()
     scene = prepared.scene
     begin, end = float(scene.start), float(scene.samples.last)
-    length = min(_length(scene, average), end - begin)
+    exponent = prepared.system.scaling.momentum
+    at_start = average.initial(exponent)
+    length = min(_length(average, motion_at(average, at_start, exponent)), end - begin)
     whole = end - begin <= _WHOLE * length
-    at_start = average.slow_states(prepared.system.scaling.momentum) or list(average.start)
-    places = [(begin, at_start)]
+    places = [(begin, at_start, length)]
     if not whole:
-        places += _places(prepared, trail, begin, end, length)
+        places += _places(prepared, average, trail, begin, end, length)
     windows: list[Window] = []
-    for at, direction in places:
+    for at, direction, length in places:
         until = end if whole else at + length
         try:
             found = side_by_side(prepared, average, at, until, direction, go_on)
@@ -106,9 +116,9 @@ def measure_modelling(
     return _extrapolated(prepared, average, windows, end - begin, spent)
 
 
-def _length(scene: Scene, average: Average) -> float:
-    """Length of a window, s."""
-    rates = rotation_rates(average)
+def _length(average: Average, motion: FreeMotion) -> float:
+    """Length of a window, s, for a free motion."""
+    rates = rotation_rates(motion)
     rotation = _TURN / max(rates)
     if average.resonance is not None:
         libration = _TURN / average.resonance.libration_rate
@@ -120,9 +130,16 @@ def _length(scene: Scene, average: Average) -> float:
 
 
 def _places(
-    prepared: InitialValueProblem, trail: SampleTrail | None, begin: float, end: float, length: float
-) -> list[tuple[float, list[Any]]]:
-    """Middle and end: the nearest samples, with the states there, the momentum's direction first."""
+    prepared: InitialValueProblem,
+    average: Average,
+    trail: SampleTrail | None,
+    begin: float,
+    end: float,
+    length: float,
+) -> list[tuple[float, list[Any], float]]:
+    """Middle and end: the nearest samples, with the states there, the momentum's direction first, and the
+    lengths of the windows.
+    """
     context, exponent = prepared.scene.context, prepared.system.scaling.time
     kept = [] if trail is None else trail.samples
     seen = [
@@ -130,12 +147,20 @@ def _places(
         for _, time, state, _ in kept
     ]
     seen = [(at, state) for at, state in seen if at > begin + length]
-    found = []
-    for wanted in ((begin + end) / 2, end - length):
-        if seen:
-            nearest = min(seen, key=lambda place: abs(place[0] - wanted))
-            if nearest not in found:
-                found.append(nearest)
+    found: list[tuple[float, list[Any], float]] = []
+    for middle in (True, False):
+        if not seen:
+            break
+        last = length
+        if average.driven is not None and not middle:  # a rotation that has become slower takes longer
+            last = _length(average, motion_at(average, seen[-1][1], prepared.system.scaling.momentum))
+            last = min(max(last, length), (end - begin) / 2)
+        wanted = (begin + end) / 2 if middle else end - last
+        at, state = min(seen, key=lambda place: abs(place[0] - wanted))
+        if average.driven is not None:
+            last = min(last, end - at)
+        if last > 0 and all(at != other for other, _, _ in found):
+            found.append((at, state, last))
     return found
 
 
@@ -152,6 +177,7 @@ def _of_whole(average: Average, window: Window, spent: float) -> ModellingError:
         how,
         spent,
         [window],
+        {name: _SPARE_OF_WHOLE * change.largest for name, change in window.changes.items()},
     )
 
 
@@ -164,8 +190,13 @@ def _extrapolated(
     along, across = (float(x) + doubt for x in mean)
     # an error across the precession changes the rate along it
     shear = float(average.shear(prepared.scene.context, prepared.scene.start))
-    grown = math.hypot(along + shear * across * span / 2, across) * span
+    changes, faster = _changed(average, windows, span), 0.0
+    if SIZE in changes and average.sources:  # an error of its size changes the rate of precession
+        faster = float(prepared.system.rate_bound) * changes[SIZE] / 2
+    grown = math.hypot(along + faster + shear * across * span / 2, across) * span
     oscillation = max(w.recorded for w in windows)
+    if average.driven is not None:  # which may be larger between the windows
+        oscillation = max(oscillation, average.driven.course.swing) + average.driven.scatter
     growth = grown / span
     momentum = _SPARE * grown + _SPARE_OF_WHOLE * oscillation
     figure = None
@@ -177,5 +208,29 @@ def _extrapolated(
     how = f"every rotation was resolved beside the run in {len(windows)} windows ({100 * share:.2g} % of it, "
     how += f"{steps:,} steps), and the growth found there extrapolated to its end"
     return ModellingError(
-        average.level, min(momentum, math.pi), figure, growth, oscillation, False, how, spent, windows
+        average.level,
+        min(momentum, math.pi),
+        figure,
+        growth,
+        oscillation,
+        False,
+        how,
+        spent,
+        windows,
+        changes,
     )
+
+
+def _changed(average: Average, windows: Sequence[Window], span: float) -> dict[str, float]:
+    """Relative errors until the end of quantities that change."""
+    found: dict[str, float] = {}
+    if average.driven is None:
+        return found
+    swings = dict(zip((SIZE, ENERGY), average.driven.course.swings, strict=True))
+    for name in windows[0].changes:
+        seen = [window.changes[name] for window in windows]
+        rates = np.array([change.growth for change in seen])
+        rate = np.abs(rates.mean()) + (rates.max() - rates.min()) / 2 + max(change.doubt for change in seen)
+        largest = max(swings[name], *(change.largest for change in seen)) + average.driven.passed
+        found[name] = _SPARE * float(rate) * span + _SPARE_OF_WHOLE * largest
+    return found

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from rigidsim.accuracy.trial import compactly
 from rigidsim.model.averaged.average import Average, osculating
+from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.resonance import SlowStart
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
@@ -33,6 +34,24 @@ _SAMPLES_PER_ROTATION = 2
 with 2000 samples of 7500 rotations a quarter of it was missed.
 """
 _TURN = 2 * math.pi
+SIZE, ENERGY = "angular_momentum_norm", "energy"
+_OF_ROTATION = "rotational_energy"
+"""The full model's name for the energy that an averaged one follows, without the potential of gradients."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Difference of a changing quantity between both models, relative to its value.
+
+    Attributes:
+        largest: the largest difference.
+        growth: its growth, 1/s.
+        doubt: difference of growth between the window's parts, 1/s.
+    """
+
+    largest: float
+    growth: float
+    doubt: float
 
 
 @dataclass(frozen=True)
@@ -47,6 +66,7 @@ class Window:
         recorded, recorded_figure: the same for the directions as the run records them.
         growth: growth of the momenta's distance, along and across the precession, rad/s.
         doubt: difference of growth between the window's parts, rad/s.
+        changes: for a motion whose energy and momentum change, how far these are from the full model's.
     """
 
     start: float
@@ -59,16 +79,30 @@ class Window:
     growth: tuple[float, float]
     doubt: float
     reduced_steps: int
+    changes: Mapping[str, Change] = field(default_factory=dict)
 
 
-def rotation_rates(average: Average) -> list[float]:
-    """Rates of the free rotation, rad/s."""
-    return [abs(float(average.motion.precession_rate)), abs(float(average.motion.wobble_rate))]
+def rotation_rates(motion: FreeMotion) -> list[float]:
+    """Rates of a free rotation, rad/s."""
+    return [abs(float(motion.precession_rate)), abs(float(motion.wobble_rate))]
 
 
-def _sample_count(average: Average, seconds: float) -> int:
+def motion_at(average: Average, states: Sequence[Any], exponent: int) -> FreeMotion:
+    """Free motion at these states of an averaged motion.
+
+    Args:
+        exponent: binary exponent of the internal unit of angular momentum.
+    """
+    if average.driven is None:
+        return average.motion
+    context = average.driven.torques.scene.context
+    axial, transverse = (context.ldexp(x, exponent) for x in states[3:5])
+    return average.driven.motion(axial, transverse)
+
+
+def _sample_count(motion: FreeMotion, seconds: float) -> int:
     """Number of samples at which both models are compared."""
-    rotations = seconds * max(rotation_rates(average)) / _TURN
+    rotations = seconds * max(rotation_rates(motion)) / _TURN
     return int(min(max(_FEWEST_SAMPLES, _SAMPLES_PER_ROTATION * rotations), _MOST_SAMPLES))
 
 
@@ -82,14 +116,18 @@ def side_by_side(
 ) -> Window | None:
     """Run both models side by side; None if one doesn't reach the end."""
     exponent = prepared.system.scaling.momentum
-    count = _sample_count(average, end - begin)
+    count = _sample_count(motion_at(average, states, exponent), end - begin)
     scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
     if begin != float(prepared.scene.start):
         scene = _with_bodies(scene, prepared, states)
-    back = average.resonance is None  # whether what averaging removed can be added back
+    # whether what averaging removed can be added back
+    back = average.resonance is None and average.driven is None
     names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
-    full = _followed(prepared, scene, FULL, True, names, go_on)
-    reduced = _followed(prepared, scene, average.level, back, names, go_on) if full else None
+    changing = [] if average.driven is None else [SIZE]
+    energies = [] if average.driven is None else [_OF_ROTATION, ENERGY]
+    full = _followed(prepared, scene, FULL, True, names + changing + energies[:1], go_on)
+    wanted = names + changing + energies[1:]
+    reduced = _followed(prepared, scene, average.level, back, wanted, go_on) if full else None
     plain = reduced
     if reduced and back and not average.short_period:
         plain = _followed(prepared, scene, average.level, False, names, go_on)
@@ -114,7 +152,21 @@ def side_by_side(
         (float(growth[0]), float(growth[1])),
         float(np.linalg.norm(first - last)) / 2,
         reduced[0],
+        _changes(times, true, reduced[1]) if average.driven is not None else {},
     )
+
+
+def _changes(
+    times: np.ndarray, true: Mapping[str, np.ndarray], reduced: Mapping[str, np.ndarray]
+) -> dict[str, Change]:
+    third, found = len(times) // 3, {}
+    for name, other in ((SIZE, SIZE), (ENERGY, _OF_ROTATION)):
+        apart = true[other].ravel() / reduced[name].ravel() - 1
+        parts = apart[:, None]
+        first, last = _slope(times[: 2 * third], parts[: 2 * third]), _slope(times[third:], parts[third:])
+        growth = float(_slope(times, parts)[0])
+        found[name] = Change(float(np.abs(apart).max()), growth, float(abs(first[0] - last[0])) / 2)
+    return found
 
 
 def _starting(
@@ -127,7 +179,8 @@ def _starting(
     count: int,
 ) -> Scene:
     """The full scene from a time on: the body as at its start, turned by the smallest rotation that brings
-    its momentum to the present one; in a resonance, as given by the slow motion.
+    its momentum to the present one; in a resonance, as given by the slow motion; under torques of the body
+    alone, on the present polhode.
 
     Args:
         states: states of the averaged motion.
@@ -146,7 +199,11 @@ def _starting(
         quaternion, velocity = average.resonance.osculating(slow, scene, samples.start)
         return replace(moved, quaternion=quaternion, euler_angles=None, angular_velocity=velocity)
     matrix = attitude.rotation_matrix(scene.quaternion)
-    momentum = apply(matrix, apply(scene.body.inertia, scene.angular_velocity))
+    inside = apply(scene.body.inertia, scene.angular_velocity)
+    if average.driven is not None:
+        inside = average.driven.momentum(*(context.ldexp(x, exponent) for x in states[3:5]))
+        moved = replace(moved, angular_velocity=apply(scene.inverse_inertia, inside))
+    momentum = apply(matrix, inside)
     size = norm(context, momentum)
     before = [x / size for x in momentum]
     now = osculating(scene, average, states[:3], samples.start)
@@ -186,7 +243,7 @@ class _AsDoubles(SampleReceiver):
             pieces.append(np.asarray(recorded[name][0], dtype=np.float64))
 
     def of(self, name: str) -> np.ndarray:
-        """A recorded vector, (samples, 3)."""
+        """A recorded variable, its samples first."""
         return np.concatenate(self._pieces[name])
 
 

@@ -22,12 +22,15 @@ def print_modelling(found: Modelling | None, on: Page) -> None:
     if found.figure_axis is not None:
         text += f", figure axis within {found.figure_axis:.1e} rad"
     on.line("averaged", text)
+    if found.angular_momentum_norm is not None and found.energy is not None:
+        text = f"size of the angular momentum within {found.angular_momentum_norm:.1e} of itself, energy of "
+        on.line("", text + f"rotation within {found.energy:.1e}")
     if not found.whole and found.growth is not None and found.oscillation is not None:
         span = found.windows[0].end - found.windows[0].start
         text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
         text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * _YEAR:.1e} rad/yr"
         on.line("", text)
-    if not found.short_period:
+    if not found.short_period and found.energy is None:
         on.line("", "[model] short_period = true adds the nutation back that averaging removed")
 
 

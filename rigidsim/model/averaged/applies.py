@@ -20,9 +20,11 @@ from rigidsim.look.readable_time import span_text
 from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
+from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.model.load import Load
 from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.surfaces import surfaces_of
 
 LIBRATION = 2.0
 """Least distance of a frequency combination from zero, in half-widths of libration: motions near the
@@ -51,6 +53,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         ConfigError: no average applies; says why.
     """
     config, level = scene.config, scene.config.model.level
+    alone = [load for load in loads if load.gradient_source is None]
     integrator = config.integrator
     against: str | None = None
     if scene.free_flight:
@@ -59,9 +62,16 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "no torque acts, so that the direction of the angular momentum rests"
     elif max(scene.body.principal_moments) == min(scene.body.principal_moments):
         against = "no gradient has a torque on a body whose moments are all the same"
-    elif strange := [load.title for load in loads if load.gradient_source is None]:
-        against = f"{strange[0]} is no gravity gradient of a source with elements, a place or an ephemeris, "
-        against += "nor of one of [[bodies]]"
+        if alone:
+            against = "a body whose moments are all the same turns steadily, and nothing averages its torques"
+    elif alone and level == ORBIT_AVERAGED:
+        against = f"{alone[0].title} is no gravity gradient, and is averaged over the rotation alone"
+        raise _refused(level, against, 'choose "spin_averaged"')
+    elif strange := [load.title for load in alone if not reads_rates_alone(load)]:
+        against = f"{strange[0]} is neither the gravity gradient of a source with elements, a place or an "
+        against += "ephemeris, nor of one of [[bodies]], nor a function of the rates in body axes"
+    elif alone and (found := surfaces_of(scene).found):
+        against = f"{found[0].text} ({found[0].where}) has a kink or jump, over which no average is smooth"
     elif all(w == 0 for w in scene.angular_velocity):
         against = "the body starts at rest"
     elif integrator.formulation != "auto":
@@ -93,10 +103,24 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
             raise _refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
     if against is not None:
         raise _refused(level, against)
+    if alone and config.model.short_period:
+        what = (
+            f"given true, but what {alone[0].title} does within a rotation isn't added back; set it to false"
+        )
+        raise ConfigError(Problem("[model] short_period", what))
 
 
-def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source]) -> Resonance | None:
+def refuse_frequencies(
+    scene: Scene,
+    spectrum: BodySpectrum,
+    sources: Sequence[Source],
+    moving: tuple[BodySpectrum, float] | None = None,
+) -> Resonance | None:
     """Refuse a motion whose frequencies aren't far enough apart.
+
+    Args:
+        moving: for a rotation that torques change, its harmonics at another time, and how many seconds lie
+            between: resonances that it passes too fast to be captured are no reason to refuse it.
 
     Returns:
         The spin-orbit resonance that an average over the orbits can keep; None without one.
@@ -106,7 +130,7 @@ def refuse_frequencies(scene: Scene, spectrum: BodySpectrum, sources: Sequence[S
     """
     for source in sources:
         _refuse_passing(scene, spectrum, source)
-    found = [_refuse_resonance(scene, spectrum, source) for source in sources]
+    found = [_refuse_resonance(scene, spectrum, source, moving) for source in sources]
     kept = [resonance for resonance in found if resonance is not None]
     if len(kept) > 1:
         what = f"the body keeps pace with [[loads]] number {kept[0].source.number} ({kept[0].name}) and "
@@ -153,7 +177,9 @@ def swing_of(spectrum: BodySpectrum, source: Source) -> float:
     return strongest * float((sizes / rates).sum()) / float(spectrum.motion.momentum)
 
 
-def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance | None:
+def _refuse_resonance(
+    scene: Scene, spectrum: BodySpectrum, source: Source, moving: tuple[BodySpectrum, float] | None
+) -> Resonance | None:
     """Refuse resonances; return the one that can be kept, if it is the only one."""
     found = np.flatnonzero(spectrum.oscillating.ravel())
     if not len(found):
@@ -173,6 +199,12 @@ def _refuse_resonance(scene: Scene, spectrum: BodySpectrum, source: Source) -> R
     rate = np.abs(np.abs(body[:, None]) - k[None, :] * source.motion)
     swing = energy / (float(spectrum.motion.momentum) * np.maximum(rate, 1e-300))
     slow = LIBRATION * width + 2 * source.slow_rate + 2 * source.uncertainty * k[None, :]
+    if moving is not None:
+        other, seconds = moving
+        drift = np.abs(np.abs(other.frequencies.ravel()[found]) - np.abs(body))[:, None] / seconds
+        passes = drift > (width / 2) ** 2
+        kick = energy / float(spectrum.motion.momentum) * np.sqrt(2 * np.pi / np.maximum(drift, 1e-300))
+        slow, swing = np.where(passes, 0.0, slow), np.where(passes, np.minimum(swing, kick), swing)
     kept = _offered(scene, spectrum, source)
     own = np.zeros(rate.shape, dtype=bool)
     if kept is not None:

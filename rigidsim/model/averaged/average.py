@@ -8,6 +8,7 @@ size would remain, and change the rate of precession with it (the osculating and
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,15 +22,18 @@ from rigidsim.model.averaged.applies import (
     separatrix_refused,
     swing_of,
 )
+from rigidsim.model.averaged.driven import Driven, driven_by, frame_along
 from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
 from rigidsim.model.averaged.orbit_terms import nutation
+from rigidsim.model.averaged.passages import passing
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
 from rigidsim.model.load import Load
 from rigidsim.model.orbits.table_states import Carried
+from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
+from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm, working_bits
 from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
@@ -72,6 +76,8 @@ class Average:
             0 elsewhere.
         resonance: spin-orbit resonance whose angle is kept; None without one.
         slow: start of the resonant motion; None without a resonance.
+        driven: what torques of the body alone do; None without such torques. Then ``motion`` and ``energy``
+            are those of the start.
     """
 
     level: str
@@ -84,6 +90,7 @@ class Average:
     figure: int
     resonance: Resonance | None = None
     slow: SlowStart | None = None
+    driven: Driven | None = None
 
     @property
     def over_orbits(self) -> bool:
@@ -97,14 +104,16 @@ class Average:
             return Carried.ECCENTRIC
         return Carried.MEAN if self.short_period else Carried.NEITHER
 
-    def slow_states(self, exponent: int) -> Vector | None:
-        """Initial slow states of a resonant average; None without a resonance.
+    def initial(self, exponent: int) -> Vector:
+        """Initial states.
 
         Args:
             exponent: binary exponent of the internal unit of angular momentum.
         """
+        if self.driven is not None:
+            return [*self.start, *self.driven.states(exponent)]
         if self.resonance is None or self.slow is None:
-            return None
+            return list(self.start)
         return [*self.slow.quaternion, self.resonance.context.ldexp(self.slow.excess, -exponent)]
 
     def rate(self, source: Source) -> Any:
@@ -116,6 +125,11 @@ class Average:
     @property
     def rate_bound(self) -> Any:
         """Bound of the rate at which the momentum turns, rad/s (mpf)."""
+        if self.driven is not None:
+            spread, unit = max(self.motion.moments) - min(self.motion.moments), self.driven.torques.scaling
+            strength = sum((source.strength * source.nearest for source in self.sources), 0 * spread)
+            own = math.ldexp(self.driven.course.fastest, -unit.time)
+            return strength * spread / (self.motion.momentum * self.driven.course.least) + own
         found = sum(abs(self.rate(source)) * source.nearest for source in self.sources)
         if self.resonance is not None:
             assert self.slow is not None
@@ -135,15 +149,19 @@ class Average:
                 across = cross(source.normal(context, time), self.start)
                 square = dot(across, across)
             total += size * square
-        return total
+        # as the momentum becomes smaller, it precesses faster
+        return total if self.driven is None else total / self.driven.course.least
 
     def tilt(self, context: Any) -> float:
         """Largest angle between the momentum and the circled axis, rad."""
         return float(self.motion.tilt(context))
 
 
-def average_of(scene: Scene, loads: Sequence[Load]) -> Average:
+def average_of(scene: Scene, loads: Sequence[Load], scaling: Scaling) -> Average:
     """The averaged motion that a scene's ``[model] level`` asks for.
+
+    Args:
+        scaling: internal units, all rates in the same.
 
     Raises:
         ConfigError: an average that doesn't apply, with the reason and what to do.
@@ -156,12 +174,15 @@ def average_of(scene: Scene, loads: Sequence[Load]) -> Average:
     try:
         motion = free_motion(context, body, momentum)
         spectrum = body_spectrum(motion)
-        resonance = refuse_frequencies(scene, spectrum, sources)
+        alone = [load for load in loads if load.gradient_source is None]
+        resonance = None if alone else refuse_frequencies(scene, spectrum, sources)
         if resonance is not None:
             return _resonant(scene, resonance, sources)
         vector = apply(matrix, momentum)
         removed = _left_out_at_start(scene, spectrum, sources, unit(context, vector))
         vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
+        if alone:
+            return _driven(scene, alone, sources, spectrum, unit(context, vector), scaling)
         motion = free_motion(context, body, momentum, norm(context, vector))
     except Separatrix:
         raise separatrix_refused(table.level) from None
@@ -206,6 +227,39 @@ def _resonant(scene: Scene, resonance: Resonance, sources: Sequence[Source]) -> 
     )
 
 
+def _driven(
+    scene: Scene,
+    alone: Sequence[Load],
+    sources: Sequence[Source],
+    spectrum: BodySpectrum,
+    direction: Vector,
+    scaling: Scaling,
+) -> Average:
+    """The average under torques of the body alone as well.
+
+    Args:
+        alone: loads that aren't gradients.
+        direction: of the momentum at the start, less what the gradients let oscillate.
+    """
+    context, table = scene.context, scene.config.model
+    epsilon = 2.0 ** (1 - working_bits(scene.config.integrator.precision))
+    driven = passing(scene, driven_by(scene, scaling, alone, epsilon), sources)
+    start = [x - context.mpf(float(y)) for x, y in zip(direction, driven.direction, strict=True)]
+    motion = driven.motion(driven.axial, driven.transverse)
+    steady = driven.course.tilt <= AXIAL
+    return Average(
+        table.level,
+        False,
+        motion,
+        sources,
+        unit(context, start),
+        driven.polhodes.energy(driven.axial, driven.transverse),
+        sum((swing_of(spectrum, source) for source in sources), driven.course.swing),
+        _figure(scene, motion) if steady else 0,
+        driven=driven,
+    )
+
+
 def _figure(scene: Scene, motion: FreeMotion) -> int:
     along = dot(scene.figure.pole, motion.axes[2])
     if abs(abs(along) - 1) > negligible(scene.context) or motion.tilt(scene.context) > AXIAL:
@@ -217,7 +271,7 @@ def _left_out_at_start(
     scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source], direction: Vector
 ) -> np.ndarray:
     """Part of the initial momentum that averaging over the rotation removes, kg m^2/s, space axes."""
-    space = _frame(np.array([float(x) for x in direction]))
+    space = frame_along(np.array([float(x) for x in direction]))
     body = np.array([[float(x) for x in row] for row in attitude.rotation_matrix(scene.quaternion)])
     principal = np.array([[float(x) for x in axis] for axis in spectrum.motion.axes]).T
     phases = spectrum.phases(space @ body @ principal)
@@ -235,14 +289,6 @@ def _left_out_at_start(
                 product[0, 1] - product[1, 0],
             ]
     return total
-
-
-def _frame(z: np.ndarray) -> np.ndarray:
-    """Right-handed orthonormal axes as rows, z last."""
-    z = z / np.linalg.norm(z)
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x /= np.linalg.norm(x)
-    return np.array([x, np.cross(z, x), z])
 
 
 def osculating(scene: Scene, average: Average, mean: Sequence[Any], time: Any) -> Vector:

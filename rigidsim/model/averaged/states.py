@@ -10,6 +10,7 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.applies import told_of_resonances
 from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
+from rigidsim.model.averaged.driven_mechanics import AMPLITUDES, DrivenMechanics
 from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
 from rigidsim.model.formulations import AttitudeStates
@@ -30,6 +31,13 @@ WHY = {
     "rotation and over the sources' orbits: its size and the energy stay as they are",
 }
 
+_WHY_TURNED = "the direction of the angular momentum, under gravity gradients averaged over the free rotation"
+_WHY_AT_REST = "the direction of the angular momentum, which torques of the body alone don't turn on average"
+WHY_DRIVEN = (
+    "the direction of the angular momentum, and its largest components along the axis that it circles and "
+    "across it, under torques averaged over the body's free rotation"
+)
+
 
 def _resonant_states(
     scene: Scene,
@@ -41,9 +49,8 @@ def _resonant_states(
     number: Rounder,
 ) -> tuple[AveragedMechanics, list[StateBlock]]:
     """States of a body in spin-orbit resonance."""
-    resonance, initial = average.resonance, average.slow_states(scaling.momentum)
+    resonance, initial = average.resonance, average.initial(scaling.momentum)
     assert resonance is not None
-    assert initial is not None
     q = list(hy.make_vars(*SLOW[:4]))
     attitude = AttitudeStates(
         average.level, SLOW[:4], [], initial[:4], [], q, "state",
@@ -61,6 +68,15 @@ def _resonant_states(
     exponents = [0] * 4 + [scaling.momentum]
     slow = StateBlock(SLOW, m.slow_derivatives, initial, exponents=exponents, why=why)
     return m, [slow, *_point_masses(m)]
+
+
+def _amplitudes(m: DrivenMechanics, scaling: Scaling) -> StateBlock:
+    """P and Q of a driven motion."""
+    why = f"size of the momentum and energy of rotation, under {' and '.join(m.driven.titles)}: its largest "
+    why += "components along the axis that it circles and across it"
+    exponents = [scaling.momentum] * 2
+    initial = m.driven.states(scaling.momentum)
+    return StateBlock(AMPLITUDES, m.amplitude_rates, initial, exponents=exponents, why=why)
 
 
 def refuse_untold(average: Average, record: Sequence[str] | None) -> None:
@@ -111,12 +127,18 @@ def averaged_states(
             hy.sqrt(hy.sum([x * x for x in s])),
         ),
     )
-    m = AveragedMechanics(
+    kind = AveragedMechanics if average.driven is None else DrivenMechanics
+    m = kind(
         scene, scaling, numbers, s, attitude, None, None, None, number, orbit_tags, tables=tables,
         loads=list(loads), average=average,
     )  # fmt: skip
-    why = WHY[average.level] + told_of_resonances(average.sources)
+    why = WHY[average.level]
+    if average.driven is not None:
+        why = _WHY_TURNED if average.sources else _WHY_AT_REST
+    why += told_of_resonances(average.sources)
     blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=why)]
+    if isinstance(m, DrivenMechanics):
+        blocks.append(_amplitudes(m, scaling))
     for orbit in tables:
         what = "elements of" if average.over_orbits else "where"
         which = "the source's orbit" if average.over_orbits else "the source is"

@@ -1,0 +1,196 @@
+"""Start of an averaged motion under torques of the body alone: its polhode, and what averaging removes.
+
+The amplitudes P and Q and the momentum's direction at the start are those of the full motion less their
+periodic terms, to first order in the torques (see ``course``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.look.readable_time import span_text
+from rigidsim.model.averaged.course import SWING, Course, NoCourse, Wave, follow, wave_of
+from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
+from rigidsim.model.averaged.polhode import Polhodes
+from rigidsim.model.averaged.torques import DrivingTorques
+from rigidsim.model.load import Load
+from rigidsim.model.numbers import scaled_numbers
+from rigidsim.model.scaling import Scaling
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Vector, apply, dot, norm
+from rigidsim.scene.records import dataclass
+from rigidsim.scene.scene import Scene
+
+EPSILON = 2.0**-60
+"""Error that mean torques are worked out to in double precision and below; in higher ones 2^-7 epsilon."""
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What torques of the body alone do to an averaged motion; numbers are mpf, SI.
+
+    Attributes:
+        titles: of these loads.
+        axial, transverse: P and Q at the start.
+        amplitude: f at the start, rad.
+        epsilon: to which torques are averaged.
+        direction: periodic part of the momentum's direction at the start.
+        passed: sum of the angles (rad) by which resonances with gradients turn the momentum.
+    """
+
+    titles: Sequence[str]
+    polhodes: Polhodes
+    torques: DrivingTorques
+    course: Course
+    axial: Any
+    transverse: Any
+    amplitude: float
+    epsilon: float
+    direction: np.ndarray
+    passed: float = 0.0
+
+    @property
+    def scatter(self) -> float:
+        """Angle (rad) by which all resonances that are passed may turn the momentum."""
+        return self.course.scatter + self.passed
+
+    def states(self, exponent: int) -> Vector:
+        """Initial P and Q in internal units of angular momentum, 2^exponent kg m^2/s."""
+        context = self.torques.scene.context
+        return [context.ldexp(x, -exponent) for x in (self.axial, self.transverse)]
+
+    def momentum(self, axial: Any, transverse: Any) -> Vector:
+        """Angular momentum, body axes, where f is as at the start, on the polhode of amplitudes P and Q."""
+        context = self.torques.scene.context
+        turn = context.mpf(self.amplitude)
+        return self.polhodes.momentum(context, axial, transverse, context.cos(turn), context.sin(turn))
+
+    def motion(self, axial: Any, transverse: Any) -> FreeMotion:
+        """Free motion on the polhode of amplitudes P and Q."""
+        scene = self.torques.scene
+        return free_motion(scene.context, scene.body, self.momentum(axial, transverse))
+
+
+def driven_by(scene: Scene, scaling: Scaling, loads: Sequence[Load], epsilon: float) -> Driven:
+    """What these loads, functions of the rates, do to a body that turns as the scene starts.
+
+    Args:
+        epsilon: of the run's precision.
+
+    Raises:
+        Separatrix: the body turns about its intermediate axis.
+        ConfigError: their average doesn't apply.
+    """
+    context, exponent = scene.context, scaling.momentum
+    numbers = scaled_numbers(scene, scaling)
+    momentum = apply(scene.body.inertia, scene.angular_velocity)
+    motion = free_motion(context, scene.body, momentum)
+    polhodes = Polhodes.of(context, motion)
+    torques = DrivingTorques.of(scene, scaling, numbers, polhodes, loads)
+    _refuse_what_changes(scene, torques)
+    first, second, third = (dot(axis, momentum) for axis in polhodes.axes)
+    across = context.sqrt((first / polhodes.root) ** 2 + second**2)
+    axial = third * context.sqrt(1 + (1 - polhodes.ratio) * (second / third) ** 2) if third else third
+    amplitude = math.atan2(float(second), float(first / polhodes.root)) if across != 0 else 0.0
+    start = [float(context.ldexp(x, -exponent)) for x in (axial, across)]
+    wave = wave_of(torques, *start)
+    removed = _at(wave.periodic, amplitude)
+    fine = np.isfinite(removed).all()
+    if fine:  # what isn't is refused below
+        axial -= context.ldexp(context.mpf(float(removed[0])), exponent)
+        across -= context.ldexp(context.mpf(float(removed[1])), exponent)
+        start = [float(context.ldexp(x, -exponent)) for x in (axial, across)]
+    begin, end = (float(context.ldexp(x, -scaling.time)) for x in (scene.start, scene.end))
+    fineness = min(EPSILON, epsilon / 128)
+    try:
+        course = follow(torques, start, begin, end, fineness)
+    except NoCourse as none:
+        level = scene.config.model.level
+        what = f'given "{level}", but {none}'
+        if none.until is not None and none.until > float(scene.start):
+            what += f" after {none.until:.6g} s ({span_text(none.until)}): end the run by then, or"
+        else:
+            what += ";"
+        what += ' choose level = "full"'
+        raise ConfigError(Problem("[model] level", what)) from None
+    titles = list(dict.fromkeys(load.title for load in loads))
+    direction = _direction_removed(scene, polhodes, wave, momentum, amplitude)
+    return Driven(titles, polhodes, torques, course, axial, across, amplitude, fineness, direction)
+
+
+def _refuse_what_changes(scene: Scene, torques: DrivingTorques) -> None:
+    against = None
+    if any(load.extra_states(torques.bare) is not None for load in torques.others):
+        against = "a load has states of its own"
+    elif torques.depends_on_time:
+        against = "a torque depends on time"
+    if against is not None:
+        what = f'given "{scene.config.model.level}", but {against}, and only torques that are functions of '
+        what += 'the rates about the body axes are averaged; choose level = "full"'
+        raise ConfigError(Problem("[model] level", what))
+
+
+def _at(values: np.ndarray, angle: float) -> np.ndarray:
+    """Periodic functions, given by their values along the last dimension, at an angle."""
+    count = values.shape[-1]
+    if not np.isfinite(values).all():
+        return np.full(values.shape[:-1], np.inf)
+    order = np.fft.fftfreq(count, 1 / count)
+    return np.asarray((np.fft.fft(values) @ np.exp(1j * order * angle)).real / count)
+
+
+def _direction_removed(
+    scene: Scene, polhodes: Polhodes, wave: Wave, momentum: Vector, amplitude: float
+) -> np.ndarray:
+    """Periodic part of the momentum's direction at the start, space axes."""
+    context = scene.context
+    combined = wave.precession + wave.orders * wave.wobble
+    sizes = np.abs(wave.harmonics)
+    # one that stands still is passed or refused in ``course``, and has no periodic part
+    moving = np.abs(combined) * SWING > sizes
+    parts = np.where(moving, wave.harmonics / np.where(moving, 1j * combined, 1.0), 0.0)
+    found = complex(parts @ np.exp(1j * wave.orders * amplitude))
+    if found == 0:
+        return np.zeros(3)
+    body = np.array([[float(x) for x in row] for row in attitude.rotation_matrix(scene.quaternion)])
+    size = norm(context, momentum)
+    principal = np.array([[float(x) for x in axis] for axis in polhodes.axes])
+    along = np.array([float(x / size) for x in momentum])
+    space = frame_along(body @ along)
+    m = principal @ along
+    own = math.atan2(m[0], m[1])
+    if polhodes.symmetric or math.hypot(m[0], m[1]) == 0:
+        own = math.atan2(float(polhodes.root) * math.cos(amplitude), math.sin(amplitude))
+    nodding = math.atan2(math.hypot(m[0], m[1]), m[2])
+    matrix = space @ body @ principal.T @ about_z(own).T @ about_x(nodding).T
+    precession = math.atan2(matrix[1, 0], matrix[0, 0])
+    start = complex(
+        _at(np.exp(1j * wave.phase).real, amplitude), _at(np.exp(1j * wave.phase).imag, amplitude)
+    )
+    found *= complex(math.cos(precession), math.sin(precession)) / start
+    return np.asarray(space.T @ np.array([found.real, found.imag, 0.0]))
+
+
+def about_z(angle: float) -> np.ndarray:
+    """Rotation matrix about the z axis."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def about_x(angle: float) -> np.ndarray:
+    """Rotation matrix about the x axis."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def frame_along(z: np.ndarray) -> np.ndarray:
+    """Right-handed orthonormal axes as rows, z last."""
+    z = z / np.linalg.norm(z)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(z, x), z])

@@ -1,0 +1,93 @@
+"""Averaged runs under torques that do work, against the full one and against exact solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import config, run_text
+
+import rigidsim
+
+EPS = np.finfo(float).eps
+START = 'angular_velocity = [0.4, 0.5, 1.2]\neuler_angles = [0.3, "35 deg", 0]'
+BODY = "principal_moments = [1, 1.7, 2]"
+GRADIENT = """kind = "gravity_gradient"
+gravitational_parameter = 4e-5
+orbit = {semi_major_axis = 1, eccentricity = 0.1, inclination = "20 deg"}"""
+RECORD = 'record = ["momentum_axis", "angular_momentum_norm", "energy", "rotational_energy"]'
+
+
+def viscous(size: float) -> str:
+    return f'kind = "viscous_torque"\ncoefficients = [{size}, {2 * size}, {1.5 * size}]'
+
+
+def text(level: str, loads: str, end: float, body: str = BODY) -> str:
+    record = RECORD if level == "full" else RECORD.replace(', "rotational_energy"', "")
+    return config(
+        body, START, loads, f"end = {end}\nsamples = 401", "", record, f'[model]\nlevel = "{level}"'
+    )
+
+
+def values(run: rigidsim.Run, name: str) -> np.ndarray:
+    return np.asarray(run.dataset[name].values)
+
+
+def apart(reduced: rigidsim.Run, full: rigidsim.Run) -> dict[str, float]:
+    """Largest differences: rad, and relative."""
+    axes = values(reduced, "momentum_axis") - values(full, "momentum_axis")
+    size = values(reduced, "angular_momentum_norm") / values(full, "angular_momentum_norm") - 1
+    energy = values(reduced, "energy") / values(full, "rotational_energy") - 1
+    return {
+        "momentum_axis": float(np.linalg.norm(axes, axis=1).max()),
+        "angular_momentum_norm": float(np.abs(size).max()),
+        "energy": float(np.abs(energy).max()),
+    }
+
+
+def test_an_axisymmetric_body_decays_exactly() -> None:
+    """w1, w2 = e^(-c t / A), w3 = e^(-d t / C): nothing is lost in averaging, nor anything in steps."""
+    moments, damping, end = np.array([1.0, 1.0, 2.0]), np.array([1e-4, 1e-4, 1.5e-4]), 1e5
+    loads = f'kind = "viscous_torque"\ncoefficients = {damping.tolist()}'
+    run = run_text(text("spin_averaged", loads, end, "principal_moments = [1, 1, 2]"))
+    times = values(run, "time")
+    rates = np.array([0.4, 0.5, 1.2])[:, None] * np.exp(-(damping / moments)[:, None] * times)
+    size = np.linalg.norm(moments[:, None] * rates, axis=0)
+    energy = (moments[:, None] * rates**2).sum(axis=0) / 2
+    # ten e-foldings: the states err by the tolerance, relative to the start
+    bound = 1024 * EPS
+    np.testing.assert_allclose(values(run, "angular_momentum_norm"), size, atol=bound * size[0])
+    np.testing.assert_allclose(values(run, "energy"), energy, atol=bound * energy[0])
+    assert np.abs(np.diff(values(run, "momentum_axis"), axis=0)).max() <= 4 * EPS
+    assert run.summary["cost"]["steps"] < 100
+
+
+@pytest.mark.parametrize("more", ["", f"\n[[loads]]\n{GRADIENT}"], ids=["alone", "with a gradient"])
+def test_the_announced_errors_cover_the_true_ones(more: str) -> None:
+    loads = viscous(1e-4) + more
+    full = run_text(text("full", loads, 4000))
+    run = run_text(text("spin_averaged", loads, 4000), estimate=True)
+    assert run.summary["cost"]["steps"] < 0.03 * full.summary["cost"]["steps"]
+    lost = 1 - values(full, "angular_momentum_norm")[-1] / values(full, "angular_momentum_norm")[0]
+    assert lost > 0.2  # so that there is something to follow
+    announced, true = run.summary["modelling"], apart(run, full)
+    for name, error in true.items():
+        assert error <= announced[name] <= 4 * error, name
+    assert announced["whole"] == bool(more)
+    assert list(run.summary["invariants"]) == ["momentum_axis_norm"]
+
+
+def test_errors_are_of_the_first_order() -> None:
+    """A tenth of the torque over ten times as long: a tenth of the error, as the same part is lost."""
+    errors = []
+    for size, end in ((1e-3, 400), (1e-4, 4000)):
+        loads = viscous(size)
+        errors.append(apart(run_text(text("spin_averaged", loads, end)), run_text(text("full", loads, end))))
+    for name, coarse in errors[0].items():
+        assert 7 < coarse / errors[1][name] < 14, name
+
+
+def test_plan_says_which_states_there_are_and_why() -> None:
+    planned = rigidsim.plan(rigidsim.parse(text("spin_averaged", viscous(1e-4), 4000)))
+    states = {entry["states"]: entry["why"] for entry in planned["reasons"]}
+    assert list(states) == ["sx sy sz", "axial transverse"]
+    assert "viscous_torque" in states["axial transverse"]
