@@ -41,7 +41,7 @@ def verdict_line(summary: Summary) -> tuple[str, str]:
 
 
 def _percent(share: float) -> str:
-    return "none" if share == 0 else f"{100 * share:.2g} %" if share >= 0.001 else "less than 0.1 %"
+    return "0 %" if share == 0 else f"{100 * share:.2g} %" if share >= 0.001 else "less than 0.1 %"
 
 
 def advice_line(advice: Advice) -> str | None:
