@@ -69,6 +69,14 @@ def test_the_mean_of_the_squared_sine_is_that_of_elliptic_integrals(parameter: f
             assert abs(mean_square_sine(k2, mpmath.sqrt, 2) - exact) > epsilon
 
 
+def test_a_torque_whose_mean_vanishes_leaves_the_amplitudes() -> None:
+    """wx wy has one sign in as many quarters of a turn as the other."""
+    odd = 'kind = "torque"\ncomponents = ["0", "0", "1e-4*wx*wy"]'
+    problem = prepared(odd)
+    changes = driven(problem).torques.mean(1.3, 0.4, 64)
+    assert np.abs(changes).max() < 1e-4 * EPS
+
+
 @pytest.mark.parametrize("parameter", PARAMETERS)
 @pytest.mark.parametrize("digits", [15, 33])
 def test_sums_over_nodes_err_by_less_than_their_bound(parameter: float, digits: int) -> None:

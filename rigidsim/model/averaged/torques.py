@@ -153,9 +153,11 @@ class DrivingTorques:
         ratio = float(self.polhodes.ratio)
         largest = max(float((1 - ratio) * (q / p) ** 2) for p, q in amplitudes) if ratio != 1 else 0.0
         count = nodes_needed(largest, max(epsilon, 2.0**-_BITS_CHECKED)) + 8
+        # of what is averaged: a mean may vanish
+        around = 2 * np.pi * (np.arange(count) + 0.5) / count
+        scale = max(float(np.abs(self.change(p, q, around)).max()) for p, q in amplitudes)
         while count <= _MOST_NODES:
             pairs = [(self.mean(p, q, count), self.mean(p, q, 2 * count)) for p, q in amplitudes]
-            scale = max(float(np.abs(fine).max()) for _, fine in pairs)
             if all(float(np.abs(x - y).max()) <= _CHECKED * scale for x, y in pairs):
                 more = -np.log2(epsilon) / _BITS_CHECKED
                 return int(np.ceil(count * max(1.0, more)))
