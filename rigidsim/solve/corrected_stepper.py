@@ -170,8 +170,8 @@ class CorrectedStepper:
         """
         stepper, smallest, largest = self.stepper, math.inf, 0.0
         while count > 0 and not self.collapsed:
-            before = stepper.steps
-            if not stepper.skip(min(count, self.left)):
+            before, stride = stepper.steps, self.stride
+            if not stepper.skip(min(count, stride - before % stride)):
                 return False
             smallest, largest = min(smallest, stepper.smallest), max(largest, stepper.largest)
             stepper.smallest, stepper.largest = smallest, largest
@@ -193,8 +193,8 @@ class CorrectedStepper:
 
     def correct(self) -> None:
         """Make the corrections if they are due; dense output of the latest step is then void."""
-        change = self.charts is not None and self.charts.near(self.stepper.state)
         due = self.stepper.steps % self.stride == 0
+        change = self.charts is not None and self.charts.near(self.stepper.state)
         if not (due or change):
             return
         if self.whole_times and not self.stepper.to_whole_time():

@@ -51,19 +51,25 @@ def evaluate_rows(
     count = len(states)
     group = _GROUP if states.dtype in (np.float32, np.float64) else 1
     padded = -(-count // group) * group
-    if padded > count:
-        states = np.concatenate([states, np.repeat(states[-1:], padded - count, axis=0)])
     # compiled expressions without parameters don't accept an array of them
     arguments = {}
     if times is not None and getattr(function, "is_time_dependent", False):
-        moments = np.asarray(times, dtype=states.dtype)
-        arguments["time"] = np.concatenate([moments, np.repeat(moments[-1:], padded - count)])
+        arguments["time"] = _padded(np.asarray(times, dtype=states.dtype), padded)
     if constants is not None:
         table = np.repeat(constants[:, None], padded, axis=1) if constants.ndim == 1 else constants
-        if table.shape[1] < padded:
-            table = np.concatenate([table, np.repeat(table[:, -1:], padded - count, axis=1)], axis=1)
-        arguments["pars"] = np.ascontiguousarray(table)
-    return np.asarray(function(np.ascontiguousarray(states.T), **arguments))[:, :count]
+        arguments["pars"] = _padded(table, padded)
+    return np.asarray(function(_padded(states.T, padded), **arguments))[:, :count]
+
+
+def _padded(values: np.ndarray, count: int) -> np.ndarray:
+    """An array, contiguous, whose last axis is filled up to a length with its last value."""
+    given = values.shape[-1]
+    if given == count:
+        return np.ascontiguousarray(values)
+    filled = np.empty((*values.shape[:-1], count), dtype=values.dtype)
+    filled[..., :given] = values
+    filled[..., given:] = values[..., -1:]
+    return filled
 
 
 class _PartnerChart:
@@ -167,6 +173,7 @@ class Evaluator:
             (one, np.array(one.exponents, dtype=np.int32) if any(one.exponents) else None)
             for one in system.recorded
         ]
+        self._first_quaternion = [float(x) for x in system.scene.quaternion]
         factor = system.singular_factor
         self._singular = None if factor is None else self._compile([factor])
 
@@ -208,7 +215,7 @@ class Evaluator:
         values = evaluate_rows(self._outputs, block.states, initial, block.times)
         in_partner = block.chart != 0
         angles: np.ndarray | None = None
-        if in_partner.any():
+        if self._system.partner is not None and in_partner.any():
             there, angles = self._partner.values(
                 block.states[in_partner],
                 block.times[in_partner],
@@ -284,9 +291,13 @@ class Evaluator:
         """Give each quaternion the sign nearest to the one before."""
         plain = block.astype(np.float64)
         before = self.continuity.last_quaternion
-        if before is None:
-            before = np.array([float(x) for x in self._system.scene.quaternion])
-        products = np.einsum("ij,ij->i", plain, np.vstack([before, plain[:-1]]))
+        shifted = np.empty_like(plain)
+        shifted[0] = self._first_quaternion if before is None else before
+        shifted[1:] = plain[:-1]
+        products = np.einsum("ij,ij->i", plain, shifted)
+        if not (products < 0).any():
+            self.continuity.last_quaternion = plain[-1].copy()
+            return block
         signs = np.cumprod(np.where(products < 0, -1, 1))
         block = block.copy()
         block[signs < 0] = -block[signs < 0]

@@ -18,6 +18,7 @@ from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
 _CAREFUL = 2**20  # steps at once
+_LONG = 1e-3  # seconds; a step that takes longer isn't taken twice to be measured
 
 
 class IntegrationLoop:
@@ -59,6 +60,7 @@ class IntegrationLoop:
         self.ways = WayFinder(corrected, clock, precision, pacing)
         self.last = clock.at(clock.count - 1)
         self.stepper.destination = float(self.last)
+        self._unit = float(np.ldexp(1.0, clock.exponent))
         self._most_steps = most_steps
         self._pacing = pacing
         self._reach: Reach | None = None
@@ -85,7 +87,7 @@ class IntegrationLoop:
                 return self._ended(Status.MAX_DRIFT)
             self._settle(self.progress.last_good, self.last)
             return self._ended(Status.FINISHED)
-        self._look_ahead()
+        self._look_ahead(self.progress.last_good)
         while True:
             stop = self.check(self.progress) or self._out_of_steps()
             if stop is None:
@@ -124,7 +126,7 @@ class IntegrationLoop:
             self._take_reached()
             self.progress.integration_seconds += time.perf_counter() - started
         else:
-            finite = self._advance()
+            finite = self._advance(boundary)
         if self.buffer.complete:
             return Status.FINISHED
         if log.stop is not None and self._reach is None:
@@ -145,13 +147,16 @@ class IntegrationLoop:
         """The given number of steps, or as many as the step limit still allows."""
         return count if self._most_steps is None else min(count, self._most_steps - self.stepper.steps)
 
-    def _look_ahead(self) -> None:
-        """Measure the length and the duration of a step by one that is taken back."""
-        boundary = self.corrected.boundary()
-        started = time.perf_counter()
-        self.stepper.step()
-        self.ways.measured(SampleWay.STEP, 1, time.perf_counter() - started)
-        self.corrected.back_to(boundary)
+    def _look_ahead(self, boundary: StepBoundary) -> None:
+        """Measure the length and the duration of a step from here by one that is taken back."""
+        for _ in range(2):  # the first is slow, as is everything that is done for the first time
+            started = time.perf_counter()
+            self.stepper.step()
+            elapsed = time.perf_counter() - started
+            self.corrected.back_to(boundary)
+            if elapsed > _LONG:
+                break
+        self.ways.looked_ahead(elapsed)
 
     def _ended(self, status: Status) -> Progress:
         if self._reach is not None and not self.buffer.complete:
@@ -187,17 +192,17 @@ class IntegrationLoop:
 
     def _account(self) -> None:
         self.progress.steps = self.stepper.steps
-        self.progress.time = float(np.ldexp(float(self.stepper.time), self.clock.exponent))
+        self.progress.time = float(self.stepper.time) * self._unit
 
-    def _advance(self) -> bool:
-        """Take one chunk of steps; False if the state stopped being finite."""
+    def _advance(self, boundary: StepBoundary) -> bool:
+        """Take one chunk of steps from a boundary, which is here; False if the state stopped being finite."""
         started, before = time.perf_counter(), self.stepper.steps
         way, count = self.ways.choose(self.buffer.count, self.buffer.upcoming)
         count = self._allowed(count)
         if self._careful is not None:
             count = min(count, self._careful)
             self._careful = 2 * self._careful if self._careful < _CAREFUL else None
-        finite = self._WAYS[way](self, count)
+        finite = self._WAYS[way](self, count, boundary)
         elapsed = time.perf_counter() - started
         self.ways.measured(way, self.stepper.steps - before, elapsed)
         self.progress.integration_seconds += elapsed
@@ -206,9 +211,8 @@ class IntegrationLoop:
 
     # --- the four ways ----------------------------------------------------------------------------------
 
-    def _skip(self, count: int) -> bool:
+    def _skip(self, count: int, boundary: StepBoundary) -> bool:
         """Take many steps towards a sample; if they pass it, go back and repeat with fewer."""
-        boundary = self.corrected.boundary()
         if not self.corrected.skip(count) or self.stepper.unresolved:
             return self._lost(boundary, count)
         if self.stepper.time > self.buffer.upcoming:
@@ -216,21 +220,22 @@ class IntegrationLoop:
             self.ways.went_past()
             self.corrected.back_to(boundary)
             return True
+        mark = boundary.mark
+        self.ways.skipped(self.stepper.steps - mark.steps, float(self.stepper.time) - float(mark.time[0]))
         self._note_steps()
         return True
 
-    def _grid(self, count: int) -> bool:
+    def _grid(self, count: int, boundary: StepBoundary) -> bool:
         """Take whole strides from a whole time on, and the samples within them."""
         most = 2 * self._pacing.grid_rows
         while count > 0:
-            boundary = self.corrected.boundary()
             part = min(count, self.corrected.left)
             longest = self.ways.longest
             while True:  # until the samples asked for reach as far as the steps
                 horizon = float(self.stepper.time) + 2 * part * longest
                 times = self.buffer.until(self.precision.scalar(horizon), most)
                 if len(times) == most:  # they lie closer than those by which this way was chosen
-                    return self._step_by_step(part)
+                    return self._step_by_step(part, boundary)
                 finite, states = self.stepper.grid(times, part)
                 if not finite or self.stepper.unresolved:
                     return self._lost(boundary, part)
@@ -246,12 +251,11 @@ class IntegrationLoop:
                 break
             if not self.stepper.at_whole_time:
                 break
-            count -= part
+            count, boundary = count - part, self.corrected.boundary()
         return True
 
-    def _block(self, count: int) -> bool:
+    def _block(self, count: int, boundary: StepBoundary) -> bool:
         """Take steps with continuous output, not past the next correction."""
-        boundary = self.corrected.boundary()
         finite, output = self.stepper.block(count)
         if not finite or self.stepper.unresolved:
             return self._lost(boundary, count)
@@ -259,10 +263,12 @@ class IntegrationLoop:
         self._reached(Reach(boundary, output))
         return True
 
-    def _step_by_step(self, count: int) -> bool:
+    def _step_by_step(self, count: int, boundary: StepBoundary) -> bool:
         """Take single steps up to the first that reaches a sample, and on as long as each reaches one."""
-        upcoming, boundary, tried = self.buffer.upcoming, self.corrected.boundary(), 0
+        upcoming, tried = self.buffer.upcoming, 0
         for _ in range(count):
+            if tried and float(upcoming) - float(self.stepper.time) < self.stepper.largest:
+                boundary, tried = self.corrected.boundary(), 0  # so that nothing is taken back at the end
             tried += 1
             if not self.stepper.step():
                 return self._lost(boundary, tried)
@@ -282,7 +288,7 @@ class IntegrationLoop:
                     break
         return True
 
-    _Take: TypeAlias = "Callable[[IntegrationLoop, int], bool]"
+    _Take: TypeAlias = "Callable[[IntegrationLoop, int, StepBoundary], bool]"
     _WAYS: ClassVar[dict[SampleWay, _Take]] = {
         SampleWay.SKIP: _skip,
         SampleWay.GRID: _grid,
@@ -323,7 +329,9 @@ class IntegrationLoop:
     def _none_left(self, boundary: StepBoundary) -> None:
         """Continue after all samples within the last steps are taken: with corrections, or with the end."""
         self._reach = None
-        if self.buffer.complete:
+        if self.buffer.complete and self.stepper.steps == boundary.mark.steps + 1:
+            self._before = boundary
+        elif self.buffer.complete:
             self._settle(boundary, self.last)
         else:
             self.corrected.correct()

@@ -20,12 +20,16 @@ Single steps are what remains between the others, and all that pays beyond 80 bi
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sampling import SampleClock
+
+
+_SPARE = 4  # steps that a skip of steps of mean length ends early: a few are far from the mean
 
 
 class SampleWay(Enum):
@@ -58,7 +62,10 @@ class Pacing:
         least_block_steps: fewer are cheaper one by one.
         look_ahead: samples over which their spacing is measured.
         skip_from: steps to a sample from which skipping costs less than single steps.
-        skip_margin: share of the predicted steps to the next sample that are skipped at once.
+        skip_margin: share of the steps to the next sample, if all are as long as the longest recent one, that
+            are skipped at once.
+        even_margin: share of the steps to the next sample, if they are as long as those of the latest skip on
+            average, that are skipped at once if that is no more than the latest skip.
         fading: factor per chunk by which the longest recent step fades.
     """
 
@@ -76,6 +83,7 @@ class Pacing:
     look_ahead: int = 16
     skip_from: float = 12.0
     skip_margin: float = 0.9
+    even_margin: float = 0.97
     fading: float = 0.98
 
 
@@ -99,20 +107,33 @@ class WayFinder:
         self._pacing = pacing
         self._last = float(clock.at(clock.count - 1))
         self._paces: dict[SampleWay, float] = {}  # steps per second, as measured last
+        self._alone = 0.0  # those of a step that is taken for nothing else
+        self._skipped, self._mean = 0, math.inf  # steps of the latest skip, and their mean length
+        self._even = True  # whether skips by the mean length have never gone past their sample
         self.longest = 0.0
 
     def measured(self, way: SampleWay, steps: int, seconds: float) -> None:
         """Learn the duration of so many steps; single steps are measured before anything is chosen."""
         self._paces[way] = max(steps, 1) / max(seconds, 1e-9)
 
+    def looked_ahead(self, seconds: float) -> None:
+        """Learn the duration of a step before the first."""
+        self.measured(SampleWay.STEP, 1, seconds)
+        self._alone = self._paces[SampleWay.STEP]
+
     def _most(self, way: SampleWay) -> int:
         """Number of steps in a chunk."""
-        pace = self._paces.get(way, self._paces[SampleWay.STEP])
+        pace = self._paces.get(way, max(self._paces[SampleWay.STEP], self._alone))
         return max(1, int(pace * self._pacing.chunk_seconds))
+
+    def skipped(self, steps: int, span: float) -> None:
+        """Learn the length of so many steps from the time that they took the motion ahead."""
+        self._skipped, self._mean = steps, span / max(steps, 1)
 
     def went_past(self) -> None:
         """Note that a skip passed its sample: steps are longer than they seemed."""
         self.longest = 1.5 * max(self.longest, self._corrected.stepper.largest)
+        self._even = False
 
     def choose(self, following: int, upcoming: Scalar) -> tuple[SampleWay, int]:
         """How to continue, and for how many steps at most.
@@ -140,10 +161,14 @@ class WayFinder:
                     wanted = max(1, int(pacing.rows_at_once * spacing), pacing.least_block_steps)
                     return SampleWay.BLOCK, min(pacing.block_steps, wanted, corrected.left, left)
                 limit = corrected.left  # steps to where a block is worth it again
-        expected = (float(upcoming) - float(stepper.time)) / size
+        rest = float(upcoming) - float(stepper.time)
+        expected = rest / size
         if expected > pacing.skip_from:
-            steps = min(pacing.skip_margin * expected - 2, self._most(SampleWay.SKIP), limit)
-            return SampleWay.SKIP, max(1, int(steps))
+            steps = pacing.skip_margin * expected - 2
+            if self._even and self._mean > 0:
+                likely = pacing.even_margin * rest / self._mean - _SPARE
+                steps = max(steps, likely) if likely <= self._skipped else steps
+            return SampleWay.SKIP, max(1, int(min(steps, self._most(SampleWay.SKIP), limit)))
         return SampleWay.STEP, min(self._most(SampleWay.STEP), limit)
 
     def _spacing(self, following: int) -> float:

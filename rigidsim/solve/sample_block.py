@@ -53,6 +53,9 @@ class SampleBlock:
             reference: one row for each sample; None if it doesn't change either.
         """
         n = len(times)
+        if not angles.turns and reference is None and not len(put_back):  # columns of no width
+            none = np.empty((n, 0))
+            return cls(first, times, states, none.astype(np.int64), np.zeros(n, np.int64), none, none)
         turns = np.array([angles.turns], dtype=np.int64)
         if reference is None:
             reference = np.array([angles.reference], dtype=np.float64).repeat(n, axis=0)
@@ -75,6 +78,8 @@ class SampleBlock:
 
     def rows(self, start: int, stop: int) -> SampleBlock:
         """Samples start ... stop-1 of the block, or as many of them as there are."""
+        if start == 0 and stop >= len(self):
+            return self
         return SampleBlock(self.first + start, *(column[start:stop] for column in self._columns))
 
     @staticmethod
@@ -82,5 +87,5 @@ class SampleBlock:
         """Join at least one block with those that follow it."""
         if len(blocks) == 1:
             return blocks[0]
-        columns = zip(*(block._columns for block in blocks), strict=True)
-        return SampleBlock(blocks[0].first, *(np.concatenate(column) for column in columns))
+        columns = zip(*[block._columns for block in blocks], strict=True)
+        return SampleBlock(blocks[0].first, *[np.concatenate(column) for column in columns])

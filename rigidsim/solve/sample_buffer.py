@@ -64,8 +64,13 @@ class SampleBuffer:
 
     def until(self, limit: Scalar, most: int) -> np.ndarray:
         """Times of the next samples at or before ``limit``, at most ``most``."""
-        pieces = []
         position = first = self.count
+        if self._found <= 1 and most > 0 and position < self._clock.count:  # one is likely all there is
+            one = self._clock.none_or_one(position, limit)
+            if one is not None:
+                self._found = len(one)
+                return one
+        pieces = []
         rows = min(max(_FIRST_ROWS, self._found + self._found // 8), self._pacing.rows_at_once)
         stop = min(self._clock.count, position + max(most, 0))
         while position < stop:

@@ -64,7 +64,23 @@ class SampleClock:
 
     def at(self, index: int) -> Scalar:
         """One sample's time in internal units, a scalar of the precision."""
+        precision = self._precision
+        whole = self._whole[precision.bits]
+        plain = precision.cheap and precision.bits >= 53 and self._samples.times is None
+        if plain and whole is not None and self._fits(index, precision):  # arrays take ten times as long
+            return (whole[0] + precision.scalar(index) * whole[1]) / whole[2] * self._per_second
         return self.internal(index, index + 1)[0]
+
+    def none_or_one(self, index: int, limit: Scalar) -> np.ndarray | None:
+        """Times of the samples from ``index`` on that lie at or before a limit, as from ``internal``; None if
+        there are several.
+        """
+        time = self.at(index)
+        if time > limit:
+            return self._precision.zeros((0,))
+        if index + 1 < self.count and self.at(index + 1) <= limit:
+            return None
+        return np.array([time], dtype=self._precision.scalar)
 
     def label(self, index: int) -> float:
         """One sample's time in seconds, as in the dataset's coordinate."""
@@ -99,9 +115,8 @@ class SampleClock:
         if precision.bits < 53:
             return self._narrowed(self._seconds(first, stop, self._double), first, precision)
         if self._samples.times is None:
-            whole, farthest = self._whole[precision.bits], max(stop - 1, 0)
-            largest = max(self._step * farthest, abs(self._numerator(farthest)))
-            if whole is not None and largest <= 2**precision.bits:
+            whole = self._whole[precision.bits]
+            if whole is not None and self._fits(max(stop - 1, 0), precision):
                 return (whole[0] + precision.indices(first, stop) * whole[1]) / whole[2]
             if precision.cheap and stop - first > 1:
                 blocks = range(first, stop, _BLOCK)
@@ -109,6 +124,10 @@ class SampleClock:
         return np.array(
             [_nearest(n, d, precision) for n, d in self._rationals(first, stop)], dtype=precision.scalar
         )
+
+    def _fits(self, index: int, precision: Precision) -> bool:
+        """Whether what is divided for a sample of a grid, and for all before, fits the significand."""
+        return max(self._step * index, abs(self._numerator(index))) <= 2**precision.bits
 
     def _exact_numbers(self, precision: Precision) -> tuple[Scalar, Scalar, Scalar] | None:
         """The numbers a, b and d; None if one of them doesn't fit the significand."""

@@ -23,6 +23,8 @@ from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
 
+_ARRIVED = hy.taylor_outcome.time_limit
+_LOST = hy.taylor_outcome.err_nf_state
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 _MOST_TO_WHOLE_TIME = 1000  # steps
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
@@ -208,11 +210,19 @@ class Stepper:
         """Go to the high part of time, by a step of at most half its last bit in either direction; stays and
         returns False if that takes too many natural steps.
         """
-        mark, integrator = self.mark(), self._integrator
-        outcome = integrator.propagate_until(integrator.time, max_steps=_MOST_TO_WHOLE_TIME)[0]
-        if outcome == hy.taylor_outcome.time_limit:
+        engine = self._integrator
+        time, state = engine.dtime, np.array(engine.state)
+        if time[1] == 0:
             return True
-        self.back_to(mark)
+        # one step is nearly always enough, and costs less than a call that may take several
+        if engine.step(-time[1])[0] == _ARRIVED and engine.dtime == (time[0], 0):
+            return True
+        engine.dtime = time
+        engine.state[:] = state
+        if engine.propagate_until(time[0], max_steps=_MOST_TO_WHOLE_TIME)[0] == _ARRIVED:
+            return True
+        engine.dtime = time
+        engine.state[:] = state
         return False
 
     def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
@@ -235,7 +245,7 @@ class Stepper:
         self._watched()
         before = self._integrator.time
         outcome, size = self._integrator.step(self._longest, write_tc=True)
-        if outcome == hy.taylor_outcome.err_nf_state:
+        if outcome == _LOST:
             self.smallest, self.largest = np.inf, 0.0  # as where no step was taken: its size may be no number
             return False
         self.smallest = self.largest = abs(float(size))
@@ -270,7 +280,7 @@ class Stepper:
             outcome = engine.propagate_until(time, max_steps=_CHUNK_TO, max_delta_t=self._longest)[0]
             if outcome != hy.taylor_outcome.step_limit:
                 break
-        return bool(outcome == hy.taylor_outcome.time_limit)
+        return bool(outcome == _ARRIVED)
 
     def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
         """Take ``count`` steps with dense output: whether all went well, and a function from times (n,) to
@@ -301,7 +311,7 @@ class Stepper:
             self.smallest = self.largest = float(self._longest)
         self.steps += int(taken)
         self._judge(before[0], int(taken))
-        return bool(outcome != hy.taylor_outcome.err_nf_state)
+        return bool(outcome != _LOST)
 
     @property
     def collapsed(self) -> bool:

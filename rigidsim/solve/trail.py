@@ -75,8 +75,8 @@ class Waypoints:
         if number % self._spacing:
             return
         # numbers of more than 80 bits aren't numpy's own
-        plain = state.astype(np.float64) if state.dtype.kind == "f" else [float(x) for x in state]
-        self._kept[number] = Waypoint(steps, float(time), np.array(plain), chart)
+        plain = state.astype(np.float64) if state.dtype.kind == "f" else np.array([float(x) for x in state])
+        self._kept[number] = Waypoint(steps, float(time), plain, chart)
         if len(self._kept) > _MOST_WAYPOINTS:
             self._spacing *= 2
             self._kept = {n: kept for n, kept in self._kept.items() if n % self._spacing == 0}
