@@ -139,9 +139,13 @@ class Precision:
                 if n + 1 < self.part_count:
                     rest = rest - part.astype(self.scalar)
         lead = parts[0]
-        for part in parts[1:]:
-            part[~np.isfinite(lead)] = 0.0
-            part[lead == 0.0] = np.copysign(0.0, lead[lead == 0.0])
+        finite, zero = np.isfinite(lead), lead == 0.0
+        if not finite.all():
+            for part in parts[1:]:
+                part[~finite] = 0.0
+        if zero.any():
+            for part in parts[1:]:
+                part[zero] = np.copysign(0.0, lead[zero])
         return parts
 
     def zeros(self, shape: tuple[int, ...]) -> np.ndarray:
