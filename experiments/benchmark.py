@@ -157,7 +157,10 @@ def measure_satellite(pairs: int, pythons: dict[str, str], *, quick: bool) -> li
         work = f"satellite without closed form at {error:.0e} rad, {satellite.radians(quick=quick):.2g} rad"
         ours, best = found.ours.get(error), found.best.get(error)
         ratios = [ours / best] if ours is not None and best is not None else []
-        note = "; ".join(found.notes)
+        notes = list(found.notes)
+        if best is not None and error in found.recorded:
+            notes.insert(0, f"with recording the ratio is {found.recorded[error] / best:.3g}")
+        note = "; ".join(notes)
         results.append(
             Result(
                 f"{SATELLITE} {error:.0e}",

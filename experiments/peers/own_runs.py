@@ -1,4 +1,8 @@
-"""rigidsim by its public face: config, run, dataset; CPU seconds of the integration and of the whole run."""
+"""rigidsim by its public face: config, run, dataset; CPU seconds of the integration and of the whole run.
+
+What a run's integration takes includes recording: all variables and drifts at the samples, their statistics
+and what is packed for the file. Peers do none of that; with "propagated" neither does rigidsim.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,17 @@ import rigidsim
 from experiments.peers import Answer
 from experiments.peers.scenes import Scene
 from rigidsim.session.guards import Observer
+from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.problem import prepare as prepared_from
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.status import Status
 
+PROPAGATED = "rigidsim, propagated alone"
 TITLES = {
     "auto": "rigidsim, formulation auto",
+    "propagated": PROPAGATED,
     "quaternion": "rigidsim, quaternion",
     "rotation_matrix": "rigidsim, rotation matrix",
     "euler_angles": "rigidsim, Euler angles",
@@ -25,8 +37,8 @@ TITLES = {
 
 def knobs(variant: str, scene: Scene) -> list[float]:
     """Tolerances, or accuracies; what this version or scene refuses is skipped by ``prepare``."""
-    if variant == "auto":  # elsewhere that is the quaternion
-        return [m * 10.0**-n for n in range(5, 13) for m in (1, 0.3)] if scene.orbit_rate else []
+    if variant in ("auto", "propagated"):  # elsewhere that is the quaternion
+        return [m * 10.0**-n for n in range(5, 13) for m in (1, 0.5, 0.3)] if scene.orbit_rate else []
     if variant == "accuracy":
         return [1e-6, 1e-9, 1e-12]
     if variant == "closed_form":
@@ -49,7 +61,8 @@ def overrides(variant: str, knob: float) -> list[str]:
         return [*settings, "integrator.hold_invariants=false", 'integrator.precision="extended"']
     if variant == "held":
         return [*settings, "integrator.hold_invariants=true"]
-    return [*settings, "integrator.hold_invariants=false", f'integrator.formulation="{variant}"']
+    formulation = "auto" if variant == "propagated" else variant
+    return [*settings, "integrator.hold_invariants=false", f'integrator.formulation="{formulation}"']
 
 
 class Clock(Observer):
@@ -81,6 +94,9 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
         experiment = rigidsim.parse(scene.config(end), overrides=overrides(variant, knob))
     except rigidsim.ConfigError as error:
         raise ValueError(str(error)) from None
+    if variant == "propagated":
+        problem = prepared_from(experiment)
+        return lambda: _propagated(problem)
 
     def solve() -> Answer:
         with tempfile.TemporaryDirectory() as folder:
@@ -96,3 +112,31 @@ def prepare(scene: Scene, end: float, variant: str, knob: float) -> Callable[[],
         return Answer(quaternion, clock.seconds)
 
     return solve
+
+
+class _Kept(SampleReceiver):
+    """Keeps the samples, and nothing else."""
+
+    def __init__(self) -> None:
+        self.blocks: list[SampleBlock] = []
+
+    def take(self, block: SampleBlock) -> None:
+        """Keep it."""
+        self.blocks.append(block)
+
+
+def _propagated(problem: InitialValueProblem) -> Answer:
+    """The integration through all samples and the quaternion there, without what a run does around it.
+
+    The integrator is a copy of one that was compiled before, as with the peers.
+    """
+    parts, kept = assemble(problem), _Kept()
+    started = time.process_time()
+    progress = sampler(problem, parts, kept).run()
+    for block in kept.blocks:
+        recorded = parts.evaluator.evaluate(block)
+    quaternion = recorded["quaternion"][0][-1].tolist()
+    seconds = time.process_time() - started
+    if progress.status is not Status.FINISHED:
+        raise RuntimeError(f"{problem.scene.name}: {progress.status}")
+    return Answer(quaternion, seconds)

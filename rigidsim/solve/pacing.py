@@ -24,10 +24,9 @@ import math
 from enum import Enum
 
 from rigidsim.scene.records import dataclass
-from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sampling import SampleClock
-
 
 _SPARE = 4  # steps that a skip of steps of mean length ends early: a few are far from the mean
 
@@ -181,7 +180,9 @@ class WayFinder:
     def _suits_grids(self, spacing: float) -> bool:
         stride, pacing = self._corrected.stride, self._pacing
         fits = spacing * pacing.grid_rows >= stride
-        return self._corrected.whole_times and fits and spacing <= pacing.grid_strides * stride
+        # the last one goes past the last sample, and back: no more of it than of the others
+        near = spacing <= pacing.grid_strides * min(stride, STRIDE)
+        return self._corrected.whole_times and fits and near
 
     def _grid_steps(self, left: int) -> int:
         """Whole strides, or all remaining steps and more, since the remainder of a grid would go step by

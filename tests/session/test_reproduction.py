@@ -70,6 +70,7 @@ DRIVES = {
     "blocks of three": Pacing(block_steps=3, least_block_steps=1, skip_from=1e9, grid_rows=0),
     "skips wherever it can": Pacing(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0),
     "skips too far": Pacing(skip_from=2.0, skip_margin=1.7, grid_rows=0),
+    "skips of even steps too far": Pacing(skip_from=2.0, skip_margin=0.2, even_margin=1.7, grid_rows=0),
     "skips mixed with grids": Pacing(skip_from=1.0, grid_strides=0.01),
     "impatient": Pacing(chunk_seconds=1e-7, patience=0.0),
 }

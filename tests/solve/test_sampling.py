@@ -44,6 +44,21 @@ def test_blocks_of_the_grid_are_the_grid() -> None:
     assert prepared.clock.at(999) == whole[999]
 
 
+@pytest.mark.parametrize("precision", ["single", "double", "extended", "quadruple"])
+@pytest.mark.parametrize(
+    "grid", ["end = 3\nsamples = 1000", "start = -2\nend = 1e4\nevery = 0.0007", "times = [0, 0.1, 7]"]
+)
+def test_one_sample_alone_is_the_one_of_the_block(grid: str, precision: str) -> None:
+    clock = prepare(rigidsim.parse(SPIN + grid + f'\n[integrator]\nprecision = "{precision}"')).clock
+    for index in {0, 1, 2, clock.count // 3, clock.count - 1}:
+        [expected] = clock.internal(index, index + 1)
+        assert clock.at(index) == expected
+        assert clock.none_or_one(index, expected).tolist() == [expected]
+        assert len(clock.none_or_one(index, expected - expected / 2**20 - 1)) == 0
+        if index + 1 < clock.count:
+            assert clock.none_or_one(index, clock.at(index + 1)) is None  # there are two
+
+
 @pytest.mark.parametrize("start", ["0", "1e6", "-50"])
 def test_the_motion_begins_at_start(start: str) -> None:
     text = SPIN + f"start = {start}\nend = {float(start) + 10}\nsamples = 11"
