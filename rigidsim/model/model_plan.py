@@ -61,9 +61,10 @@ class ModelPlan:
     @property
     def wide(self) -> bool:
         """Whether the equations are too long to be compiled unrolled."""
-        summed = (
-            self.average is not None and self.average.driven is not None and self.average.driven.course.nodes
-        )
+        average = self.average
+        if average is not None and average.resonance is not None:
+            return True
+        summed = average is not None and average.driven is not None and average.driven.course.nodes
         return bool(summed) or any(load.wide for load in self.loads)
 
 

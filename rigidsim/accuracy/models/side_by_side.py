@@ -195,7 +195,7 @@ def _starting(
     if begin == float(scene.start):
         return moved
     if average.resonance is not None:
-        slow = SlowStart(list(states[:4]), scene.context.ldexp(states[4], exponent))
+        slow = SlowStart(list(states[:4]), [scene.context.ldexp(x, exponent) for x in states[4:7]])
         quaternion, velocity = average.resonance.osculating(slow, scene, samples.start)
         return replace(moved, quaternion=quaternion, euler_angles=None, angular_velocity=velocity)
     matrix = attitude.rotation_matrix(scene.quaternion)

@@ -206,17 +206,19 @@ def _refuse_resonance(
         kick = energy / float(spectrum.motion.momentum) * np.sqrt(2 * np.pi / np.maximum(drift, 1e-300))
         slow, swing = np.where(passes, 0.0, slow), np.where(passes, np.minimum(swing, kick), swing)
     kept = _offered(scene, spectrum, source)
-    own = np.zeros(rate.shape, dtype=bool)
+    own = held = np.zeros(rate.shape, dtype=bool)
     if kept is not None:
         spin = 2 * float(spectrum.motion.momentum / spectrum.motion.moments[2])
         of_spin = (i == 2) & (np.abs(np.abs(body) - spin) < abs(float(spectrum.motion.wobble_rate)))
         own = of_spin[:, None] & (k == kept.multiple)[None, :]
+        # the average keeps the body's axes and the momentum, so that it keeps its wobble as well
+        held = (2 * k[None, :] == i[:, None] * kept.multiple) & (rate < source.motion / 2)
     met = bool((own & ((rate < slow) | (swing > SWING))).any())
     keeps = scene.config.model.level == ORBIT_AVERAGED
     remedy = 'choose level = "full"'
-    if keeps:
-        slow, swing = np.where(own, 0.0, slow), np.where(own, 0.0, swing)
-    elif met:
+    if keeps and met:
+        slow, swing = np.where(held, 0.0, slow), np.where(held, 0.0, swing)
+    elif met and not keeps:
         remedy = 'choose level = "orbit_averaged", which keeps its angle, or "full"'
     worst = np.unravel_index(int(np.argmax(slow / np.maximum(rate, 1e-300))), rate.shape)
     if rate[worst] < slow[worst] or swing.max() > SWING:

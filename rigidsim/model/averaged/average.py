@@ -114,7 +114,8 @@ class Average:
             return [*self.start, *self.driven.states(exponent)]
         if self.resonance is None or self.slow is None:
             return list(self.start)
-        return [*self.slow.quaternion, self.resonance.context.ldexp(self.slow.excess, -exponent)]
+        momentum = [self.resonance.context.ldexp(x, -exponent) for x in self.slow.momentum]
+        return [*self.slow.quaternion, *momentum]
 
     def rate(self, source: Source) -> Any:
         """Precession constant k = 3 (G M / a^3) excess / L (mpf, 1/s) of a source; see
@@ -134,7 +135,8 @@ class Average:
         if self.resonance is not None:
             assert self.slow is not None
             found += 4 * self.resonance.strength * self.resonance.source.nearest / self.motion.momentum
-            found += 2 * self.resonance.libration_rate + abs(self.slow.excess) / self.motion.moments[2]
+            beyond = sum(abs(x) for x in self.slow.momentum)
+            found += 2 * self.resonance.libration_rate + beyond / self.motion.moments[0]
         return found
 
     def shear(self, context: Any, time: Any) -> Any:
@@ -208,11 +210,11 @@ def average_of(scene: Scene, loads: Sequence[Load], scaling: Scaling) -> Average
 def _resonant(scene: Scene, resonance: Resonance, sources: Sequence[Source]) -> Average:
     context, table, motion = scene.context, scene.config.model, resonance.motion
     slow = resonance.start(scene)
-    size = slow.excess + resonance.pace * motion.moments[2]
-    motion = replace(motion, momentum=size)
+    momentum = resonance.whole(slow)
+    motion = replace(motion, momentum=norm(context, momentum))
     resonance = replace(resonance, motion=motion)
-    start = [row[2] for row in attitude.rotation_matrix(slow.quaternion)]
-    energy = size * size / (2 * motion.moments[2])
+    start = apply(attitude.rotation_matrix(slow.quaternion), momentum)
+    energy = sum(x * x / i for x, i in zip(momentum, motion.moments, strict=True)) / 2
     return Average(
         table.level,
         False,

@@ -1,37 +1,45 @@
 """Spin-orbit resonance: p turns of the body to one revolution of its source, 2 p = k a whole number.
 
-The body turns about its axis of largest moment, which is along the angular momentum L s. Turned back by p
-times the mean anomaly M about s, its axes of least and middle moment, a and b, move slowly, and with P and T
-the directions of the orbit's pericentre and across, averaged over M,
+The body turns nearly about its axis of largest moment. Turned back by p times the mean anomaly M about the
+momentum L s, its principal axes a, b, c move slowly, and with P and T the directions of the orbit's
+pericentre and across, averaged over M,
 
-    U = (3 G M / 2 a^3) ((C - (A + B)/2) <(a/r)^3 (r . s)^2> - ((B - A)/2) h),
-    h = X_0 (Pa^2 - Pb^2 + Ta^2 - Tb^2) / 2
-        + X_2 ((Pa + Tb)^2 - (Pb - Ta)^2) / 4 + X_-2 ((Pa - Tb)^2 - (Pb + Ta)^2) / 4,
+    U = (3 G M / 2 a^3) sum over i = a, b, c of I_i <(a/r)^3 (i . r)^2>,
+    <(a/r)^3 (i . r)^2> = X_0^0 m^2 (P_s^2 + T_s^2) / 2
+        + ((X_0^0 + X_k^2) S^2 + (X_0^0 - X_k^2) D^2 + (X_0^0 + X_k^-2) S'^2 + (X_0^0 - X_k^-2) D'^2) / 8
+        + X_k^0 (S S' + D D') / 4
+        + m (P_s ((Y_0 + Y_2) S + (Y_0 + Y_-2) S') + T_s ((Y_0 - Y_2) D + (Y_0 - Y_-2) D')) / 2,
+    S, S' = E_P +- G_T,   D, D' = E_T -+ G_P,   m = i . s,   P_s = P . s,   T_s = T . s,
+    E_P = P . (i - m s),   G_P = P . (s x i),   and so for T,
 
-Pa = P . a and so on, with Hansen's coefficients X_m = X_k^{-3,m}(e): the whole commensurable harmonic, at
-any obliquity and eccentricity. For spin and orbit about the same axis h = X_2 cos 2 gamma, the potential of
-Goldreich & Peale 1966; with a moving node it has Colombo's top and Cassini's states (Colombo 1966; Peale
-1969, Astronomical Journal 74, 483) besides.
+with Hansen's coefficients X_k^m = X_k^{-3,m}(e), and Y_m = X_p^{-3,m}(e) for whole p and 0 elsewhere: the
+whole mean at fixed a, b, c and s, at any obliquity and eccentricity. For c along s and about the orbit's
+normal it is the potential of Goldreich & Peale 1966; with a moving node it has Colombo's top and Cassini's
+states (Colombo 1966; Peale 1969, Astronomical Journal 74, 483) besides. The terms in Y are constant in the
+body, and for a nearly spherical one, whose free wobble is as slow, bend c away from s by some 3 e times the
+obliquity. ``anomaly_sums`` has what this mean leaves out to second order.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from rigidsim.model.averaged.anomaly_sums import AnomalySums, second_order
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.hansen import hansen
 from rigidsim.model.averaged.sources import Source
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, multiply, norm, transpose
+from rigidsim.scene.arithmetic import Matrix, Vector, apply, multiply, norm, transpose
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
-_POINTS = {True: 512, False: 8192}  # points per turn, by whether the eccentricity is below 0.6
+_ROUNDS = 4  # iterations of the start; each gains a factor of the nutation's size
 
 
 @dataclass(frozen=True)
@@ -39,12 +47,13 @@ class SlowStart:
     """Initial state of a resonant average; mpf.
 
     Attributes:
-        quaternion: attitude of the axes a, b, s, to space axes.
-        excess: angular momentum beyond that of exactly p turns to a revolution, kg m^2/s.
+        quaternion: attitude of the axes a, b, c, to space axes.
+        momentum: angular momentum along them beyond that of exactly p turns to a revolution about c,
+            kg m^2/s.
     """
 
     quaternion: Vector
-    excess: Any
+    momentum: Vector
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,33 @@ class Resonance:
         return zero, plus, minus
 
     @cached_property
+    def of_wobble(self) -> tuple[Any, Any, Any]:
+        """Hansen coefficients Y_0, Y_2, Y_-2 (mpf)."""
+        e = self.orbit.eccentricity
+        if self.multiple % 2:
+            return self.context.zero, self.context.zero, self.context.zero
+        zero, plus, minus = (hansen(self.context, e, self.multiple // 2, m) for m in (0, 2, -2))
+        return zero, plus, minus
+
+    @cached_property
+    def second_order(self) -> Vector:
+        """Coefficients of the second order's potential, J (mpf); see ``anomaly_sums``."""
+        largest, rate = self.motion.moments[2], self.orbit.mean_motion
+        unit = largest * rate * rate
+        found = second_order(self._ratios, *self._drive, self.multiple)
+        return [unit * self.context.mpf(k) for k in found]
+
+    @property
+    def _ratios(self) -> tuple[float, ...]:
+        return tuple(float(x / self.motion.moments[2]) for x in self.motion.moments)
+
+    @property
+    def _drive(self) -> tuple[float, float]:
+        """3 G M / (a^3 n^2), and the eccentricity."""
+        strength = float(self.source.strength / self.orbit.mean_motion**2)
+        return strength, float(self.orbit.eccentricity)
+
+    @cached_property
     def strength(self) -> Any:
         """Strength (3 G M / 2 a^3) (B - A) / 2, J (mpf)."""
         least, middle, _ = self.motion.moments
@@ -101,92 +137,80 @@ class Resonance:
         """Mean anomaly M, rad (mpf)."""
         return self.orbit.mean_anomaly + self.orbit.mean_motion * time
 
+    def whole(self, slow: SlowStart) -> Vector:
+        """Angular momentum along a, b, c, kg m^2/s (mpf)."""
+        first, second, third = slow.momentum
+        return [first, second, third + self.pace * self.motion.moments[2]]
+
     def start(self, scene: Scene) -> SlowStart:
         """The slow motion at the scene's start, without the terms that go round with the orbit."""
-        context, body = scene.context, scene.body
+        context, body = self.context, scene.body
         matrix = attitude.rotation_matrix(scene.quaternion)
-        principal = multiply(matrix, transpose(self.motion.axes))
         momentum = apply(matrix, apply(body.inertia, scene.angular_velocity))
-        found = self._slow(principal, momentum, scene.start)
-        removed, angle = self._left_out(found, scene.start)
-        momentum = [x - context.mpf(y) for x, y in zip(momentum, removed, strict=True)]
+        principal = multiply(matrix, transpose(self.motion.axes))
         about = [x / norm(context, momentum) for x in momentum]
-        principal = multiply(_about(context, about, -context.mpf(angle)), principal)
-        return self._slow(principal, momentum, scene.start)
+        frame = multiply(_about(context, about, -self._angle(scene.start)), principal)
+        inside = apply(transpose(frame), momentum)
+        slow = self._slow(frame, inside)
+        for _ in range(_ROUNDS):
+            added, turn = self._left_out(slow, scene.start)
+            mean = multiply(frame, _turned(context, [-x for x in turn]))
+            slow = self._slow(mean, [x - y for x, y in zip(inside, added, strict=True)])
+        return slow
 
     def osculating(self, slow: SlowStart, scene: Scene, time: Any) -> tuple[Vector, Vector]:
         """Quaternion and angular velocity (body axes, rad/s) of the full motion at a time in seconds."""
         context = self.context
-        principal = attitude.rotation_matrix(slow.quaternion)
-        axis = [row[2] for row in principal]
-        added, angle = self._left_out(slow, time)
-        turn = self.multiple * self.anomaly(time) / 2 + context.mpf(angle)
-        principal = multiply(_about(context, axis, turn), principal)
-        size = slow.excess + self.pace * self.motion.moments[2]
-        momentum = [size * x + context.mpf(y) for x, y in zip(axis, added, strict=True)]
-        principal = multiply(_shortest(context, axis, momentum), principal)
+        added, turn = self._left_out(slow, time)
+        frame = multiply(attitude.rotation_matrix(slow.quaternion), _turned(context, turn))
+        momentum = [x + y for x, y in zip(self.whole(slow), added, strict=True)]
+        about = apply(frame, momentum)
+        about = [x / norm(context, about) for x in about]
+        principal = multiply(_about(context, about, self._angle(time)), frame)
         matrix = multiply(principal, self.motion.axes)
-        rate = norm(context, momentum) / self.motion.moments[2]
-        velocity = [rate * x for x in self.motion.axes[2]]
+        rates = [x / moment for x, moment in zip(momentum, self.motion.moments, strict=True)]
+        velocity = apply(transpose(self.motion.axes), rates)
         return attitude.unit_quaternion(context, attitude.quaternion_from_matrix(context, matrix)), velocity
 
-    def _slow(self, principal: Matrix, momentum: Vector, time: Any) -> SlowStart:
-        """Slow state from the principal axes (columns, space axes) and the momentum, to which the third axis
-        is brought.
+    def _angle(self, time: Any) -> Any:
+        """Angle p M by which the frame is turned back."""
+        return self.multiple * self.anomaly(time) / 2
+
+    def _slow(self, frame: Matrix, momentum: Vector) -> SlowStart:
+        context = self.context
+        quaternion = attitude.unit_quaternion(context, attitude.quaternion_from_matrix(context, frame))
+        first, second, third = momentum
+        return SlowStart(quaternion, [first, second, third - self.pace * self.motion.moments[2]])
+
+    def _left_out(self, slow: SlowStart, time: Any) -> tuple[Vector, Vector]:
+        """Terms that go round with the orbit, along a, b, c: of the momentum (kg m^2/s), and the rotation
+        vector (rad) of the frame; mpf.
         """
         context = self.context
-        axis = [row[2] for row in principal]
-        principal = multiply(_shortest(context, axis, momentum), principal)
-        axis = [row[2] for row in principal]
-        back = multiply(_about(context, axis, -self.multiple * self.anomaly(time) / 2), principal)
-        quaternion = attitude.unit_quaternion(context, attitude.quaternion_from_matrix(context, back))
-        excess = norm(context, momentum) - self.pace * self.motion.moments[2]
-        return SlowStart(quaternion, excess)
+        unit = self.motion.moments[2] * self.orbit.mean_motion
+        place = self.source.place(context, time)
+        back = transpose(attitude.rotation_matrix(slow.quaternion))
+        along, across = (_doubles(apply(back, v)) for v in (place.pericentre, place.across))
+        momentum = _doubles([x / unit for x in self.whole(slow)])
+        sums = AnomalySums.of(np.array(self._ratios), *self._drive, self.multiple)
+        anomaly = float(self.anomaly(time) % (2 * context.pi * sums.turns))
+        added, turn = (sums.at(anomaly, x) for x in sums.removed(along, across, momentum))
+        return [unit * context.mpf(float(x)) for x in added], [context.mpf(float(x)) for x in turn]
 
-    def _left_out(self, slow: SlowStart, time: Any) -> tuple[np.ndarray, float]:
-        """Terms removed from the momentum (space axes, kg m^2/s) and from the angle about it (rad): the
-        integrals over time, without their means, of the torque less its mean.
-        """
-        e, n = float(self.orbit.eccentricity), float(self.orbit.mean_motion)
-        count = _POINTS[e < 0.6]
-        mean = 2 * np.pi * np.arange(count) / count
-        anomaly = mean + e * np.sin(mean)
-        for _ in range(60):
-            step = (anomaly - e * np.sin(anomaly) - mean) / (1 - e * np.cos(anomaly))
-            anomaly = anomaly - np.clip(step, -0.5, 0.5)
-        place = self.source.place(self.context, time)
-        along, across = (np.array([float(x) for x in v]) for v in (place.pericentre, place.across))
-        x, y = np.cos(anomaly) - e, math.sqrt(1 - e * e) * np.sin(anomaly)
-        radius = np.hypot(x, y)
-        seen = (x[:, None] * along + y[:, None] * across) / radius[:, None]
-        frame = np.array([[float(v) for v in row] for row in attitude.rotation_matrix(slow.quaternion)])
-        angle = self.multiple * mean / 2
-        c, s, zero = np.cos(angle), np.sin(angle), np.zeros(count)
-        turn = np.moveaxis(np.array([[c, -s, zero], [s, c, zero], [zero, zero, zero + 1]]), 2, 0)
-        axes = frame @ turn
-        inside = np.einsum("nij,ni->nj", axes, seen)
-        moments = np.array([float(v) for v in self.motion.moments])
-        product = np.einsum("nij,nj->ni", axes, moments * inside)
-        torque = float(self.source.strength) * np.cross(seen, product) / radius[:, None] ** 3
-        waves = np.fft.fft(torque, axis=0) / count
-        order = np.fft.fftfreq(count, 1 / count)
-        order[0] = 1.0
-        at = np.exp(1j * order * float(self.anomaly(time) % (2 * self.context.pi)))[:, None]
-        waves[0] = 0.0
-        once = waves * at / (1j * n * order)[:, None]
-        twice = once / (1j * n * order)[:, None]
-        axis = frame[:, 2]
-        return once.sum(axis=0).real, float(twice.sum(axis=0).real @ axis / moments[2])
+
+def _doubles(vector: Sequence[Any]) -> np.ndarray:
+    return np.array([float(x) for x in vector])
+
+
+def _turned(context: Any, vector: Vector) -> Matrix:
+    """Rotation matrix (mpf) of a rotation vector."""
+    angle = norm(context, vector)
+    if angle == 0:
+        return attitude.rotation_matrix([context.one, *([context.zero] * 3)])
+    return _about(context, [x / angle for x in vector], angle)
 
 
 def _about(context: Any, axis: Vector, angle: Any) -> Matrix:
     """Rotation matrix (mpf) about a unit axis."""
     s = context.sin(angle / 2)
     return attitude.rotation_matrix([context.cos(angle / 2), *(s * x for x in axis)])
-
-
-def _shortest(context: Any, before: Vector, after: Vector) -> Matrix:
-    """Smallest rotation of one direction to another, which must not be its opposite."""
-    size = norm(context, before) * norm(context, after)
-    quaternion = [size + dot(before, after), *cross(before, after)]
-    return attitude.rotation_matrix(attitude.unit_quaternion(context, quaternion))

@@ -65,7 +65,7 @@ def _resonant_states(
         "turned back by so many turns to a revolution, and the momentum beyond that, under torques averaged "
     )
     why += "over rotation and orbits"
-    exponents = [0] * 4 + [scaling.momentum]
+    exponents = [0] * 4 + [scaling.momentum] * 3
     slow = StateBlock(SLOW, m.slow_derivatives, initial, exponents=exponents, why=why)
     return m, [slow, *_point_masses(m)]
 
