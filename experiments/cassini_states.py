@@ -13,9 +13,9 @@ Held against:
   over the mean anomaly without Hansen's coefficients, gives the Jacobian J in the node's frame and the
   harmonics of what goes round with the argument, each of which moves the pole by (i k w - J)^-1 of itself;
   free precession exp(J t) takes up the rest of the start. The mean of the path is within a tenth of what goes
-  round of that, and of (3 e)^2 (C - A)/C n/w of the angle for the Moon: the figure axis, bent by a torque that
-  is constant in the body and turns with the pericentre at the rate w, is kept by the average and not by this
-  theory. Mercury's path is within a tenth of its own size. The Moon's isn't judged (0.83): its
+  round of that, and of (3 e)^2 (C - A)/C n/w of the angle for the Moon: the average keeps the bend of the
+  figure axis by a torque that is constant in the body and turns with the pericentre at the rate w, and this
+  theory doesn't. Mercury's path is within a tenth of its own size. The Moon's isn't judged (1.8): its
   libration in longitude, which this theory leaves out, is driven at twice the pericentre's argument, 3.00 yr,
   close to its own 2.9;
 - the full model, every rotation resolved: three times 3/2 (C - A)/C n/w of the angle, the order of what

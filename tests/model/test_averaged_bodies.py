@@ -137,9 +137,14 @@ def test_windows_start_where_the_bodies_are(monkeypatch: pytest.MonkeyPatch) -> 
     assert all(window["momentum_axis"] < 2 * nodding() for window in found["windows"])
 
 
-def test_two_masses_are_a_kepler_orbit() -> None:
+# halves the spin in the time of the run
+SLOWED = '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1e31, 1e31, 1e31]\n'
+
+
+@pytest.mark.parametrize("more", ["", SLOWED], ids=["gradient alone", "beside friction"])
+def test_two_masses_are_a_kepler_orbit(more: str) -> None:
     """The Sun as the planet sees it: the same average by elements."""
-    run = run_text(scene("spin_averaged", "sun", beside=""))
+    run = run_text(scene("spin_averaged", "sun", beside=more))
     period = 2 * math.pi * math.sqrt(AU**3 / (SUN + EARTH))
     orbit = (
         f'{{semi_major_axis = "1 au", eccentricity = 0.3, inclination = "7 deg", periapsis = {math.pi!r}, '
@@ -147,7 +152,7 @@ def test_two_masses_are_a_kepler_orbit() -> None:
     orbit += f"period = {period!r}}}"
     load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = {SUN!r}\norbit = {orbit}\n'
     axes = 'output.record=["momentum_axis"]'
-    kepler = run_text(SCENE % ("", SPIN, load, "spin_averaged"), axes)
+    kepler = run_text(SCENE % ("", SPIN, more + load, "spin_averaged"), axes)
     path = np.linalg.norm(run.dataset.momentum_axis.values[-1] - run.dataset.momentum_axis.values[0])
     assert path > 5e-7
     assert apart(run, kepler) < 2.0**-42  # the tolerance of averaged motions on Kepler orbits, 1024 epsilon

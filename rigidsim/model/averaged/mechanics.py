@@ -151,8 +151,8 @@ class AveragedMechanics(SourcesSeen):
         states = self.carried(self.point_masses)
         ends = min(pair.host, pair.number), max(pair.host, pair.number)  # either direction will do
         place, inverse = states.between(*ends), states.inverse_distances[ends]
-        rate = self.of.rate(source) * source.of.distance(context) ** 3
-        size = as_factor(self.number(context.ldexp(rate, scaling.time - 3 * scaling.length)))
+        cubed = self.number(context.ldexp(source.of.distance(context) ** 3, -3 * scaling.length))
+        size = cubed * self._strength(source)
         factor = size * (dot(place, s) * (inverse * inverse * inverse * (inverse * inverse)))
         return [factor * x for x in place]
 
