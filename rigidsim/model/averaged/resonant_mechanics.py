@@ -73,7 +73,7 @@ class ResonantMechanics(AveragedMechanics):
         return [x / self.momentum_size for x in self.slow_momentum]
 
     @cached_property
-    def direction(self) -> list[Symbolic]:  # type: ignore[override]
+    def direction(self) -> list[Symbolic]:
         """Direction s of the momentum, space axes."""
         return apply(self.slow_matrix, self.about)
 
