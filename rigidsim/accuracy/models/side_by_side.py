@@ -119,7 +119,7 @@ def side_by_side(
     count = _sample_count(motion_at(average, states, exponent), end - begin)
     scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
     if begin != float(prepared.scene.start):
-        scene = _with_bodies(scene, prepared, states)
+        scene = with_bodies(scene, prepared, states)
     # whether what averaging removed can be added back
     back = average.resonance is None and average.driven is None
     names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
@@ -216,7 +216,7 @@ def _starting(
     return replace(moved, quaternion=attitude.unit_quaternion(context, quaternion), euler_angles=None)
 
 
-def _with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[Any]) -> Scene:
+def with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[Any]) -> Scene:
     """The scene with its point masses where the averaged motion's states have them."""
     if scene.bodies is None:
         return scene
