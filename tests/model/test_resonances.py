@@ -230,8 +230,8 @@ def test_the_commensurable_angle_is_that_of_every_rotation(
     eccentricity = 0.05 if spin < 1.2 else 0.2
     nutation = flattening * math.sin(math.radians(8)) * (1 - eccentricity) ** -3
     assert np.linalg.norm(apart, axis=1).max() < nutation
-    # averaged over two revolutions, and relative to the path: 1.5 % at 1:1 without wobble and second order, of
-    # which the harmonics left out are of the order of e^2, of e at 3:2
+    # averaged over two revolutions, and relative to the path: 1.5 % at 1:1 without wobble and second order,
+    # of which the harmonics left out are of the order of e^2, of e at 3:2
     mean = apart.reshape(-1, 16, 3).mean(axis=1)
     left_out = eccentricity**2 if spin < 1.2 else eccentricity
     assert np.linalg.norm(mean, axis=1).max() < 3 * flattening * (flattening + left_out) * path.max()

@@ -14,8 +14,8 @@ don't vanish with the eccentricity are
     x = n . c,   z = (P - i T) . (a + i b) / 2,
 
 n, P, T being the orbit's normal, pericentre and across, and a, b, c the principal axes brought to the
-momentum by the shortest turn; the k_j come from a fit over all orientations. For whole p the rest is e^2 times
-as large, for half-integers e times.
+momentum by the shortest turn; the k_j come from a fit over all orientations. For whole p the rest is e^2
+times as large, for half-integers e times.
 """
 
 from __future__ import annotations
