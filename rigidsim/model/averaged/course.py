@@ -137,7 +137,7 @@ def wave_of(torques: DrivingTorques, axial: float, transverse: float) -> Wave:
 
 
 @dataclass(frozen=True)
-class Course:
+class PolhodeCourse:
     """P and Q along the run; internal units.
 
     Attributes:
@@ -179,7 +179,7 @@ class Course:
 
 def follow(
     torques: DrivingTorques, start: Sequence[float], begin: float, end: float, epsilon: float
-) -> Course:
+) -> PolhodeCourse:
     """Follow the mean torques over the run.
 
     Args:
@@ -213,7 +213,7 @@ def follow(
     found = [_changed(torques, amplitudes[i], wave) for i, wave in zip(picked, waves, strict=True)]
     swings = max(x for x, _ in found), max(y for _, y in found)
     largest = max(w.parameter for w in waves)
-    return Course(torques, times, amplitudes, nodes, largest, fastest, scatter, swing, swings)
+    return PolhodeCourse(torques, times, amplitudes, nodes, largest, fastest, scatter, swing, swings)
 
 
 def _changed(torques: DrivingTorques, amplitudes: np.ndarray, wave: Wave) -> tuple[float, float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.look.readable_time import span_text
-from rigidsim.model.averaged.course import SWING, Course, NoCourse, Wave, follow, wave_of
+from rigidsim.model.averaged.course import SWING, NoCourse, PolhodeCourse, Wave, follow, wave_of
 from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
 from rigidsim.model.averaged.polhode import Polhodes
 from rigidsim.model.averaged.torques import DrivingTorques
@@ -46,7 +46,7 @@ class Driven:
     titles: Sequence[str]
     polhodes: Polhodes
     torques: DrivingTorques
-    course: Course
+    course: PolhodeCourse
     axial: Any
     transverse: Any
     amplitude: float
