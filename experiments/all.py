@@ -42,6 +42,7 @@ STUDIES = (
     "whole_cycle",
     "cassini_states",
     "tumbling_averages",
+    "damped_averages",
     "earth_obliquity",
 )
 

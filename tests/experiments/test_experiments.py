@@ -26,6 +26,7 @@ SLOW = {  # about how many seconds they take
     "apophis_flyby": 15,
     "averaged_motions": 100,
     "cassini_states": 40,
+    "damped_averages": 30,
     "earth_obliquity": 25,
     "flip_period": 15,
     "flip_sphere": 10,

@@ -19,6 +19,7 @@ import numpy as np
 
 from rigidsim.accuracy.models.side_by_side import (
     ENERGY,
+    SHAPE,
     SIZE,
     Window,
     motion_at,
@@ -113,7 +114,8 @@ def measure_modelling(
     spent = time.process_time() - started
     if whole:
         return _of_whole(average, windows[0], spent)
-    return _extrapolated(prepared, average, windows, end - begin, spent)
+    motions = [motion_at(average, states, exponent) for _, states, _ in places]
+    return _extrapolated(prepared, average, windows, motions, end - begin, spent)
 
 
 def _length(average: Average, motion: FreeMotion) -> float:
@@ -156,7 +158,10 @@ def _places(
             last = _length(average, motion_at(average, seen[-1][1], prepared.system.scaling.momentum))
             last = min(max(last, length), (end - begin) / 2)
         wanted = (begin + end) / 2 if middle else end - last
-        at, state = min(seen, key=lambda place: abs(place[0] - wanted))
+        near = seen
+        if average.driven is not None:  # whose course is known until the end alone
+            near = [place for place in seen if place[0] <= wanted] or seen[:1]
+        at, state = min(near, key=lambda place: abs(place[0] - wanted))
         if average.driven is not None:
             last = min(last, end - at)
         if last > 0 and all(at != other for other, _, _ in found):
@@ -182,7 +187,12 @@ def _of_whole(average: Average, window: Window, spent: float) -> ModellingError:
 
 
 def _extrapolated(
-    prepared: InitialValueProblem, average: Average, windows: list[Window], span: float, spent: float
+    prepared: InitialValueProblem,
+    average: Average,
+    windows: list[Window],
+    motions: Sequence[FreeMotion],
+    span: float,
+    spent: float,
 ) -> ModellingError:
     rates = np.array([w.growth for w in windows])
     doubt = max(w.doubt for w in windows)
@@ -191,8 +201,11 @@ def _extrapolated(
     # an error across the precession changes the rate along it
     shear = float(average.shear(prepared.scene.context, prepared.scene.start))
     changes, faster = _changed(average, windows, span), 0.0
-    if SIZE in changes and average.sources:  # an error of its size changes the rate of precession
-        faster = float(prepared.system.rate_bound) * changes[SIZE] / 2
+    if average.driven is not None and average.sources:
+        # lasting errors of size and energy change the rate of precession; what oscillates doesn't
+        kept = [_lasting(windows, name, span / 2) + average.driven.passed for name in (SIZE, SHAPE)]
+        detuned = max(average.driven.detuned(motion, kept[0], kept[1]) for motion in motions)
+        faster = average.strength * detuned
     grown = math.hypot(along + faster + shear * across * span / 2, across) * span
     oscillation = max(w.recorded for w in windows)
     if average.driven is not None:  # which may be larger between the windows
@@ -227,10 +240,21 @@ def _changed(average: Average, windows: Sequence[Window], span: float) -> dict[s
     if average.driven is None:
         return found
     swings = dict(zip((SIZE, ENERGY), average.driven.course.swings, strict=True))
-    for name in windows[0].changes:
-        seen = [window.changes[name] for window in windows]
-        rates = np.array([change.growth for change in seen])
-        rate = np.abs(rates.mean()) + (rates.max() - rates.min()) / 2 + max(change.doubt for change in seen)
-        largest = max(swings[name], *(change.largest for change in seen)) + average.driven.passed
-        found[name] = _SPARE * float(rate) * span + _SPARE_OF_WHOLE * largest
+    for name in (SIZE, ENERGY):
+        largest = max(swings[name], *(window.changes[name].largest for window in windows))
+        grown = _grown(windows, name, span)
+        found[name] = _SPARE * grown + _SPARE_OF_WHOLE * (largest + average.driven.passed)
     return found
+
+
+def _grown(windows: Sequence[Window], name: str, seconds: float) -> float:
+    """By how much the relative error of a changing quantity grows."""
+    seen = [window.changes[name] for window in windows]
+    rates = np.array([change.growth for change in seen])
+    rate = abs(rates.mean()) + (rates.max() - rates.min()) / 2 + max(change.doubt for change in seen)
+    return float(rate) * seconds
+
+
+def _lasting(windows: Sequence[Window], name: str, seconds: float) -> float:
+    """The same, with the mean error within the windows."""
+    return max(abs(window.changes[name].mean) for window in windows) + _grown(windows, name, seconds)

@@ -35,6 +35,8 @@ with 2000 samples of 7500 rotations a quarter of it was missed.
 """
 _TURN = 2 * math.pi
 SIZE, ENERGY = "angular_momentum_norm", "energy"
+SHAPE = "energy over the squared momentum"
+"""It tells the polhode, and is nearer than either."""
 _OF_ROTATION = "rotational_energy"
 """The full model's name for the energy that an averaged one follows, without the potential of gradients."""
 
@@ -45,11 +47,13 @@ class Change:
 
     Attributes:
         largest: the largest difference.
+        mean: the mean one, without what oscillates.
         growth: its growth, 1/s.
         doubt: difference of growth between the window's parts, 1/s.
     """
 
     largest: float
+    mean: float
     growth: float
     doubt: float
 
@@ -160,12 +164,19 @@ def _changes(
     times: np.ndarray, true: Mapping[str, np.ndarray], reduced: Mapping[str, np.ndarray]
 ) -> dict[str, Change]:
     third, found = len(times) // 3, {}
-    for name, other in ((SIZE, SIZE), (ENERGY, _OF_ROTATION)):
-        apart = true[other].ravel() / reduced[name].ravel() - 1
+    weights = np.hanning(len(times))
+    ratios = {
+        SIZE: true[SIZE].ravel() / reduced[SIZE].ravel(),
+        ENERGY: true[_OF_ROTATION].ravel() / reduced[ENERGY].ravel(),
+    }
+    ratios[SHAPE] = ratios[ENERGY] / ratios[SIZE] ** 2
+    for name, ratio in ratios.items():
+        apart = ratio - 1
         parts = apart[:, None]
         first, last = _slope(times[: 2 * third], parts[: 2 * third]), _slope(times[third:], parts[third:])
         growth = float(_slope(times, parts)[0])
-        found[name] = Change(float(np.abs(apart).max()), growth, float(abs(first[0] - last[0])) / 2)
+        mean = float(weights @ apart / weights.sum())
+        found[name] = Change(float(np.abs(apart).max()), mean, growth, float(abs(first[0] - last[0])) / 2)
     return found
 
 

@@ -124,6 +124,11 @@ class Average:
         return source.strength * self.motion.excess / self.motion.momentum
 
     @property
+    def strength(self) -> float:
+        """Largest rate of precession, averaged over orbits, per ``FreeMotion.excess`` / momentum, 1/s^2."""
+        return sum(float(s.strength) * (1 - s.eccentricity**2) ** -1.5 / 2 for s in self.sources)
+
+    @property
     def rate_bound(self) -> Any:
         """Bound of the rate at which the momentum turns, rad/s (mpf)."""
         if self.driven is not None:

@@ -14,9 +14,9 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.look.readable_time import span_text
-from rigidsim.model.averaged.course import SWING, NoCourse, PolhodeCourse, Wave, follow, wave_of
+from rigidsim.model.averaged.course import PARAMETER, SWING, NoCourse, PolhodeCourse, Wave, follow, wave_of
 from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
-from rigidsim.model.averaged.polhode import Polhodes
+from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed
 from rigidsim.model.averaged.torques import DrivingTorques
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import scaled_numbers
@@ -74,6 +74,45 @@ class Driven:
         """Free motion on the polhode of amplitudes P and Q."""
         scene = self.torques.scene
         return free_motion(scene.context, scene.body, self.momentum(axial, transverse))
+
+    def motion_in_double(self, axial: float, transverse: float) -> FreeMotion:
+        """The same from P and Q in internal units, in double precision: cheap enough for many places."""
+        scaling, polhodes = self.torques.scaling, self.polhodes
+        ratio, root = float(polhodes.ratio), float(polhodes.root)
+        if ratio != 1:  # no further than averages go
+            transverse = min(transverse, abs(axial) * math.sqrt(PARAMETER / (1 - ratio)))
+        wave = wave_of(self.torques, axial, transverse)
+        size = math.hypot(axial, root * transverse)
+        sines = mean_square_sine(wave.parameter, math.sqrt, means_needed(wave.parameter, 2.0**-60))
+        share = (transverse / size) ** 2
+        squares = [ratio * share * (1 - sines), share * sines]
+        return FreeMotion(
+            math.ldexp(size, scaling.momentum),
+            [float(x) for x in polhodes.moments],
+            polhodes.axes,
+            wave.parameter,
+            [*squares, 1 - sum(squares)],
+            [abs(x) / size for x in (root * transverse, transverse, axial)],
+            math.ldexp(wave.precession, -scaling.time),
+            0.0 if polhodes.symmetric else math.ldexp(abs(wave.wobble), -scaling.time),
+        )
+
+    def detuned(self, motion: FreeMotion, size: float, shape: float) -> float:
+        """Change of ``FreeMotion.excess`` over the momentum (s), to which precession is in proportion, by
+        relative errors of the momentum's size and of the energy over its square.
+        """
+        first, _, third = (float(x) for x in self.polhodes.moments)
+        length = float(motion.momentum)
+        across = float(motion.amplitudes[0]) ** 2
+        twice = length**2 * (across / first + (1 - across) / third)
+        scale, found = self.torques.scaling.momentum, []
+        for i, j in ((0, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
+            whole, other = (length * (1 + i * size)) ** 2, twice * (1 + i * size) ** 2 * (1 + j * shape)
+            turned = min(max((other - whole / third) / (1 / first - 1 / third), 0.0), whole)
+            axial, transverse = math.sqrt(whole - turned), math.sqrt(turned / float(self.polhodes.ratio))
+            moved = self.motion_in_double(math.ldexp(axial, -scale), math.ldexp(transverse, -scale))
+            found.append(float(moved.excess) / moved.momentum)
+        return max(abs(x - found[0]) for x in found[1:])
 
 
 def driven_by(scene: Scene, scaling: Scaling, loads: Sequence[Load], epsilon: float) -> Driven:

@@ -39,15 +39,13 @@ def passing(scene: Scene, driven: Driven, sources: Sequence[Source]) -> Driven:
     """
     if not sources:
         return driven
-    exponent, context = driven.torques.scaling.momentum, scene.context
     times, amplitudes = driven.course.times, driven.course.amplitudes
     seconds = np.ldexp(times, driven.torques.scaling.time)
     places = np.linspace(seconds[0], seconds[-1], _PLACES)
     spectra = []
     for at in places:
         now = [np.interp(at, seconds, amplitudes[:, i]) for i in (0, 1)]
-        axial, transverse = (context.ldexp(context.mpf(float(x)), exponent) for x in now)
-        spectra.append(body_spectrum(driven.motion(axial, transverse)))
+        spectra.append(body_spectrum(driven.motion_in_double(float(now[0]), float(now[1]))))
     apart, total = float(places[1] - places[0]), 0.0
     for n, spectrum in enumerate(spectra):
         when = _when(scene, float(places[n]))

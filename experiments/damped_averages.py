@@ -1,0 +1,329 @@
+"""A rotation that is damped: how far is its average from the full motion, in momentum, energy and wobble?
+
+Method: a body with moments 1 : 1.7 : 2 that tumbles, under a viscous torque that takes nine tenths of its
+energy over 10,000 turns (--full; 1,000 with ten times the torque otherwise), alone and under a gravity
+gradient beside it; every rotation resolved, and averaged. An axisymmetric body, whose rates decay
+exponentially. The first body at eight sizes of the torque. Then random bodies with random torques (40 with
+--full, 10 otherwise), of which each averaged run announces its errors.
+
+Held against:
+- the errors that the averaged runs announce for the momentum's direction, its size and the energy;
+- the wobble, the angle from the axis of the largest moment to the momentum: its extremes in the last of 50
+  parts of the full motion, and those of the free motion with the averaged momentum and energy, within what
+  their announced errors and their change over that part make of these;
+- the exact solution of the axisymmetric body, to the tolerance over ten e-foldings;
+- the order: errors are in proportion to the torque over momentum times rate, if the same share is lost.
+
+Run: python -m experiments.damped_averages [--full] [--out DIR]      two minutes of CPU with --full
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from experiments.common import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    Check,
+    Result,
+    main,
+    new_figure,
+    save,
+    simulate,
+    tidy,
+)
+from rigidsim.errors import ConfigError
+
+NAME = "damped_averages"
+CONFIG = """
+name = "damped"
+[body]
+principal_moments = {moments}
+[initial]
+angular_velocity = {rates}
+euler_angles = ["30 deg", "40 deg", "10 deg"]
+[[loads]]
+kind = "viscous_torque"
+coefficients = {damping}
+{gradient}
+[time]
+end = {end}
+samples = {samples}
+[model]
+level = "{level}"
+[output]
+record = {record}
+estimate = {estimate}
+"""
+GRADIENT = """[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = {square}
+orbit = {{semi_major_axis = 1, eccentricity = {e}, inclination = "{tilt} deg"}}
+"""
+ANNOUNCED = {
+    "momentum_axis": "momentum's direction",
+    "angular_momentum_norm": "size of the momentum",
+    "energy": "energy",
+}
+SAMPLES = 2001
+PARTS = 50
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A damped body; SI.
+
+    Attributes:
+        moments, rates, damping: about the principal axes.
+        gradient: tables of a gravity gradient, or nothing.
+        end: s.
+    """
+
+    moments: tuple[float, ...]
+    rates: tuple[float, ...]
+    damping: tuple[float, ...]
+    end: float
+    gradient: str = ""
+
+    def run(self, level: str, samples: int = SAMPLES, *, estimate: bool = True) -> Result:
+        """One model; an averaged one measures its errors if asked to."""
+        reduced = level != "full"
+        energy = ["energy"] if reduced else ["rotational_energy", "figure_axis"]
+        record = ["momentum_axis", "angular_momentum_norm", *energy]
+        return simulate(
+            CONFIG.format(
+                moments=[float(x) for x in self.moments], rates=[float(x) for x in self.rates],
+                damping=[float(x) for x in self.damping], gradient=self.gradient, end=self.end,
+                samples=samples, level=level, record=record, estimate=str(reduced and estimate).lower(),
+            ).replace("'", '"')
+        )  # fmt: skip
+
+
+def tumbler(size: float, end: float, gradient: str = "") -> Scene:
+    """Moments 1 : 1.7 : 2, in short-axis mode, with a wobble of 30 deg."""
+    return Scene((1.0, 1.7, 2.0), (0.4, 0.5, 1.2), (size, 2 * size, 1.5 * size), end, gradient)
+
+
+def distances(averaged: Result, full: Result) -> dict[str, np.ndarray]:
+    """Of the averaged motion from the full one at the samples: rad, and relative."""
+    axes = averaged.values("momentum_axis") - full.values("momentum_axis")
+    return {
+        "momentum_axis": np.linalg.norm(axes, axis=1),
+        "angular_momentum_norm": np.abs(
+            averaged.values("angular_momentum_norm") / full.values("angular_momentum_norm") - 1
+        ),
+        "energy": np.abs(averaged.values("energy") / full.values("rotational_energy") - 1),
+    }
+
+
+def extremes(moments: tuple[float, ...], energy: float, momentum: float) -> np.ndarray:
+    """Least and largest angle between the axis of the largest moment and the momentum in free motion, rad."""
+    a, b, c = moments
+    along = [(2 * energy - momentum**2 / x) / (1 / c - 1 / x) / momentum**2 for x in (a, b)]
+    return np.sort(np.arccos(np.sqrt(np.clip(along, 0.0, 1.0))))
+
+
+def wobble(full: Result) -> np.ndarray:
+    """Angle from the figure axis to the momentum at each sample, rad, at most a right one."""
+    axes = full.values("figure_axis"), full.values("momentum_axis")
+    return np.asarray(np.arccos(np.clip(np.abs((axes[0] * axes[1]).sum(axis=1)), 0.0, 1.0)))
+
+
+def covered(title: str, averaged: Result, full: Result) -> list[Check]:
+    """Errors over what is announced."""
+    checks = []
+    for name, error in distances(averaged, full).items():
+        announced = float(averaged.summary["modelling"][name])
+        print(f"{title}: {ANNOUNCED[name]} {error.max():.2g}, {announced:.2g} announced", file=sys.stderr)
+        source = "summary.json, modelling: not above 1"
+        words = f"{title}: {ANNOUNCED[name]} from the full motion's, over what is announced"
+        checks.append(Check(words, float(error.max()) / announced, 0.5, 0.5, "1", source, "absolute"))
+    return checks
+
+
+def wobbles(scene: Scene, averaged: Result, full: Result) -> list[Check]:
+    """The wobble in the last part of the full motion, and that of the averaged momentum and energy."""
+    last = slice(-(SAMPLES // PARTS), None)
+    size, energy = (averaged.values(name)[last] for name in ("angular_momentum_norm", "energy"))
+    bounds = np.array([extremes(scene.moments, e, s) for e, s in zip(energy, size, strict=True)])
+    announced = [averaged.summary["modelling"][name] for name in ("energy", "angular_momentum_norm")]
+    middle = extremes(scene.moments, energy.mean(), size.mean())
+    moved = [
+        extremes(scene.moments, energy.mean() * (1 + x * announced[0]), size.mean() * (1 + y * announced[1]))
+        for x in (-1, 1)
+        for y in (-1, 1)
+    ]
+    seen, checks = wobble(full)[last], []
+    for number, (word, value) in enumerate((("least", seen.min()), ("largest", seen.max()))):
+        allowed = max(abs(m[number] - middle[number]) for m in moved) + float(np.ptp(bounds[:, number]))
+        name = f"tumbler: {word} wobble in the last fiftieth"
+        source = "free motion of the averaged momentum and energy; announced errors and change meanwhile"
+        degrees = (float(np.degrees(x)) for x in (value, middle[number], allowed))
+        checks.append(Check(name, *degrees, "deg", source, "absolute"))
+    return checks
+
+
+def axisymmetric() -> Check:
+    """Energy of a body whose rates decay exponentially."""
+    scene = Scene((1.0, 1.0, 2.0), (0.4, 0.5, 1.2), (1e-4, 1e-4, 1.5e-4), 1e5)
+    found = scene.run("spin_averaged", estimate=False)
+    moments, damping = np.array(scene.moments), np.array(scene.damping)
+    rates = np.array(scene.rates)[:, None] * np.exp(-(damping / moments)[:, None] * found.values("time"))
+    energy = (moments[:, None] * rates**2).sum(axis=0) / 2
+    worst = float(np.abs(found.values("energy") - energy).max() / energy[0])
+    source = "w1, w2 = e^(-c t / A), w3 = e^(-d t / C); 1024 epsilon, the tolerance, relative to the start"
+    return Check(
+        "axisymmetric body: energy from the exact one", worst, 0.0, 1024 * 2.0**-52, "1", source, "absolute"
+    )
+
+
+def orders(sizes: np.ndarray) -> tuple[list[Check], dict[str, np.ndarray]]:
+    """Exponents of the errors' growth with the torque, if the same share is lost."""
+    found: dict[str, list[float]] = {name: [] for name in ANNOUNCED}
+    for size in sizes:
+        scene = tumbler(float(size), 0.4 / float(size))
+        apart = distances(scene.run("spin_averaged", estimate=False), scene.run("full"))
+        for name, error in apart.items():
+            found[name].append(float(error.max()))
+    checks, errors = [], {name: np.array(values) for name, values in found.items()}
+    for name, values in errors.items():
+        slope = float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
+        source = "first-order averaging; phases at which samples meet the oscillation"
+        checks.append(
+            Check(f"order of the error in the torque: {ANNOUNCED[name]}", slope, 1.0, 0.05, "1", source)
+        )
+    return checks, errors
+
+
+def random_scene(number: int) -> Scene:
+    """A triaxial body in any rotation, any viscous torque, in 0.4 of them with a gravity gradient."""
+    random = np.random.default_rng([15, number])
+    a, b = random.uniform(0.3, 1.0, 2)
+    third = random.uniform(max(abs(a - b), 0.3) * 1.01, a + b)
+    direction = random.normal(size=3)
+    torque = 10.0 ** random.uniform(-5, -2.5)
+    gradient = ""
+    if random.uniform() < 0.4:
+        motion = 10.0 ** random.uniform(-3, -2)
+        gradient = GRADIENT.format(square=motion**2, e=random.uniform(0, 0.3), tilt=random.uniform(0, 60))
+    return Scene(
+        (a, b, third),
+        tuple(direction / np.linalg.norm(direction)),
+        tuple(torque * random.uniform(0, 1, 3)),
+        float(min(random.uniform(0.3, 1.5) / torque, 4e4)),
+        gradient,
+    )
+
+
+def campaign(count: int) -> tuple[list[Check], np.ndarray, int]:
+    """Random bodies: true errors over announced ones, (bodies, 3), and how many were refused."""
+    ratios, refused, number = [], 0, 0
+    while len(ratios) < count:
+        scene = random_scene(number)
+        number += 1
+        try:
+            averaged = scene.run("spin_averaged")
+        except ConfigError as error:
+            refused += 1
+            print(f"random {number - 1}: {error.problems[0].what[:200]}", file=sys.stderr)
+            continue
+        announced = averaged.summary["modelling"]
+        apart = distances(averaged, scene.run("full"))
+        ratios.append([float(apart[name].max()) / float(announced[name]) for name in ANNOUNCED])
+        print(f"random {number - 1}: {ratios[-1]} of what is announced", file=sys.stderr)
+    found = np.array(ratios)
+    checks = [
+        Check(
+            f"random bodies: {words}: largest error over what is announced",
+            float(found[:, i].max()), 0.5, 0.5, "1", f"summary.json of {count} runs: not above 1", "absolute",
+        )
+        for i, words in enumerate(ANNOUNCED.values())
+    ]  # fmt: skip
+    return checks, found, refused
+
+
+def study(full: bool, out: Path) -> list[Check]:
+    """All of it; see the module's text."""
+    size, end = (2.5e-5, 5e4) if full else (2.5e-4, 5e3)
+    scenes = {
+        "tumbler": tumbler(size, end),
+        "with a gradient": tumbler(size, end, GRADIENT.format(square=4e-5, e=0.1, tilt=20)),
+    }
+    checks: list[Check] = []
+    runs: dict[str, dict[str, Result]] = {}
+    for title, scene in scenes.items():
+        found = runs[title] = {level: scene.run(level) for level in ("full", "spin_averaged")}
+        for level, result in found.items():
+            cpu = result.summary["cost"]["cpu_by_phase"]["integrate_and_record"]
+            print(f"{title}, {level}: {result.steps:,d} steps, {cpu:.3g} s", file=sys.stderr)
+        checks += covered(title, found["spin_averaged"], found["full"])
+    checks += wobbles(scenes["tumbler"], runs["tumbler"]["spin_averaged"], runs["tumbler"]["full"])
+    checks.append(axisymmetric())
+    sizes = 2e-3 / 2.0 ** np.arange(8 if full else 5)
+    slopes, errors = orders(sizes)
+    rows, ratios, refused = campaign(40 if full else 10)
+    print(f"random bodies: {refused} refused", file=sys.stderr)
+    draw(scenes, runs, (sizes, errors), ratios, out)
+    return checks + slopes + rows
+
+
+def draw(
+    scenes: dict[str, Scene],
+    runs: dict[str, dict[str, Result]],
+    ordered: tuple[np.ndarray, dict[str, np.ndarray]],
+    ratios: np.ndarray,
+    out: Path,
+) -> None:
+    """The wobble, the distances, their order, and the random bodies."""
+    figure = new_figure(11.5, 8.2, "A damped rotation: its average beside every rotation")
+    scene, both = scenes["tumbler"], runs["tumbler"]
+    averaged, full = both["spin_averaged"], both["full"]
+    time, colors = averaged.values("time"), (BLUE, ORANGE, GREEN)
+    axes = figure.add_subplot(2, 2, 1)
+    axes.plot(time, np.degrees(wobble(full)), ".", color=GREY, markersize=2, label="full")
+    pairs = zip(averaged.values("energy"), averaged.values("angular_momentum_norm"), strict=True)
+    bounds = np.degrees([extremes(scene.moments, e, s) for e, s in pairs])
+    for i, label in enumerate(("averaged: extremes", None)):
+        axes.plot(time, bounds[:, i], color=RED, linewidth=1.4, label=label)
+    energy = averaged.values("energy")
+    left = f"{100 * energy[-1] / energy[0]:.0f} % of the energy left at the end"
+    tidy(axes, "time (s)", "wobble (deg)", left)
+    axes.legend(fontsize=8, markerscale=4, loc="upper right")
+    axes = figure.add_subplot(2, 2, 2)
+    for color, (name, error) in zip(colors, distances(averaged, full).items(), strict=True):
+        axes.semilogy(time, np.maximum(error, 1e-12), ".", color=color, markersize=2, label=ANNOUNCED[name])
+        axes.axhline(averaged.summary["modelling"][name], color=color, linewidth=0.9, linestyle="--")
+    tidy(axes, "time (s)", "distance (rad, relative)", "average from full; dashed: announced")
+    axes.set_ylim(bottom=float(min(np.median(x) for x in distances(averaged, full).values())) / 30)
+    axes.legend(fontsize=8, markerscale=4, loc="lower right")
+    axes = figure.add_subplot(2, 2, 3)
+    sizes, errors = ordered
+    for color, (name, values) in zip(colors, errors.items(), strict=True):
+        axes.loglog(sizes, values, "o-", color=color, markersize=4, linewidth=0.8, label=ANNOUNCED[name])
+    line = errors["angular_momentum_norm"][0] / 2 * sizes / sizes[0]
+    axes.loglog(sizes, line, color=GREY, linewidth=0.8, linestyle=":", label="first order")
+    tidy(axes, "coefficient of the torque (N m s)", "largest distance", "the same share lost")
+    axes.xaxis.set_minor_formatter("")
+    axes.legend(fontsize=8, loc="lower right")
+    axes = figure.add_subplot(2, 2, 4)
+    for i, (color, label) in enumerate(zip(colors, ANNOUNCED.values(), strict=True)):
+        axes.plot(np.arange(len(ratios)), ratios[:, i], "o", color=color, markersize=4, label=label)
+    axes.axhline(1.0, color=RED, linewidth=1.0)
+    tidy(axes, "random body", "true error over announced", "below the line: covered")
+    axes.set_ylim(0.0, 1.2 * max(1.0, float(ratios.max())))
+    axes.legend(fontsize=8, loc="lower right")
+    save(figure, out, NAME)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, NAME))
