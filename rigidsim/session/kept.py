@@ -180,7 +180,7 @@ def _means(one: MemberSeries) -> Kept:
 def _drifts(one: MemberSeries, lengths: np.ndarray) -> Kept:
     values = one.parts[0]
     size = np.abs(values[:, :, 0])
-    largest = np.where(lengths > 0, np.max(np.where(np.isnan(size), 0, size), axis=1, initial=0), np.nan)
+    largest = np.where(lengths > 0, np.fmax.reduce(size, axis=1, initial=0.0), np.nan)
     of_a_member = ("coordinates", "scale", "scale_units")
     attributes = {k: v for k, v in one.variable.attributes.items() if k not in of_a_member}
     named = one.variable.attributes.get("long_name", one.variable.name)

@@ -50,22 +50,23 @@ def indicators(times: np.ndarray, growth: np.ndarray) -> Indicators:
     Returns:
         Zeros for motions at their start, where nothing has grown yet; NaN for motions without a finite value.
     """
-    since = np.broadcast_to(
-        (times - times[:1]) if times.ndim == 2 else (times - times[0])[:, None], growth.shape
-    )
-    known = np.logical_and.accumulate(np.isfinite(growth), axis=0)
-    g = np.where(known, growth, 0.0)
-    step = np.where(known[1:], np.diff(since, axis=0), 0.0)
+    since = times - times[:1] if times.ndim == 2 else (times - times[0])[:, None]
+    finite = np.isfinite(growth)
+    whole = bool(finite.all())  # as growth mostly is: nothing has to be left out
+    known = finite[:, :1] if whole else np.logical_and.accumulate(finite, axis=0)
+    g = growth if whole else np.where(known, growth, 0.0)
+    step = np.diff(since, axis=0) if whole else np.where(known[1:], np.diff(since, axis=0), 0.0)
     area = np.zeros_like(g)
     np.cumsum(step * (g[1:] + g[:-1]) / 2, axis=0, out=area[1:])
     with np.errstate(invalid="ignore", divide="ignore"):
         y = np.where(since > 0, 2 * (g - area / since), 0.0)
         mean = np.zeros_like(g)
         np.cumsum(step * (y[1:] + y[:-1]) / 2, axis=0, out=mean[1:])
-        last = known.sum(axis=0) - 1
+        last = np.broadcast_to(known.sum(axis=0) - 1, growth.shape[1:])
         there = last >= 0
         place = np.maximum(last, 0)[None, :]
-        until = np.where(there, np.take_along_axis(since, place, axis=0)[0], np.nan)
+        until = np.take_along_axis(np.broadcast_to(since, growth.shape), place, axis=0)[0]
+        until = np.where(there, until, np.nan)
         grown = np.take_along_axis(g, place, axis=0)[0]
         megno = np.where(until > 0, mean[-1] / until, 0.0)
         exponent = np.where(until > 0, grown / until, 0.0)

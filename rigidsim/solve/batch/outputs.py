@@ -17,6 +17,8 @@ from rigidsim.solve.compiled import compiled_function
 
 _GROUP = 64  # a multiple of every SIMD width: padded to it, a column's bits don't depend on its place
 
+_NORMAL = 1000  # exponents of powers of two that are normal numbers
+
 Values = dict[str, np.ndarray]
 
 
@@ -80,8 +82,8 @@ class BatchOutputs:
         times: np.ndarray,
         begun: np.ndarray,
         along: np.ndarray | None = None,
-    ) -> np.ndarray:
-        """All outputs, (outputs, samples, m).
+    ) -> list[np.ndarray]:
+        """All outputs, each (samples, m).
 
         Args:
             states, times: motion (samples, states, m) and times (samples, m), internal units.
@@ -89,16 +91,17 @@ class BatchOutputs:
         """
         rows, of_motion, growth = self._parts
         found = self._evaluated(of_motion, states, swept, times, begun)
-        if not growth:
-            return found
-        table = np.full((len(self._system.outputs), *found.shape[1:]), np.nan)
-        table[rows] = found
-        if along is not None:
-            table[sorted(self._growth)] = self._evaluated(growth, along, swept, times)
-        return table
+        table = dict(zip(rows, found, strict=True))
+        if growth:
+            lost = np.full(times.shape, np.nan)
+            grown = [lost] if along is None else self._evaluated(growth, along, swept, times)
+            table |= dict(zip(sorted(self._growth), grown, strict=True))
+        return [table[row] for row in range(len(table))]
 
-    def named(self, found: np.ndarray, numbers: Numbers, part: np.ndarray) -> tuple[Values, Values]:
-        """Outputs at samples as recorded variables (samples, m, components), SI, and drifts by invariant."""
+    def named(self, found: Sequence[np.ndarray], numbers: Numbers, part: np.ndarray) -> tuple[Values, Values]:
+        """Outputs, each (samples, m), as recorded variables (samples, m, components), SI, and drifts by
+        invariant.
+        """
         values: Values = {}
         for variable in self._system.recorded:
             columns = [
@@ -113,8 +116,8 @@ class BatchOutputs:
         self._join(values, numbers, part)
         return values, drifts
 
-    def named_at_events(self, found: np.ndarray, numbers: Numbers, members: np.ndarray) -> Values:
-        """Outputs at crossings, (outputs, 1, n), as recorded variables (n, components), SI.
+    def named_at_events(self, found: Sequence[np.ndarray], numbers: Numbers, members: np.ndarray) -> Values:
+        """Outputs at crossings, each (1, n), as recorded variables (n, components), SI.
 
         Args:
             members: places of the members that cross.
@@ -177,12 +180,19 @@ class BatchOutputs:
 def _to_si(values: np.ndarray, numbers: Numbers, exponent: Any, part: np.ndarray) -> np.ndarray:
     if isinstance(exponent, int):
         return np.ldexp(values, exponent) if exponent else values
-    return np.ldexp(values, numbers.whole_numbers(exponent)[part])
+    exponents = numbers.whole_numbers(exponent)[part]
+    if (
+        np.abs(exponents).max(initial=0) < _NORMAL
+    ):  # where a product with a power of two is rounded like ldexp,
+        return np.asarray(values * np.ldexp(1.0, exponents))  # at a tenth of its cost
+    return np.ldexp(values, exponents)
 
 
-def _at_events(variable: Recorded, at: np.ndarray, numbers: Numbers, chosen: np.ndarray) -> np.ndarray:
+def _at_events(
+    variable: Recorded, at: Sequence[np.ndarray], numbers: Numbers, chosen: np.ndarray
+) -> np.ndarray:
     columns = [
-        np.ldexp(at[variable.first + k, 0], numbers.whole_numbers(variable.exponents[k])[chosen])
+        np.ldexp(at[variable.first + k][0], numbers.whole_numbers(variable.exponents[k])[chosen])
         for k in range(variable.count)
     ]
     return np.stack(columns, axis=1)

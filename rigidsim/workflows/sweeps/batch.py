@@ -169,7 +169,9 @@ class BatchTiles:
         kept["status"] = status_variable(_outcome_codes(statuses))
         drifts = [np.abs(values) for values in block.drifts.values()]
         nothing = np.zeros(len(gave_up))
-        worst = np.max([np.nanmax(d, axis=0, initial=0) for d in drifts], axis=0) if drifts else nothing
+        worst = (
+            np.max([np.fmax.reduce(d, axis=0, initial=0.0) for d in drifts], axis=0) if drifts else nothing
+        )
         over = worst > block.drift_bound
         warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
         if errors is not None:
@@ -203,6 +205,8 @@ def _lost(block: BatchBlock) -> np.ndarray:
     """Members in which a recorded variable becomes undefined after having been defined, (members,)."""
     found = np.zeros(len(block.members), dtype=bool)
     for values in block.values.values():
+        if np.isfinite(values.sum()):
+            continue
         bad = np.asarray(np.isnan(values).reshape(*values.shape[:2], -1).any(axis=2))
         if bad.any():
             taken = np.arange(len(bad))[:, None] < block.reached
