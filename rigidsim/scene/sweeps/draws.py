@@ -53,7 +53,7 @@ def normal(seed: int, key: str, component: int) -> Draw:
 
 
 @dataclass(frozen=True)
-class Line:
+class DrawnValues:
     """Values ``(first + step * draw) / below`` of whole numbers: fractions take four times as long to add."""
 
     draw: Draw
@@ -62,15 +62,15 @@ class Line:
     below: int
 
     @classmethod
-    def of(cls, draw: Draw, first: Fraction, step: Fraction) -> Line:
+    def of(cls, draw: Draw, first: Fraction, step: Fraction) -> DrawnValues:
         """Values ``first + step * draw``."""
         below = math.lcm(first.denominator, step.denominator)
         return cls(draw, int(first * below), int(step * below), below)
 
-    def times(self, factor: Fraction) -> Line:
+    def times(self, factor: Fraction) -> DrawnValues:
         """All values times a factor."""
         up, down = factor.numerator, factor.denominator
-        return Line(self.draw, self.first * up, self.step * up, self.below * down)
+        return DrawnValues(self.draw, self.first * up, self.step * up, self.below * down)
 
     def numerator(self, index: int) -> int:
         """Numerator of a value."""

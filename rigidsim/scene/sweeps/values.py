@@ -269,7 +269,7 @@ def _random(way: str, given: Sequence[Any], count: int, key: str, seed: int, len
     lines = []
     for k, (a, b) in enumerate(pairs):
         step = (b[0] - a[0] if uniform else b[0]) / parts
-        lines.append((draws.Line.of(drawn(seed, key, k), a[0], step), a[1], a[2]))
+        lines.append((draws.DrawnValues.of(drawn(seed, key, k), a[0], step), a[1], a[2]))
 
     def entry(index: int) -> Entry:
         return tuple(
@@ -280,7 +280,7 @@ def _random(way: str, given: Sequence[Any], count: int, key: str, seed: int, len
     return AxisValues(count, components, entry, ratios=_ratios_of(lines))
 
 
-def _ratios_of(lines: Sequence[tuple[draws.Line, int, str]]) -> Ratios | None:
+def _ratios_of(lines: Sequence[tuple[draws.DrawnValues, int, str]]) -> Ratios | None:
     """See ``AxisValues``."""
     made = []
     for line, power, unit in lines:
@@ -292,7 +292,10 @@ def _ratios_of(lines: Sequence[tuple[draws.Line, int, str]]) -> Ratios | None:
             return None
         up, down = factor.numerator, factor.denominator
         made.append(
-            (draws.Line(line.draw, line.first * up, line.step * up, line.below * down), line.below * down)
+            (
+                draws.DrawnValues(line.draw, line.first * up, line.step * up, line.below * down),
+                line.below * down,
+            )
         )
 
     def ratios(indices: Sequence[int]) -> list[tuple[list[int], int]]:

@@ -88,14 +88,13 @@ def until_next(
             to have as well; 0 where none did.
     """
     expected = []
-    for lane, member in enumerate(inside):
+    for member, moment, target, begin, before in zip(inside, moments, targets, begun, taken, strict=True):
         if member == IDLE:
             continue
-        gone, left = moments[lane] - begun[lane], targets[lane] - moments[lane]
-        if taken[lane] and gone > 0:
-            steps = int(left / gone * taken[lane]) + 2
+        if before and moment > begin:
+            steps = int((target - moment) / (moment - begin) * before) + 2
         else:
-            steps = int(left * pace) if pace else _FIRST_STEPS
-        expected.append(min(max(steps, _LEAST_STEPS), most_steps - taken[lane]))
-    first = min(expected)
-    return max(max(steps for steps in expected if steps <= first + _SHORTLY), 1)
+            steps = int((target - moment) * pace) if pace else _FIRST_STEPS
+        expected.append(min(max(steps, _LEAST_STEPS), most_steps - before))
+    last = min(expected) + _SHORTLY
+    return max(max([steps for steps in expected if steps <= last]), 1)

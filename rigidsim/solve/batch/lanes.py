@@ -15,6 +15,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, put_in_place, until_next
+from rigidsim.solve.batch.stack_places import StackPlaces
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
@@ -82,6 +83,7 @@ class BatchEngine:
         else:
             self._integrator = _engines.get(described, self._compiled)
         self._longest = longest_step(self._integrator.order, np.float64)
+        self._stack = StackPlaces(self._integrator)
 
     def _compiled(self) -> Any:
         system, width = self._system, self.width
@@ -244,18 +246,18 @@ class BatchEngine:
 
         enter(range(width))
         moments, targets = high.tolist(), target.tolist()
-        while any(member != IDLE for member in inside):
+        while inside.count(IDLE) < width:
             self._log.clear()
             most = until_next(moments, inside, targets, begun, taken, most_steps, pace)
-            integrator.propagate_until(target, max_steps=most, max_delta_t=bounds)
+            self._stack(integrator.propagate_until, target, max_steps=most, max_delta_t=bounds)
             outcomes = integrator.propagate_res
-            high, low = (np.array(part) for part in integrator.dtime)
+            high, low = map(np.array, integrator.dtime)
             moments = high.tolist()
-            taken = [before + int(now[3]) for before, now in zip(taken, outcomes, strict=True)]
+            taken = [before + now[3] for before, now in zip(taken, outcomes, strict=True)]
             for crossing in self._log:
                 if inside[crossing.lane] != IDLE:
                     result.found.setdefault(inside[crossing.lane], []).append(crossing)
-            if any(now[0] == _LOST for now in outcomes):
+            if _LOST in [now[0] for now in outcomes]:
                 self._after_loss(result, inside, taken, outcomes, waiting)
                 lanes = list(range(width))
             else:
@@ -326,7 +328,7 @@ class BatchEngine:
                 found = np.array(integrator.state)[None]
             else:
                 grid = part if known else np.vstack([begin, part])
-                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=longest)
+                _, found = self._stack(integrator.propagate_grid, grid, max_steps=left, max_delta_t=longest)
                 outcomes = integrator.propagate_res[:count]
                 taken += [now[3] for now in outcomes]
                 arrived[:] = [now[0] == _ARRIVED for now in outcomes]

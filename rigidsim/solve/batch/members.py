@@ -14,7 +14,8 @@ from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.sweeps.sweep import Axis, Sweep
 from rigidsim.scene.sweeps.values import Ratios
 from rigidsim.solve.batch.double_double import Doubled
-from rigidsim.solve.batch.replay import Distinct, Swept, quotients_in_two_doubles
+from rigidsim.solve.batch.exact_doubles import quotients_in_two_doubles
+from rigidsim.solve.batch.replay import Distinct, Swept
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 
 _HELD = 1 << 21
@@ -23,7 +24,7 @@ are looked at.
 """
 
 
-class _Column(Sequence[ExactNumber]):
+class _AxisColumn(Sequence[ExactNumber]):
     """One number of some of an axis's values, each worked out when it is asked for."""
 
     def __init__(self, axis: Axis, column: int, indices: Sequence[int]) -> None:
@@ -44,7 +45,7 @@ class _Quotients:
         count, columns = axis.values.count, len(axis.columns)
         self._parts = np.empty((columns, 3, count))
         self._known = np.zeros(count, dtype=bool)
-        self._values = [_Column(axis, column, range(count)) for column in range(columns)]
+        self._values = [_AxisColumn(axis, column, range(count)) for column in range(columns)]
 
     def columns(self, which: np.ndarray) -> list[Swept]:
         """See ``AxisNumbers``."""
@@ -103,7 +104,7 @@ class AxisNumbers:
         columns = range(len(axis.columns))
         if axis.values.ratios is not None:
             found = [quotients_in_two_doubles(*ratio) for ratio in axis.values.ratios(indices)]
-            return [Distinct(_Column(axis, n, indices), found[n]) for n in columns]
+            return [Distinct(_AxisColumn(axis, n, indices), found[n]) for n in columns]
         entries = [axis.exact(index) for index in indices]
         return [Distinct([entry[n] for entry in entries]) for n in columns]
 

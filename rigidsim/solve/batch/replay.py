@@ -9,19 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.tracing.graph import Graph, Guard
 from rigidsim.solve.batch import double_double as dd
 from rigidsim.solve.batch.double_double import Doubled
+from rigidsim.solve.batch.exact_doubles import in_two_doubles, in_two_parts, parts_of
 from rigidsim.solve.precision import precision_of
 
-_MANTISSA, _NORMAL = 53, 2.3e-308  # bits of a double, and about the least that has them all
 _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
 """Errors of mpmath for numbers outside the range of an operation; the member's own build reports them."""
 _BINARY: dict[str, Callable[[Doubled, Doubled], Doubled]] = {
@@ -144,7 +142,7 @@ class Replay:
 
     def _worked_out(self, node: int, operation: str, arguments: tuple[Any, ...]) -> Doubled:
         if operation == "constant":
-            return _doubled(arguments[0])
+            return in_two_parts(arguments[0])
         if operation == "column":
             column = self._swept[arguments[0]]
             index, found = column.index[self._members], column.distinct.doubled
@@ -194,7 +192,7 @@ class Replay:
         parts = []
         for member in first:
             try:
-                parts.append(_parts(self._exactly(node, int(member))))
+                parts.append(parts_of(self._exactly(node, int(member))))
             except _FAILURES:
                 parts.append((np.nan, np.nan, np.inf))
         high, low, error = (np.array(x)[codes] for x in zip(*parts, strict=True))
@@ -277,65 +275,6 @@ _EXACT: dict[str, Callable[..., Any]] = {
     "maximum": max,
     "minimum": min,
 }
-
-
-def _parts(value: Any) -> tuple[float, float, float]:
-    """An mpf in two doubles, and the remainder."""
-    high = float(value)
-    rest = value - high
-    low = float(rest)
-    left = abs(float(rest - low))
-    return high, low, left * 1.0001 + (5e-324 if rest != low else 0.0)
-
-
-def _doubled(value: Any) -> Doubled:
-    return Doubled(*_parts(value))
-
-
-def in_two_doubles(values: Sequence[ExactNumber]) -> Doubled:
-    """Exact numbers in two doubles."""
-    return _columns_of([_parts_of_exact(value) for value in values])
-
-
-def quotients_in_two_doubles(numerators: Sequence[int], below: int) -> Doubled:
-    """Quotients of whole numbers with a common denominator, in two doubles."""
-    try:
-        return _columns_of([_parts_of_quotient(above, below) for above in numerators])
-    except OverflowError:
-        return in_two_doubles([ExactNumber(Fraction(above, below)) for above in numerators])
-
-
-def _columns_of(parts: Sequence[tuple[float, float, float]]) -> Doubled:
-    high, low, error = np.array(parts, dtype=np.float64).reshape(-1, 3).T.copy()
-    return Doubled(high, low, error)
-
-
-def _parts_of_exact(value: ExactNumber) -> tuple[float, float, float]:
-    """An exact number as ``_parts`` has it."""
-    try:
-        if value.pi_power:
-            raise OverflowError
-        return _parts_of_quotient(value.rational.numerator, value.rational.denominator)
-    except OverflowError:
-        high, low, error = _parts(value.at(context_for(34)))
-        return high, low, error + abs(high) * 2.0**-200
-
-
-def _parts_of_quotient(above: int, below: int) -> tuple[float, float, float]:
-    """The same of a quotient of whole numbers, which Python rounds once.
-
-    Raises:
-        OverflowError: it is outside a double's range.
-    """
-    high = above / below
-    up, down = high.as_integer_ratio()
-    rest, under = above * down - up * below, below * down
-    if not rest:
-        return high, 0.0, 0.0
-    low = rest / under
-    if under & (under - 1) == 0 and rest.bit_length() <= _MANTISSA and abs(low) > _NORMAL:
-        return high, low, 0.0
-    return high, low, abs(low) * 2.0**-_MANTISSA + 5e-324
 
 
 def _is_power_of_two(graph: Graph, node: int) -> bool:

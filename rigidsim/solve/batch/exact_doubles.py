@@ -1,0 +1,75 @@
+"""Exact numbers in two doubles, each with a bound of its error (``double_double``)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.solve.batch.double_double import Doubled
+
+_MANTISSA, _NORMAL = 53, 2.3e-308  # bits of a double, and about the least that has them all
+
+
+def parts_of(value: Any) -> tuple[float, float, float]:
+    """An mpf in two doubles, and the remainder."""
+    high = float(value)
+    rest = value - high
+    low = float(rest)
+    left = abs(float(rest - low))
+    return high, low, left * 1.0001 + (5e-324 if rest != low else 0.0)
+
+
+def in_two_parts(value: Any) -> Doubled:
+    """An mpf in two doubles."""
+    return Doubled(*parts_of(value))
+
+
+def in_two_doubles(values: Sequence[ExactNumber]) -> Doubled:
+    """Exact numbers in two doubles."""
+    return _columns_of([_parts_of_exact(value) for value in values])
+
+
+def quotients_in_two_doubles(numerators: Sequence[int], below: int) -> Doubled:
+    """Quotients of whole numbers with a common denominator, in two doubles."""
+    try:
+        return _columns_of([_parts_of_quotient(above, below) for above in numerators])
+    except OverflowError:
+        return in_two_doubles([ExactNumber(Fraction(above, below)) for above in numerators])
+
+
+def _columns_of(parts: Sequence[tuple[float, float, float]]) -> Doubled:
+    high, low, error = np.array(parts, dtype=np.float64).reshape(-1, 3).T.copy()
+    return Doubled(high, low, error)
+
+
+def _parts_of_exact(value: ExactNumber) -> tuple[float, float, float]:
+    """An exact number as ``parts_of`` has it."""
+    try:
+        if value.pi_power:
+            raise OverflowError
+        return _parts_of_quotient(value.rational.numerator, value.rational.denominator)
+    except OverflowError:
+        high, low, error = parts_of(value.at(context_for(34)))
+        return high, low, error + abs(high) * 2.0**-200
+
+
+def _parts_of_quotient(above: int, below: int) -> tuple[float, float, float]:
+    """The same of a quotient of whole numbers, which Python rounds once.
+
+    Raises:
+        OverflowError: it is outside a double's range.
+    """
+    high = above / below
+    up, down = high.as_integer_ratio()
+    rest, under = above * down - up * below, below * down
+    if not rest:
+        return high, 0.0, 0.0
+    low = rest / under
+    if under & (under - 1) == 0 and rest.bit_length() <= _MANTISSA and abs(low) > _NORMAL:
+        return high, low, 0.0
+    return high, low, abs(low) * 2.0**-_MANTISSA + 5e-324
