@@ -88,11 +88,19 @@ class BatchRun:
     Args:
         width: lanes of the integrator; by default what the processor takes at once.
         unfelt: largest component of tangent vectors, see ``BatchMotion``.
+        at_once: sample values evaluated together.
     """
 
-    def __init__(self, family: Family, width: int | None = None, unfelt: float = UNFELT) -> None:
+    def __init__(
+        self,
+        family: Family,
+        width: int | None = None,
+        unfelt: float = UNFELT,
+        at_once: int = _VALUES_AT_ONCE,
+    ) -> None:
         self.family = family
         self.width = width or recommended_width()
+        self._at_once = at_once
         self._traced = family.traced
         self._system = family.traced.system
         self._precision = precision_of("double")
@@ -114,7 +122,7 @@ class BatchRun:
         """
         samples = self._traced.prepared.clock.count
         each = samples * (len(self._system.states) + len(self._system.outputs))
-        most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
+        most = max(self._at_once // each // self.width, 1) * self.width
         # members with about as many steps run side by side, so that none waits for long
         order = np.argsort(numbers.doubles(self._system.rate_bound), kind="stable")
         for first in range(0, len(order), most):

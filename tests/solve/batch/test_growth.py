@@ -77,12 +77,9 @@ def test_one_integrator_does_for_both_only_where_it_may(monkeypatch: pytest.Monk
     assert taken[0] == whole
     assert 0 < taken[2][1] < 9
     assert taken[1] == (5, 9 - taken[2][1])  # vectors that steps know of tell nothing about the code
-    monkeypatch.setattr("rigidsim.solve.batch.run._VALUES_AT_ONCE", 1)
     taken.clear()
-    motions(growing(PLANAR), RATES)
+    motions(growing(PLANAR), RATES, at_once=1)
     assert taken == [(7, tried[1]), tried, (7, 9 - tried[1])]  # the second block needn't be tried again
-    monkeypatch.undo()
-    monkeypatch.setattr(BatchEngine, "run", counted)
     otherwise = True
     taken.clear()
     again = motions(growing(PLANAR), RATES)
