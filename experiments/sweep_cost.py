@@ -6,19 +6,23 @@ by one; and the wall time of a sweep of a minute or more with two workers beside
 Method: CPU time of one core, medians over runs in turn: batches with all that comes before (families, their
 numbers, samples, drifts), against bare heyoka with ``par[]`` and nothing recorded; and once more with
 estimates of errors, which aren't part of what is asked. With ``--workers``: whole processes of ``rigidsim
-sweep``, one worker and several in turn, wall and CPU time, the same dataset; say nothing else on the machine.
+sweep``, one worker and several in turn, wall time by stages, and CPU time; nothing else should run beside
+them.
 
 Held against: at most 0.25 of the CPU at width 8, 0.35 at width 4; with two workers at most 0.55 of the wall
 time of one.
 
 Run: python -m experiments.sweep_cost [4096]
-     python -m experiments.sweep_cost --workers 2 [120000]
+     python -m experiments.sweep_cost --workers 2 [150000]
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
+import shutil
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -28,7 +32,6 @@ from pathlib import Path
 import heyoka as hy
 
 from experiments.common import Check, table
-from experiments.spin_orbit_map import measured
 from rigidsim.accuracy.estimates.member_estimate import MemberEstimates
 from rigidsim.scene.config import parse
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -36,7 +39,7 @@ from rigidsim.solve.batch.family import Families, Family, Numbers
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.run import BatchRun
 
-MEMBERS, MANY, ROUNDS = 4096, 120_000, 3
+MEMBERS, MANY, ROUNDS = 4096, 150_000, 3
 _MOST = {8: 0.25, 4: 0.35}
 _MOST_OF_TWO = 0.55
 _ASKED = "asked of this project (issue 14)"
@@ -111,27 +114,45 @@ def side_by_side(count: int) -> list[Check]:
     ]
 
 
+STAGES = {"trying out": "import", "running": "check", "writing": "tiles"}
+"""What a line on stderr begins, and what has ended with it."""
+
+
+def staged(command: Sequence[str]) -> dict[str, float]:
+    """Wall seconds of the stages of a sweep, of the whole, and the CPU seconds of all its processes."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    began = last = time.perf_counter()
+    seconds: dict[str, float] = {}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            now = time.perf_counter()
+            for words, stage in STAGES.items():
+                if words in line:
+                    seconds[stage], last = now - last, now
+    ended = time.perf_counter()
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
+    return {**seconds, "dataset": ended - last, "wall": ended - began, "cpu": cpu}
+
+
 def shared(count: int, workers: int) -> list[Check]:
-    """A sweep by one worker and by several, as whole processes."""
+    """A sweep by one worker and by several, as whole processes; each is a new sweep, with its check."""
     ratios = []
     with tempfile.TemporaryDirectory(prefix="rigidsim-workers-") as temporary:
         config = Path(temporary) / "free_bodies.toml"
         config.write_text(TEXT.replace("COUNT", str(count)), encoding="utf-8")
-        for _ in range(ROUNDS):
+        for turn in range(ROUNDS):
             told = {}
             for number in (1, workers):
-                command = [
-                    sys.executable,
-                    "-m",
-                    "rigidsim",
-                    "sweep",
-                    str(config),
-                    "--out",
-                    temporary,
-                    "--force",
-                ]
-                told[number], _ = measured([*command, "--workers", str(number)])
-                print(f"{number} workers: {told[number]}", flush=True)
+                out = Path(temporary) / f"{turn}_{number}"
+                command = [sys.executable, "-m", "rigidsim", "sweep", str(config), "--out", str(out)]
+                told[number] = staged([*command, "--workers", str(number)])
+                stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in told[number].items())
+                print(f"{number} workers, seconds: {stages}", flush=True)
+                shutil.rmtree(out)
             ratios.append(told[workers]["wall"] / told[1]["wall"])
     most = _MOST_OF_TWO if workers == 2 else 1.0
     name = f"wall time with {workers} workers over one"

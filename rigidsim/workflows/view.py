@@ -47,6 +47,7 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
 
 
 def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, Run]]:
+    from rigidsim.scene.sweeps.sweep import Sweep
     from rigidsim.store.sweeps.run import open_sweep
     from rigidsim.workflows.read import parse
     from rigidsim.workflows.run import run
@@ -56,8 +57,12 @@ def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, R
         raise RunFolderError("--member is for one sweep: give its folder (runs/NAME), and no other run")
     folder = open_sweep(paths[0]).folder
     experiment = parse(folder.config.read_text(), source=str(folder.config))
-    chosen = list(dict.fromkeys(members))
-    return [(f"member {member}", run(single_member(experiment, member), out=None)) for member in chosen]
+    sweep, named = Sweep.of(experiment), []
+    for member in dict.fromkeys(members):
+        one = single_member(experiment, member)
+        said = "; ".join(filter(None, (one.config.description, sweep.told(member))))
+        named.append((f"member {member}", run(one.replace({"description": said}), out=None)))
+    return named
 
 
 def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:

@@ -166,6 +166,15 @@ def test_words_and_whole_vectors_are_values_too() -> None:
         sweep.exact([0])
 
 
+def test_a_member_is_told_to_six_digits_with_units() -> None:
+    sweep = swept(
+        f'{RATE} = {{logspace = [1e-6, 1e-1, 21], name = "rate"}}\n'
+        'axes."integrator.formulation" = {values = ["rates", "quaternion"]}\n'
+        'axes."body.principal_moments" = {values = [[1, 2, 2.5]], name = "body"}'
+    )
+    assert sweep.told(3) == 'rate = 1.77828e-06 rad/s, formulation = "quaternion", body = [1, 2, 2.5] kg m^2'
+
+
 def test_a_setting_reaches_a_key_with_points_in_it() -> None:
     text = f"{BASE}[sweep]\n{RATE} = {{linspace = [0, 1, 3]}}\n"
     experiment = parse(text, overrides=['sweep.axes."initial.angular_velocity[2]".linspace=[0, 2, 5]'])

@@ -16,7 +16,7 @@ from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
 from rigidsim.scene.sweep_table import SweepTable
 from rigidsim.scene.sweeps.keys import unit_and_length
-from rigidsim.scene.sweeps.values import AxisValues, axis_values
+from rigidsim.scene.sweeps.values import AxisValues, axis_values, nearest_double
 from rigidsim.scene.toml_text import parse_toml
 from rigidsim.scene.validation_messages import shown
 
@@ -160,6 +160,18 @@ class Sweep:
     def texts(self, member: int) -> tuple[str, ...]:
         """The values that identify a member, as written in a config, in the order of the axes."""
         return tuple(axis.values.text(i) for axis, i in zip(self.axes, self.indices(member), strict=True))
+
+    def told(self, member: int) -> str:
+        """The values that identify a member, for people: to six digits, with units."""
+        found = []
+        for axis, index in zip(self.axes, self.indices(member), strict=True):
+            text = axis.values.text(index)
+            if axis.numeric:
+                numbers = [f"{nearest_double(x):.6g}" for x in axis.exact(index)]
+                text = f"[{', '.join(numbers)}]" if axis.values.components else numbers[0]
+            unit = f" {axis.unit}" if axis.numeric and axis.unit != "1" else ""
+            found.append(f"{axis.name} = {text}{unit}")
+        return ", ".join(found)
 
     def overrides(self, member: int) -> list[str]:
         """``KEY=VALUE`` texts that turn the base experiment into the member."""
