@@ -57,7 +57,7 @@ def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, R
         raise RunFolderError("--member is for one sweep: give its folder (runs/NAME), and no other run")
     folder = open_sweep(paths[0]).folder
     experiment = parse(folder.config.read_text(), source=str(folder.config))
-    sweep, named = Sweep.of(experiment), []
+    sweep, named = Sweep.of(experiment), list[tuple[str, Run]]()
     for member in dict.fromkeys(members):
         one = single_member(experiment, member)
         said = "; ".join(filter(None, (one.config.description, sweep.told(member))))
