@@ -236,3 +236,21 @@ def test_the_time_at_which_the_separatrix_comes_near_is_told() -> None:
     rates = solve_ivp(change, (0, times[-1]), given["rates"], "DOP853", times, rtol=1e-8, atol=1e-10).y
     crossed = times[np.flatnonzero(np.diff(np.sign(rates[1])))]
     assert told < crossed[0] < 1.35 * told
+
+
+def test_a_resonance_with_a_source_is_passed_fast_or_refused() -> None:
+    """Ten times slower, it turns the momentum sqrt(10) times as far; a hundred times, it may capture."""
+
+    def passing(slower: float) -> InitialValueProblem:
+        damping = [x / slower for x in (3e-6, 2.4e-5, 2.3e-5)]
+        loads = f'kind = "viscous_torque"\ncoefficients = {damping}\n[[loads]]\nkind = "gravity_gradient"\n'
+        loads += "gravitational_parameter = 2.5e-5\n"
+        loads += 'orbit = {semi_major_axis = 1, eccentricity = 0.044, inclination = "12.6 deg"}'
+        rates, end = [0.63, 0.62, -0.46], str(19000 * slower)
+        return prepared(loads, rates=rates, moments=[0.307, 1.0, 0.879], end=end)
+
+    fast, slow = (driven(passing(slower)).passed for slower in (1, 10))
+    assert 1e-5 < fast < 1e-3
+    assert slow == pytest.approx(math.sqrt(10) * fast, rel=0.05)
+    with pytest.raises(ConfigError, match="may be captured in a resonance.*or end the run before"):
+        passing(100)
