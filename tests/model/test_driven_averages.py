@@ -252,5 +252,5 @@ def test_a_resonance_with_a_source_is_passed_fast_or_refused() -> None:
     fast, slow = (driven(passing(slower)).passed for slower in (1, 10))
     assert 1e-5 < fast < 1e-3
     assert slow == pytest.approx(math.sqrt(10) * fast, rel=0.05)
-    with pytest.raises(ConfigError, match="may be captured in a resonance.*or end the run before"):
+    with pytest.raises(ConfigError, match=r"may be captured in a resonance.*or end the run before"):
         passing(100)
