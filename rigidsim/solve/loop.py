@@ -18,7 +18,6 @@ from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
 _CAREFUL = 2**20  # steps at once
-_LONG = 1e-3  # seconds; a step that takes longer isn't taken twice to be measured
 
 
 class IntegrationLoop:
@@ -87,7 +86,7 @@ class IntegrationLoop:
                 return self._ended(Status.MAX_DRIFT)
             self._settle(self.progress.last_good, self.last)
             return self._ended(Status.FINISHED)
-        self._look_ahead(self.progress.last_good)
+        self.ways.look_ahead(self.progress.last_good)
         while True:
             stop = self.check(self.progress) or self._out_of_steps()
             if stop is None:
@@ -146,17 +145,6 @@ class IntegrationLoop:
     def _allowed(self, count: int) -> int:
         """The given number of steps, or as many as the step limit still allows."""
         return count if self._most_steps is None else min(count, self._most_steps - self.stepper.steps)
-
-    def _look_ahead(self, boundary: StepBoundary) -> None:
-        """Measure the length and the duration of a step from here by one that is taken back."""
-        for _ in range(2):  # the first is slow, as is everything that is done for the first time
-            started = time.perf_counter()
-            self.stepper.step()
-            elapsed = time.perf_counter() - started
-            self.corrected.back_to(boundary)
-            if elapsed > _LONG:
-                break
-        self.ways.looked_ahead(elapsed)
 
     def _ended(self, status: Status) -> Progress:
         if self._reach is not None and not self.buffer.complete:

@@ -21,13 +21,15 @@ Single steps are what remains between the others, and all that pays beyond 80 bi
 from __future__ import annotations
 
 import math
+import time
 from enum import Enum
 
 from rigidsim.scene.records import dataclass
-from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sampling import SampleClock
 
+_LONG = 1e-3  # seconds; a step that takes longer isn't taken twice to be measured
 _SPARE = 4  # steps that a skip of steps of mean length ends early: a few are far from the mean
 
 
@@ -115,9 +117,16 @@ class WayFinder:
         """Learn the duration of so many steps; single steps are measured before anything is chosen."""
         self._paces[way] = max(steps, 1) / max(seconds, 1e-9)
 
-    def looked_ahead(self, seconds: float) -> None:
-        """Learn the duration of a step before the first."""
-        self.measured(SampleWay.STEP, 1, seconds)
+    def look_ahead(self, boundary: StepBoundary) -> None:
+        """Measure the duration of a step from a boundary, which is here, by one that is taken back."""
+        for _ in range(2):  # the first is slow, as is everything that is done for the first time
+            started = time.perf_counter()
+            self._corrected.stepper.step()
+            elapsed = time.perf_counter() - started
+            self._corrected.back_to(boundary)
+            if elapsed > _LONG:
+                break
+        self.measured(SampleWay.STEP, 1, elapsed)
         self._alone = self._paces[SampleWay.STEP]
 
     def _most(self, way: SampleWay) -> int:
