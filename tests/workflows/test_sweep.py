@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool, _ResultItem
 from pathlib import Path
@@ -567,6 +567,33 @@ def test_workers_get_ready_before_the_check_and_end_with_a_refusal(tmp_path: Pat
         begun = ["get_imported"] * min(9, os.cpu_count() or 1)
         assert done == ["pool of 9", *begun, *["get_ready"] * 6, "check", "shutdown"]
         assert not any(place.exists() for place in Noted.places)
+
+
+@pytest.mark.parametrize("lasting", [0, 2, 5])
+def test_what_workers_that_died_should_have_looked_at_is_looked_at_here(lasting: int) -> None:
+    asked: list[int] = []
+
+    def looked(share: int) -> int:
+        asked.append(share)
+        return share**2
+
+    class Pool:
+        def submit(self, *_: object) -> None: ...
+
+        def map(self, function: Callable[[int], int], tasks: list[int]) -> Iterator[int]:
+            yield from (share**2 for share in tasks[:lasting])
+            if lasting < len(tasks):
+                raise BrokenProcessPool("a worker died")
+
+        def shutdown(self, **_: object) -> None: ...
+
+    class Mortal(Workers):
+        def _pool(self, *_: object) -> Pool:  # type: ignore[override]
+            return Pool()
+
+    with Mortal(2) as workers:
+        assert list(workers.each(looked, list(range(5)))) == [0, 1, 4, 9, 16]
+    assert asked == list(range(lasting, 5))
 
 
 def test_a_worker_that_got_ready_compiles_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
