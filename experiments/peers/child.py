@@ -16,7 +16,6 @@ from typing import Any
 
 _MOST_CALLS = 200
 _HANDFUL = 3  # settings
-_AROUND = 5.0
 _PATIENCE = 1.0  # CPU seconds of one call from which it isn't repeated
 
 
@@ -62,23 +61,22 @@ def measure(prepare: Callable[[], Callable[[], Any]], fill: float, fewest: int =
 
     Args:
         prepare: returns the function to be timed.
-        fill: CPU seconds of integrations to choose the fastest from; of calls ``_AROUND`` times as much.
+        fill: CPU seconds of calls to choose the fastest from.
         fewest: calls at least, but of slow ones.
     """
     started = time.process_time()
     solve = prepare()
     prepared = time.process_time() - started
-    fastest, whole, spent, around, quaternion = math.inf, math.inf, 0.0, 0.0, []
+    fastest, whole, spent, quaternion = math.inf, math.inf, 0.0, []
     for number in range(_MOST_CALLS):
         started = time.process_time()
         answer = solve()
         elapsed = time.process_time() - started
         quaternion = list(getattr(answer, "quaternion", answer))
-        seconds = getattr(answer, "seconds", elapsed)
-        fastest, whole = min(fastest, seconds), min(whole, elapsed)
-        spent, around = spent + seconds, around + elapsed
-        enough = spent > fill or around > _AROUND * fill
-        if elapsed > _PATIENCE or (enough and number + 1 >= fewest):
+        fastest = min(fastest, getattr(answer, "seconds", elapsed))
+        whole = min(whole, elapsed)
+        spent += elapsed
+        if elapsed > _PATIENCE or (spent > fill and number + 1 >= fewest):
             break
     return {"prepare": prepared, "seconds": fastest, "whole": whole, "quaternion": quaternion}
 
