@@ -321,7 +321,7 @@ def draw(
     axes.axhline(1.0, color=RED, linewidth=1.0)
     tidy(axes, "random body", "true error over announced", "below the line: covered")
     axes.set_ylim(0.0, 1.2 * max(1.0, float(ratios.max())))
-    axes.legend(fontsize=8, loc="center left")
+    axes.legend(fontsize=8, loc="lower left")
     save(figure, out, NAME)
 
 
