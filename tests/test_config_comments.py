@@ -103,3 +103,33 @@ def test_the_water_molecule_flips(runs: Path) -> None:
         last = float(dataset.time[-1])
     assert f"every {np.diff(flips).mean() * 1e12:.2f} ps" in comments
     assert f"steps of {10 ** round(math.log10(last / run.summary['cost']['steps'])):.0e} s" in comments
+
+
+def test_how_far_the_satellite_is_braked(runs: Path) -> None:
+    text, comments = given("detumbling_cubesat")
+    changes = ["output.timeline=false", "output.estimate=false"]
+    run = rigidsim.run(rigidsim.parse(text, overrides=changes), out=runs)
+    with run.dataset as dataset:
+        momentum, energy = (
+            float(dataset[name][-1] / dataset[name][0]) for name in ("angular_momentum_norm", "energy")
+        )
+    assert f"momentum falls to {100 * momentum:.0f} % and the energy to {100 * energy:.0f} %" in comments
+    assert f"takes {round(run.summary['cost']['steps'], -3):,} steps" in comments
+
+
+@pytest.mark.slow
+def test_how_far_the_braked_satellite_is_from_the_motion_with_every_rotation(runs: Path) -> None:
+    text, comments = given("detumbling_cubesat")
+    average = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs, force=True)
+    changes = [
+        'model.level="full"',
+        'name="every_rotation"',
+        "output.timeline=false",
+        "output.estimate=false",
+    ]
+    full = rigidsim.run(rigidsim.parse(text, overrides=changes), out=runs)
+    assert f"instead of {full.summary['cost']['steps'] / 1e6:.1f} million" in comments
+    apart = np.linalg.norm(average.dataset.momentum_axis.values - full.dataset.momentum_axis.values, axis=1)
+    assert apart.max() < 6e-6
+    assert "stays within 6e-6 rad of it" in comments
+    assert apart.max() < average.summary["modelling"]["momentum_axis"]

@@ -208,6 +208,20 @@ def test_the_page_of_a_run_with_axes_alone_is_about_their_precession() -> None:
     assert titles(figures.figure(alone))[0] == titles(page)[0]
 
 
+def test_the_page_of_an_averaged_rotation_that_is_braked_says_what_is_left_of_it() -> None:
+    dataset = precessing().assign_attrs(formulation="spin_averaged")
+    left = np.exp(-np.linspace(0.0, 2.0, dataset.sizes["time"]))
+    recorded = {"angular_momentum_norm": 3.0 * left, "energy": 5.0 * left**2}
+    page = figures.figure(dataset.assign({name: ("time", values) for name, values in recorded.items()}))
+    assert titles(page)[0] == "What is left of the rotation"
+    momentum, energy = (line.get_ydata() for line in page.axes[0].get_lines())
+    np.testing.assert_allclose(momentum, left, rtol=1e-15)
+    np.testing.assert_allclose(energy, left**2, rtol=1e-15)
+    assert collisions(page) == []
+    steady = {name: ("time", np.full_like(left, values[0])) for name, values in recorded.items()}
+    assert titles(figures.figure(dataset.assign(steady)))[0].startswith("Obliquity")
+
+
 def test_nutation_ellipse_has_its_period_and_its_axes() -> None:
     page = figures.figure(precessing(years=60), "nutation")
     (axes,) = page.axes

@@ -183,6 +183,18 @@ def test_a_globe_without_rotation_points_where_its_axis_does(symmetric_top: Buil
         assert any("direction of the Sun isn't shown" in note for note in found.notes)
 
 
+def test_where_a_longitude_strays_as_far_as_it_advances_no_circle_of_precession_is_drawn(
+    symmetric_top: Build,
+) -> None:
+    top = symmetric_top(count=101)
+    dataset = averaged(top, "momentum", top)
+    node = dataset["node_longitude"]
+    swings = 2.0 * np.ptp(node.values) * np.cos(np.linspace(0.0, 2 * np.pi, node.size))[:, None]
+    found = picture(dataset.assign(node_longitude=node + swings))
+    assert "precession" not in {line.name for line in found.stages[0].lines}
+    assert "precession" in {line.name for line in picture(dataset).stages[0].lines}
+
+
 def test_against_a_moving_plane_a_globe_is_seen_from_that_plane(symmetric_top: Build) -> None:
     top = symmetric_top(count=101)
     dataset = averaged(top, "figure", earth(top))

@@ -88,6 +88,7 @@ POLAR_MOTION = Panel(
 )
 OBLIQUITY = Panel(_has_orientation, timelines.obliquity, begins=True)
 LONGITUDE = Panel(_has_orientation, timelines.longitude, begins=True)
+BRAKING = Panel(lambda dataset: bool(timelines.braked(dataset)), timelines.braking)
 LIBRATION = Panel(has("libration"), timelines.libration)
 ROLL_PITCH_YAW = Panel(_regular, timelines.roll_pitch_yaw, begins=True)
 TILT = Panel(lambda dataset: has("tilt")(dataset) or is_top(dataset), timelines.tilt, begins=True)
@@ -215,7 +216,8 @@ def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     if moving:
         return (RATES, ATTITUDE), (*moving, POLHODE)
     if not (RATES.shows(rows) or ATTITUDE.shows(rows)):  # only axes are known, as of an averaged model
-        return (OBLIQUITY, LONGITUDE) if _precesses(rows) else (WOBBLE,), (NUTATION, PATH)
+        axes = (OBLIQUITY, LONGITUDE) if _precesses(rows) else (WOBBLE,)
+        return (BRAKING, *axes), (NUTATION, PATH)
     if polhode.surfaces(rows) is not None:
         return (RATES, ATTITUDE), (POLHODE, HERPOLHODE)
     return (RATES, ATTITUDE), (POLHODE,)

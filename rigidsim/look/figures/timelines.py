@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 AXIS_COLORS = {"figure": BLUE, "spin": ORANGE, "momentum": VIOLET}
 _STILL = 1e-9  # of its size, below which what a curve does is rounding
+_VISIBLE = 0.01  # of its start, from which a change is seen on an axis from zero
 _QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is told in the axis' own unit
 _TURNS = 720.0  # degrees, from which the mean growth of an angle is taken off
 
@@ -192,6 +193,30 @@ def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
             < np.pi  # else it goes about another pole
         )
     }
+
+
+def braked(dataset: xarray.Dataset) -> dict[str, Array]:
+    """Recorded size of the angular momentum and energy that change visibly, as shares of their start."""
+    found = {}
+    for name in ("angular_momentum_norm", "energy"):
+        recorded = signals.values(dataset, name)
+        if recorded is None or not np.isfinite(recorded).all() or not recorded[0] > 0:
+            continue
+        share = recorded / recorded[0]
+        if np.abs(share - 1).max() > _VISIBLE:
+            found[name] = share
+    return found
+
+
+def braking(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Draw the size of the angular momentum and the energy as shares of their start."""
+    shares = braked(dataset)
+    words = {"angular_momentum_norm": ("angular momentum", VIOLET), "energy": ("energy", ORANGE)}
+    labels, hues = zip(*(words[name] for name in shares), strict=True)
+    lines(axes, dataset, np.stack(list(shares.values()), axis=1), labels, hues)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    key(axes, "What is left of the rotation")
+    axes.set_ylabel("share of the start")
 
 
 def libration(axes: Axes, dataset: xarray.Dataset) -> None:

@@ -137,7 +137,7 @@ def reference_plane(stage: Stage) -> None:
 
 
 def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, notes: list[str]) -> None:
-    """Put on a stage the circle that a pole describes about the normal, with its period.
+    """Put on a stage the circle that a pole describes about the normal, with its period, if it goes round there.
 
     Args:
         pole: unit vectors (rows, 3), space axes.
@@ -152,9 +152,12 @@ def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, n
     found = signals.orientation(dataset, axis)
     seconds = signals.seconds(dataset)
     if found is not None and len(seconds) > 8:
-        rate = np.polyfit(seconds - seconds[0], found[1], 1)[0]
-        span = seconds[-1] - seconds[0]
-        if abs(rate) > 0 and abs(rate) * span > 1e-9:
+        elapsed = seconds - seconds[0]
+        rate, start = np.polyfit(elapsed, found[1], 1)
+        advance = abs(rate) * elapsed[-1]
+        if float(np.abs(found[1] - start - rate * elapsed).max()) > max(advance, 1e-6):
+            return  # it strays as far as it advances: it goes about another pole
+        if advance > 1e-9:
             words += f": once in {span_text(2 * np.pi / abs(rate), 3)}"
             which = "pole" if axis == "figure" else axis
             notes.append(f"the {which}'s longitude moves by {rate:.6g} rad/s on the mean (straight line)")
