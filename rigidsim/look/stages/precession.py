@@ -137,7 +137,7 @@ def reference_plane(stage: Stage) -> None:
 
 
 def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, notes: list[str]) -> None:
-    """Put on a stage the circle that a pole describes about the normal, with its period, if it goes round there.
+    """Put on a stage the circle that a pole describes about the normal, if it does, with its period.
 
     Args:
         pole: unit vectors (rows, 3), space axes.
