@@ -184,7 +184,8 @@ def orientation(dataset: Table, axis: str) -> tuple[Array, Array] | None:
         obliquity, node = values(dataset, "obliquity"), values(dataset, "node_longitude")
         assert obliquity is not None
         assert node is not None
-        return obliquity[:, names.index(axis)], node[:, names.index(axis)]
+        found = obliquity[:, names.index(axis)], node[:, names.index(axis)]
+        return found if np.isfinite(found[0]).any() else None  # an average over a tumbling has no figure axis
     directions = pole(dataset, axis)
     if directions is None:
         return None

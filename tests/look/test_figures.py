@@ -541,3 +541,16 @@ def test_figure_axis_is_that_of_symmetry_or_of_the_largest_moment(symmetric_top:
     )
     asked = dataset.assign_attrs(config='[frame]\nfigure_axis = "y"\n')
     np.testing.assert_array_equal(signals.figure_direction(asked), [0.0, 1.0, 0.0])
+
+
+def test_an_axis_that_is_nowhere_defined_has_no_path() -> None:
+    """The figure axis of an average over a tumbling rotation."""
+    angles = [[np.nan, 1.0], [np.nan, 1.25]]
+    dataset = xarray.Dataset(
+        dict.fromkeys(("obliquity", "node_longitude"), (("time", "axis"), angles)),
+        coords={"axis": ["figure", "momentum"]},
+    )
+    assert signals.orientation(dataset, "figure") is None
+    found = signals.orientation(dataset, "momentum")
+    assert found is not None
+    assert [column.tolist() for column in found] == [[1.0, 1.25], [1.0, 1.25]]

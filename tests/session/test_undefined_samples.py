@@ -76,7 +76,7 @@ def test_a_variable_lost_on_the_way_is_warned_of(flipping: rigidsim.Run) -> None
     assert "more than 45 degrees from the figure axis" in told
     shown = Console(file=io.StringIO(), width=400)
     print_summary(flipping.outcome, "here", shown)
-    assert f"polar_motion at {outside.sum()} samples; NaN is recorded there" in shown.file.getvalue()
+    assert f"polar_motion at {outside.sum()} samples: undefined there, NaN" in shown.file.getvalue()
 
 
 def test_the_count_is_that_of_all_sessions(flipping: rigidsim.Run, tmp_path: Path) -> None:

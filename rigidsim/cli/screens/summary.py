@@ -121,7 +121,7 @@ def _print_ended(summary: Summary, on: Page) -> None:
     if summary.undefined_samples:
         counts = summary.undefined_samples.items()
         told = [f"{name} at {count:,} sample{'s' * (count > 1)}" for name, count in counts]
-        on.line("undefined", f"{', '.join(told)}; NaN is recorded there")
+        on.line("missing", f"{', '.join(told)}: undefined there, NaN is recorded")
     chaos = summary.lyapunov
     if chaos is not None:
         what = "chaotic" if chaos.chaotic else "regular"
