@@ -15,7 +15,13 @@ T = TypeVar("T")
 
 
 class Way(Protocol):
-    """Computes tiles; no bit depends on which way is used."""
+    """Computes tiles; no bit depends on which way is used.
+
+    Attributes:
+        elsewhere: whether other processes compute them.
+    """
+
+    elsewhere: bool
 
     def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
         """Get ready for a sweep's tiles, beside whatever is still to be looked at before any is computed; at
@@ -36,6 +42,8 @@ class Way(Protocol):
 
 class OneProcess:
     """Computes tiles in this process, one after the other."""
+
+    elsewhere = False
 
     def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
         """See ``Way``."""

@@ -45,6 +45,8 @@ class Workers:
         count: number of processes.
     """
 
+    elsewhere = True
+
     def __init__(self, count: int) -> None:
         self.count = count
         self._ended = ExitStack()
