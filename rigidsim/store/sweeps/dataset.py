@@ -116,16 +116,10 @@ def label_numbers(axis: Axis, known: np.ndarray | None = None) -> np.ndarray:
     Args:
         known: the same, (count, components), where they are known already.
     """
-    table = label_table(axis) if known is None else known
-    return table if axis.values.components else table[:, 0]
-
-
-def label_table(axis: Axis) -> np.ndarray:
-    """The doubles nearest to the values of an axis of numbers, (count, components), 1 to 7 us each."""
-    table = _quotients(axis)
+    table = _quotients(axis) if known is None else known
     if table is None:
         table = np.array([[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)])
-    return table
+    return table if axis.values.components else table[:, 0]
 
 
 def _quotients(axis: Axis) -> np.ndarray | None:

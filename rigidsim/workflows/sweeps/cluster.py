@@ -40,8 +40,6 @@ class Cluster:
         alone: seconds without any worker after which to give up.
     """
 
-    elsewhere = True
-
     def __init__(self, address: str, patience: float = 20.0, alone: float = 120.0) -> None:
         self._address, self._patience, self._alone = address, patience, alone
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import Future
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -22,7 +20,6 @@ from rigidsim.session.members import MemberResults, run_alone
 from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
 from rigidsim.store.memory import MemoryRun
-from rigidsim.store.sweeps.dataset import Labels, label_table
 from rigidsim.store.sweeps.sources import plain
 from rigidsim.store.sweeps.tile import Tile, TileVariable
 from rigidsim.workflows.analyse import analyse
@@ -121,26 +118,6 @@ def batches_of(config: str) -> BatchTiles:
     """The families of a config's sweep, traced once per process."""
     sweep = sweep_of(config)
     return BatchTiles(sweep, hidden_of(sweep))
-
-
-def labels_beside(sweep: Sweep) -> Labels:
-    """The doubles nearest to the values of each axis, worked out beside tiles by a thread, which holds up
-    nobody who leaves.
-    """
-    found: Future[dict[int, np.ndarray]] = Future()
-
-    def work() -> None:
-        try:
-            known = batches_of(sweep.experiment.text).axes.nearest
-            numeric = {place: axis for place, axis in enumerate(sweep.axes) if axis.numeric}
-            found.set_result(
-                {k: label_table(axis) if (t := known(k)) is None else t for k, axis in numeric.items()}
-            )
-        except BaseException as error:
-            found.set_exception(error)
-
-    threading.Thread(target=work, name="rigidsim labels", daemon=True).start()
-    return lambda place: found.result().get(place)
 
 
 def get_ready(config: str) -> None:

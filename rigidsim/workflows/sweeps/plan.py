@@ -14,8 +14,8 @@ from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import QUICK, check_sweep
 from rigidsim.workflows.sweeps.members import alone, batches_of, recording
 
-_SECONDS_OF_A_TILE, _LEAST_SECONDS = 5.0, 1.0
-_SHARE_OF_A_TILE = 64
+_SECONDS_OF_A_TILE, _LEAST_SECONDS = 5.0, 2.0
+_SHARE_OF_A_TILE = 32
 """A tile takes at most this part of a sweep (or ``_LEAST_SECONDS``): at the end of a sweep workers wait for
 whoever has the last one. A tile itself, with its file, costs about 10 ms.
 """

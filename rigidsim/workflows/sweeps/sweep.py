@@ -14,7 +14,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.overrides import apply_overrides
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import parse_toml
-from rigidsim.store.sweeps.dataset import Labels, write_dataset
+from rigidsim.store.sweeps.dataset import write_dataset
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.gathered import TileReader, gather
 from rigidsim.store.sweeps.generation import Generation
@@ -23,7 +23,7 @@ from rigidsim.store.sweeps.sources import sources_of
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.check import check_sweep
-from rigidsim.workflows.sweeps.members import batches_of, labels_beside, recording, sweep_of
+from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
 from rigidsim.workflows.sweeps.plan import tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
 from rigidsim.workflows.sweeps.ways import OneProcess, Way
@@ -167,11 +167,8 @@ def run_sweep(
         with folder.locked(shared=share is not None):
             observer.nothing_left()
             return open_sweep(folder.path)
-    labels: Labels | None = None
     with way.ready_for(wanted):
         check_sweep(wanted, every=not _known(wanted, folder), each=way.each)
-        if way.elsewhere and share is None:
-            labels = labels_beside(wanted)
         with folder.locked(shared=share is not None):
             if share is None:
                 folder.begin(force=force)
@@ -186,8 +183,7 @@ def run_sweep(
     try:
         with folder.locked():
             observer.completing()
-            spent = time.perf_counter() - began, time.process_time() - cpu
-            return _completed(wanted, folder, labels, *spent)
+            return _completed(wanted, folder, time.perf_counter() - began, time.process_time() - cpu)
     except RunFolderError:
         if share is not None and folder.at_work:  # other processes complete it
             return open_sweep(folder.path)
@@ -271,11 +267,8 @@ def _run_tiles(
     return None
 
 
-def _completed(
-    wanted: Sweep, folder: SweepFolder, labels: Labels | None, wall: float, cpu: float
-) -> SavedSweep:
+def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> SavedSweep:
     """Write dataset and summary once all tiles are there."""
-    labels = labels or batches_of(wanted.experiment.text).axes.nearest
     generations = folder.generations()
     sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
     reader = TileReader(folder, generations)
@@ -300,6 +293,7 @@ def _completed(
         "mixed_provenance": summary["mixed_provenance"] or "",
         **summary["provenance"],
     }
+    labels = batches_of(wanted.experiment.text).axes.nearest
     digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes, labels)
     summary["dataset_sha256"] = digest
     folder.write_summary(summary)

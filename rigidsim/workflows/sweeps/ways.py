@@ -15,13 +15,7 @@ T = TypeVar("T")
 
 
 class Way(Protocol):
-    """Computes tiles; no bit depends on which way is used.
-
-    Attributes:
-        elsewhere: whether other processes compute them.
-    """
-
-    elsewhere: bool
+    """Computes tiles; no bit depends on which way is used."""
 
     def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
         """Get ready for a sweep's tiles, beside whatever is still to be looked at before any is computed; at
@@ -42,8 +36,6 @@ class Way(Protocol):
 
 class OneProcess:
     """Computes tiles in this process, one after the other."""
-
-    elsewhere = False
 
     def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
         """See ``Way``."""

@@ -45,8 +45,6 @@ class Workers:
         count: number of processes.
     """
 
-    elsewhere = True
-
     def __init__(self, count: int) -> None:
         self.count = count
         self._ended = ExitStack()
