@@ -1,28 +1,19 @@
 """Where do the poles of the Moon and Mercury stand: Cassini's states found and followed by an average?
 
 Method: Kepler orbits whose node turns uniformly about the pole of the ecliptic (the Moon) or of the Laplace
-plane (Mercury). The body starts in step with its source, 1:1 and 3:2, with its pole where the theory below
-has the state; `level = "orbit_averaged"` keeps the commensurable angle. The state is the mean place of the
-pole in the frame that turns with the node (Hann window), from which the next run starts: what is left of the
-precession about it then is how well it was found. The full model runs from the same start.
+plane (Mercury). The body starts in step with its source, 1:1 and 3:2, where the theory below has the state
+(`orbit_averaged`). The state is the mean place of the pole in the frame that turns with the node (Hann
+window), from which the next run starts, and the full model at last.
 
 Held against:
 - the balance L |W| sin I = dU/dt of precession and torque with the potential averaged over the argument of
   the pericentre (Colombo 1966; Peale 1969, Astronomical Journal 74, 483), solved by bisection;
-- the linear theory of the pole's path about that balance: the torque of a body that turns uniformly, summed
-  over the mean anomaly without Hansen's coefficients, gives the Jacobian J in the node's frame and the
-  harmonics of what goes round with the argument, each of which moves the pole by (i k w - J)^-1 of itself;
-  free precession exp(J t) takes up the rest of the start. The mean of the path is within a tenth of what goes
-  round of that, and of (3 e)^2 (C - A)/C n/w of the angle for the Moon: the average keeps the bend of the
-  figure axis by a torque that is constant in the body and turns with the pericentre at the rate w, and this
-  theory doesn't. Mercury's path is within a tenth of its own size. The Moon's isn't judged (1.8): its
-  libration in longitude, which this theory leaves out, is driven at twice the pericentre's argument, 3.00 yr,
-  close to its own 2.9;
-- the full model, every rotation resolved: three times 3/2 (C - A)/C n/w of the angle, the order of what
-  averaging leaves out;
-- the Moon's 1.543 deg against the ecliptic (Williams et al. 2014), 1 %: its elements are a mean Kepler
-  orbit's, without the Sun; Mercury's obliquity of 2.04 arcmin (Margot et al. 2012), from which its C/MR^2 was
-  found, 4 %: the published uncertainty.
+- the linear theory of the path about it: the torque of a body that turns uniformly, summed over the anomaly,
+  gives the Jacobian J in the node's frame and harmonics k of the argument (rate w), each of which moves the
+  pole by (i k w - J)^-1 of itself. Tolerances: a tenth of what goes round, and for the Moon (3 e)^2 (C - A)/C
+  n/w of the angle, the bend of the figure axis; its path isn't judged, as it librates near its own period;
+- the full model: three times 3/2 (C - A)/C n/w of the angle, the order of what averaging leaves out;
+- the Moon's 1.543 deg (Williams et al. 2014), 1 %; Mercury's 2.04 arcmin (Margot et al. 2012), 4 %.
 
 Run: python -m experiments.cassini_states [--full] [--out DIR]
 """

@@ -96,23 +96,6 @@ class DrivenMechanics(AveragedMechanics):
         return as_factor(self.number(strength)) * self._excess
 
     @cached_property
-    def _axes(self) -> tuple[list[Symbolic], list[Symbolic], list[Symbolic]]:
-        """Directions of momentum, figure and spin axis: all the mean direction of the momentum."""
-        mean, sign = self.direction, self.of.figure
-        lost = [hy.expression(float("nan"))] * 3
-        return mean, [float(sign) * x for x in mean] if sign else lost, mean
-
-    @cached_property
-    def momentum_space(self) -> list[Symbolic]:
-        """Angular momentum, space axes."""
-        return [self.momentum_size * x for x in self.direction]
-
-    @cached_property
-    def momentum_body(self) -> list[Symbolic]:
-        """The same as ``momentum_space``; only its size is recorded."""
-        return self.momentum_space
-
-    @cached_property
     def rotational_energy(self) -> Symbolic:
         """Energy of the free rotation."""
         context, polhodes = self.scene.context, self.driven.polhodes

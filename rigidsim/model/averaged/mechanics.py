@@ -200,18 +200,20 @@ class AveragedMechanics(SourcesSeen):
         return nutation(hy, ellipse, self._place(source.orbit), size, s, self.number)
 
     @cached_property
+    def momentum_size(self) -> Any:
+        """Size of the angular momentum, internal units."""
+        context = self.scene.context
+        return self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
+
+    @cached_property
     def momentum_space(self) -> list[Symbolic]:
         """Angular momentum, space axes."""
-        context = self.scene.context
-        size = self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
-        return [size * x for x in self._axes[0]]
+        return [self.momentum_size * x for x in self._axes[0]]
 
     @cached_property
     def momentum_body(self) -> list[Symbolic]:
         """Angular momentum without the terms added back; only its size is recorded."""
-        context = self.scene.context
-        size = self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
-        return [size * x for x in self.direction]
+        return [self.momentum_size * x for x in self.direction]
 
     @property
     def figure_space(self) -> list[Symbolic]:

@@ -258,16 +258,6 @@ class ResonantMechanics(AveragedMechanics):
         return apply(self.slow_matrix, [x + y for x, y in zip(own, turned, strict=True)])
 
     @cached_property
-    def momentum_space(self) -> list[Symbolic]:
-        """Angular momentum, space axes."""
-        return [self.momentum_size * x for x in self.direction]
-
-    @cached_property
-    def momentum_body(self) -> list[Symbolic]:
-        """The same as ``momentum_space``; only its size is recorded."""
-        return self.momentum_space
-
-    @cached_property
     def rotational_energy(self) -> Symbolic:
         """Rotational energy m . I^-1 m / 2."""
         pairs = zip(self._inverse_moments, self.slow_momentum, strict=True)
