@@ -6,6 +6,7 @@ from decimal import Decimal
 from fractions import Fraction
 from math import sqrt
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -127,13 +128,14 @@ def test_many_draws_at_once_are_the_draws_one_by_one() -> None:
     table += 'axes."initial.quaternion" = {uniform = [["0 deg", 0, 0, 0], ["1 deg", 1, 1, 1]], count = 9}'
     vectors, times, turned = swept(table).axes
     for axis in (vectors, times):
-        assert axis.values.ratios is not None
+        assert axis.values.drawn is not None
         some = [7, 0, 3]
-        found = axis.values.ratios(some)
-        for component, (numerators, below) in enumerate(found):
-            expected = [axis.exact(index)[component].rational for index in some]
-            assert [Fraction(above, below) for above in numerators] == expected
-    assert turned.values.ratios is None  # multiples of pi aren't quotients
+        for component, drawn in enumerate(axis.values.drawn):
+            assert [drawn.value(index) for index in some] == [
+                axis.exact(index)[component].rational for index in some
+            ]
+            assert drawn.draw.many(np.array(some)).tolist() == [drawn.draw(index) for index in some]
+    assert turned.values.drawn is None  # multiples of pi aren't rational
 
 
 def test_directions_lie_on_the_sphere_and_cover_it() -> None:

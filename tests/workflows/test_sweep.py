@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import pickle
 import shutil
@@ -487,11 +488,10 @@ def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: P
         killed = 0
 
         def progressed(self, done: int) -> None:
-            children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
-            workers = [int(c) for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
+            workers = multiprocessing.active_children()
             if workers and not self.killed:
-                self.killed = workers[0]
-                os.kill(self.killed, signal.SIGKILL)
+                self.killed = workers[0].pid or 0
+                workers[0].kill()
 
     killer = Killer()
     text = CONFIG + SWEEP.replace("tile = 2", "tile = 1")
@@ -549,23 +549,25 @@ def test_workers_get_ready_before_the_check_and_end_with_a_refusal(tmp_path: Pat
             self.places.append(between)
             return Pool()
 
-    def checked(sweep: Sweep, **_: object) -> None:
-        done.append("check")
-        if "tile = 7" in sweep.experiment.text:
-            raise ConfigError(Problem("a key", "bad"))
+    class Check:
+        def __init__(self, sweep: Sweep, **_: object) -> None:
+            self.sweep = sweep
+
+        def finish(self) -> None:
+            done.append("check")
+            if "tile = 7" in self.sweep.experiment.text:
+                raise ConfigError(Problem("a key", "bad"))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rigidsim.workflows.sweeps.sweep.check_sweep", checked)
+        patch.setattr("rigidsim.workflows.sweeps.sweep.SweepCheck", Check)
         patch.setattr("rigidsim.workflows.sweeps.sweep.Workers", Noted)
         assert swept(tmp_path, workers=2).finished
         tiles = ["leave_tile"] * 3
-        begun = ["get_imported"] * min(2, os.cpu_count() or 1)
-        assert done == ["pool of 2", *begun, "get_ready", "get_ready", "check", *tiles, "shutdown"]
+        assert done == ["pool of 2", "get_ready", "get_ready", "check", *tiles, "shutdown"]
         done.clear()
         with pytest.raises(ConfigError, match="bad"):
             swept(tmp_path, CONFIG + SWEEP.replace("tile = 2", "tile = 7"), workers=9, force=True)
-        begun = ["get_imported"] * min(9, os.cpu_count() or 1)
-        assert done == ["pool of 9", *begun, *["get_ready"] * 6, "check", "shutdown"]
+        assert done == ["pool of 6", *["get_ready"] * 6, "check", "shutdown"]
         assert not any(place.exists() for place in Noted.places)
 
 
@@ -591,7 +593,7 @@ def test_what_workers_that_died_should_have_looked_at_is_looked_at_here(lasting:
         def _pool(self, *_: object) -> Pool:  # type: ignore[override]
             return Pool()
 
-    with Mortal(2) as workers:
+    with Mortal(2) as workers, workers.ready_for(sweep_of(CONFIG + SWEEP)):
         assert list(workers.each(looked, list(range(5)))) == [0, 1, 4, 9, 16]
     assert asked == list(range(lasting, 5))
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable
 from fractions import Fraction
 from statistics import NormalDist
+from typing import Protocol
+
+import numpy as np
 
 from rigidsim.scene.records import dataclass
 
@@ -20,36 +22,73 @@ precision has, so that mathematical libraries that differ in the last bit give t
 PLACES = 10**18
 """Number of equal parts into which uniform draws divide the interval from 0 to 1."""
 
-Draw = Callable[[int], int]
-"""From a value's index to the draw."""
+
+class Draw(Protocol):
+    """Draws from a distribution, whole numbers below 2^62 in size."""
+
+    def __call__(self, index: int) -> int:
+        """The draw of a value's index."""
+
+    def many(self, indices: np.ndarray) -> np.ndarray:
+        """Draws of many indices in half the time, (indices,) int64."""
 
 
-def uniform(seed: int, key: str, component: int) -> Draw:
+class Uniform:
     """Uniform draws between 0 and 1, both excluded, in units of ``1 / (2 PLACES)``."""
-    begun = hashlib.blake2b(f"{seed}\n{key}\n".encode(), digest_size=8)
 
-    def draw(index: int) -> int:
-        name = begun.copy()
-        name.update(f"{index}\n{component}".encode())
-        return 2 * (int.from_bytes(name.digest(), "big") * PLACES >> 64) + 1
+    def __init__(self, seed: int, key: str, component: int) -> None:
+        self._begun = hashlib.blake2b(f"{seed}\n{key}\n".encode(), digest_size=8)
+        self._component = component
 
-    return draw
+    def _digest(self, index: int) -> bytes:
+        name = self._begun.copy()
+        name.update(b"%d\n%d" % (index, self._component))
+        return name.digest()
+
+    def __call__(self, index: int) -> int:
+        """See ``Draw``."""
+        return 2 * (int.from_bytes(self._digest(index), "big") * PLACES >> 64) + 1
+
+    def many(self, indices: np.ndarray) -> np.ndarray:
+        """See ``Draw``."""
+        words = np.frombuffer(b"".join(map(self._digest, indices.tolist())), dtype=">u8")
+        return 2 * _high_words(words.astype(np.uint64), PLACES).astype(np.int64) + 1
+
+
+def _high_words(words: np.ndarray, factor: int) -> np.ndarray:
+    """The upper 64 bits of products of 64-bit numbers, by halves, uint64."""
+    half, mask = np.uint64(32), np.uint64(2**32 - 1)
+    above, below = np.uint64(factor >> 32), np.uint64(factor & 2**32 - 1)
+    high, low = words >> half, words & mask
+    middle, other = high * below, low * above
+    carried = (low * below >> half) + (middle & mask) + (other & mask)
+    found: np.ndarray = high * above + (middle >> half) + (other >> half) + (carried >> half)
+    return found
 
 
 _quantile = NormalDist().inv_cdf  # Wichura 1988, algorithm AS 241
 
 
-def normal(seed: int, key: str, component: int) -> Draw:
+class Normal:
     """Normal draws of mean 0 and deviation 1, in units of ``1 / DRAWN``."""
-    shares = uniform(seed, key, component)
 
-    def draw(index: int) -> int:
-        share = shares(index)
-        below = share < PLACES
-        size = round(_quantile((share if below else 2 * PLACES - share) / (2 * PLACES)) * DRAWN)
-        return size if below else -size
+    def __init__(self, seed: int, key: str, component: int) -> None:
+        self._shares = Uniform(seed, key, component)
 
-    return draw
+    def __call__(self, index: int) -> int:
+        """See ``Draw``."""
+        return _normal(self._shares(index))
+
+    def many(self, indices: np.ndarray) -> np.ndarray:
+        """See ``Draw``."""
+        return np.array(list(map(_normal, self._shares.many(indices).tolist())), dtype=np.int64)
+
+
+def _normal(share: int) -> int:
+    """The normal draw below which a uniform one's share of all lies."""
+    below = share < PLACES
+    size = round(_quantile((share if below else 2 * PLACES - share) / (2 * PLACES)) * DRAWN)
+    return size if below else -size
 
 
 @dataclass(frozen=True)
@@ -72,11 +111,6 @@ class DrawnValues:
         up, down = factor.numerator, factor.denominator
         return DrawnValues(self.draw, self.first * up, self.step * up, self.below * down)
 
-    def numerator(self, index: int) -> int:
-        """Numerator of a value."""
-        return self.first + self.step * self.draw(index)
-
-    def numerators(self, indices: Iterable[int]) -> list[int]:
-        """Numerators of many values."""
-        first, step, draw = self.first, self.step, self.draw
-        return [first + step * draw(index) for index in indices]
+    def value(self, index: int) -> Fraction:
+        """A value, exactly."""
+        return Fraction(self.first + self.step * self.draw(index), self.below)

@@ -18,6 +18,7 @@ import mpmath
 from rigidsim.scene.exact import ExactNumber, decimal_text, fraction_of, in_its_unit, with_unit
 from rigidsim.scene.sweep_table import LARGEST_AXIS, AxisTable
 from rigidsim.scene.sweeps import draws
+from rigidsim.scene.sweeps.draws import DrawnValues
 from rigidsim.scene.units import UnitError, to_si
 from rigidsim.scene.validation_messages import shown
 
@@ -85,7 +86,6 @@ def _is_number(text: str) -> bool:
 
 
 Entry = tuple[Written, ...]
-Ratios = Callable[[Sequence[int]], list[tuple[list[int], int]]]
 
 
 @dataclass(frozen=True)
@@ -97,15 +97,15 @@ class AxisValues:
         components: components of each value; 0 for plain numbers, and for values that aren't numbers.
         entry: function that gives the numbers of a value; None if values aren't numbers.
         word: function that gives the TOML text of a value that isn't a number; None for numbers.
-        ratios: function that gives many values at once, SI, for each component numerators and their common
-            denominator, in a fraction of the time; None where they aren't such quotients.
+        drawn: each component as numbers drawn at random, SI, of which many at once take a fraction of the
+            time; None where they aren't drawn, or are multiples of pi.
     """
 
     count: int
     components: int
     entry: Callable[[int], Entry] | None
     word: Callable[[int], str] | None = None
-    ratios: Ratios | None = None
+    drawn: tuple[DrawnValues, ...] | None = None
 
     def text(self, index: int) -> str:
         """A value as written in a config, which identifies it."""
@@ -265,22 +265,19 @@ def _random(way: str, given: Sequence[Any], count: int, key: str, seed: int, len
         raise ValueError("a standard deviation of zero or more is allowed")
 
     uniform = way == "uniform"
-    drawn, parts = (draws.uniform, 2 * draws.PLACES) if uniform else (draws.normal, draws.DRAWN)
+    drawn, parts = (draws.Uniform, 2 * draws.PLACES) if uniform else (draws.Normal, draws.DRAWN)
     lines = []
     for k, (a, b) in enumerate(pairs):
         step = (b[0] - a[0] if uniform else b[0]) / parts
-        lines.append((draws.DrawnValues.of(drawn(seed, key, k), a[0], step), a[1], a[2]))
+        lines.append((DrawnValues.of(drawn(seed, key, k), a[0], step), a[1], a[2]))
 
     def entry(index: int) -> Entry:
-        return tuple(
-            Written(ExactNumber(Fraction(line.numerator(index), line.below), power), unit)
-            for line, power, unit in lines
-        )
+        return tuple(Written(ExactNumber(line.value(index), power), unit) for line, power, unit in lines)
 
-    return AxisValues(count, components, entry, ratios=_ratios_of(lines))
+    return AxisValues(count, components, entry, drawn=_in_si(lines))
 
 
-def _ratios_of(lines: Sequence[tuple[draws.DrawnValues, int, str]]) -> Ratios | None:
+def _in_si(lines: Sequence[tuple[DrawnValues, int, str]]) -> tuple[DrawnValues, ...] | None:
     """See ``AxisValues``."""
     made = []
     for line, power, unit in lines:
@@ -290,18 +287,8 @@ def _ratios_of(lines: Sequence[tuple[draws.DrawnValues, int, str]]) -> Ratios | 
             return None
         if power + turns:
             return None
-        up, down = factor.numerator, factor.denominator
-        made.append(
-            (
-                draws.DrawnValues(line.draw, line.first * up, line.step * up, line.below * down),
-                line.below * down,
-            )
-        )
-
-    def ratios(indices: Sequence[int]) -> list[tuple[list[int], int]]:
-        return [(line.numerators(indices), below) for line, below in made]
-
-    return ratios
+        made.append(line.times(factor))
+    return tuple(made)
 
 
 _SUCH_AS = {"normal": "[[0, 0, 1], [0.1, 0.1, 0.1]]", "uniform": "[[0, 0, 0], [1, 1, 1]]"}
@@ -310,7 +297,7 @@ _SUCH_AS = {"normal": "[[0, 0, 1], [0.1, 0.1, 0.1]]", "uniform": "[[0, 0, 0], [1
 def _random_directions(radius: Written, key: str, seed: int, length: int) -> Callable[[int], Entry]:
     """Random points of uniform density on a sphere: normal draws scaled to its radius."""
 
-    normals = [draws.normal(seed, key, component) for component in range(length)]
+    normals = [draws.Normal(seed, key, component) for component in range(length)]
 
     def entry(index: int) -> Entry:
         whole = [draw(index) for draw in normals]

@@ -11,10 +11,10 @@ import numpy as np
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import key_steps
+from rigidsim.scene.sweeps.draws import DrawnValues
 from rigidsim.scene.sweeps.sweep import Axis, Sweep
-from rigidsim.scene.sweeps.values import Ratios
 from rigidsim.solve.batch.double_double import Doubled
-from rigidsim.solve.batch.exact_doubles import quotients_in_two_doubles
+from rigidsim.solve.batch.exact_doubles import drawn_in_two_doubles
 from rigidsim.solve.batch.replay import Distinct, Swept
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 
@@ -22,6 +22,7 @@ _HELD = 1 << 21
 """Largest count of an axis's numbers that are kept: 50 MB; those of a longer one are drawn whenever members
 are looked at.
 """
+_AT_ONCE = 4096  # values that are worked out together
 
 
 class _AxisColumn(Sequence[ExactNumber]):
@@ -37,11 +38,11 @@ class _AxisColumn(Sequence[ExactNumber]):
         return self._axis.exact(int(self._indices[index]))[self._column]
 
 
-class _Quotients:
-    """The values of an axis that are quotients of whole numbers, in two doubles, as far as they are known."""
+class _Drawn:
+    """The values of an axis that are drawn at random, in two doubles, as far as they are known."""
 
-    def __init__(self, axis: Axis, ratios: Ratios) -> None:
-        self._ratios = ratios
+    def __init__(self, axis: Axis, drawn: Sequence[DrawnValues]) -> None:
+        self._drawn = drawn
         count, columns = axis.values.count, len(axis.columns)
         self._parts = np.empty((columns, 3, count))
         self._known = np.zeros(count, dtype=bool)
@@ -51,19 +52,14 @@ class _Quotients:
         """See ``AxisNumbers``."""
         new = np.unique(which[~self._known[which]])
         if len(new):
-            for part, found in zip(self._parts, self._ratios(new.tolist()), strict=True):
-                made = quotients_in_two_doubles(*found)
+            for part, values in zip(self._parts, self._drawn, strict=True):
+                made = drawn_in_two_doubles(values, new)
                 part[:, new] = made.high, made.low, made.error
             self._known[new] = True
         return [
             Swept(Distinct(values, Doubled(*part)), which)
             for values, part in zip(self._values, self._parts, strict=True)
         ]
-
-    @property
-    def nearest(self) -> np.ndarray | None:
-        """The doubles nearest to all values, (count, columns); None if some aren't known."""
-        return self._parts[:, 0].T if self._known.all() else None
 
 
 class AxisNumbers:
@@ -72,7 +68,7 @@ class AxisNumbers:
     def __init__(self, sweep: Sweep) -> None:
         self._sweep = sweep
         self._whole: dict[int, list[Distinct]] = {}
-        self._quotients: dict[int, _Quotients] = {}
+        self._drawn: dict[int, _Drawn] = {}
         self._words: dict[int, dict[str, int]] = {}
 
     def traced(self, place: int) -> bool:
@@ -87,11 +83,9 @@ class AxisNumbers:
             which: index of the axis value that each member has, (members,).
         """
         axis = self._sweep.axes[place]
-        ratios = axis.values.ratios
-        if ratios is not None and axis.values.count * len(axis.columns) <= _HELD:
-            if place not in self._quotients:
-                self._quotients[place] = _Quotients(axis, ratios)
-            return self._quotients[place].columns(which)
+        drawn = self._drawn_of(place)
+        if drawn is not None:
+            return drawn.columns(which)
         if place not in self._whole and axis.values.count <= len(which):
             self._whole[place] = self._distinct(place, range(axis.values.count))
         if place in self._whole:
@@ -99,19 +93,46 @@ class AxisNumbers:
         needed, index = np.unique(which, return_inverse=True)
         return [Swept(distinct, index) for distinct in self._distinct(place, needed.tolist())]
 
+    def _drawn_of(self, place: int) -> _Drawn | None:
+        """The numbers of an axis that are kept because they are drawn at random; None for other axes."""
+        axis = self._sweep.axes[place]
+        drawn = axis.values.drawn
+        if drawn is None or axis.values.count * len(axis.columns) > _HELD:
+            return None
+        if place not in self._drawn:
+            self._drawn[place] = _Drawn(axis, drawn)
+        return self._drawn[place]
+
+    def look_at(self, members: np.ndarray) -> None:
+        """Work out numbers of members that take their time, for whatever needs them later."""
+        for place, which in enumerate(_rows(self._sweep, members)):
+            drawn = self._drawn_of(place)
+            if drawn is not None:
+                drawn.columns(which)
+
     def _distinct(self, place: int, indices: Sequence[int]) -> list[Distinct]:
         axis = self._sweep.axes[place]
         columns = range(len(axis.columns))
-        if axis.values.ratios is not None:
-            found = [quotients_in_two_doubles(*ratio) for ratio in axis.values.ratios(indices)]
+        if axis.values.drawn is not None:
+            which = np.asarray(indices, dtype=np.int64)
+            found = [drawn_in_two_doubles(values, which) for values in axis.values.drawn]
             return [Distinct(_AxisColumn(axis, n, indices), found[n]) for n in columns]
         entries = [axis.exact(index) for index in indices]
         return [Distinct([entry[n] for entry in entries]) for n in columns]
 
     def nearest(self, place: int) -> np.ndarray | None:
-        """The doubles nearest to all values of an axis, (values, components), if they are known already."""
-        held = self._quotients.get(place)
-        return None if held is None else held.nearest
+        """The doubles nearest to all values of an axis, (values, components); None if they aren't drawn at
+        random.
+        """
+        values = self._sweep.axes[place].values
+        if values.drawn is None:
+            return None
+        table = np.empty((values.count, len(values.drawn)))
+        for first in range(0, values.count, _AT_ONCE):
+            which = np.arange(first, min(first + _AT_ONCE, values.count))
+            for column, swept in enumerate(self.columns(place, which)):
+                table[which, column] = swept.nearest
+        return table
 
     def codes(self, place: int, which: np.ndarray) -> np.ndarray:
         """Codes below the axis's length, equal for members whose axis values have the same text."""
@@ -120,6 +141,11 @@ class AxisNumbers:
         needed, index = np.unique(which, return_inverse=True)
         found = [known.setdefault(text(i), len(known)) for i in needed.tolist()]
         return np.array(found, dtype=np.int64)[index]
+
+
+def _rows(sweep: Sweep, members: np.ndarray) -> Sequence[np.ndarray]:
+    """The index of the value that each member has, for each axis."""
+    return np.unravel_index(members, sweep.shape) if sweep.product else (members,) * len(sweep.axes)
 
 
 @dataclass(frozen=True)
@@ -153,11 +179,10 @@ class Members:
         """
         chosen = np.arange(sweep.count) if members is None else np.asarray(members, dtype=np.int64)
         axes = AxisNumbers(sweep) if axes is None else axes
-        rows = np.unravel_index(chosen, sweep.shape) if sweep.product else (chosen,) * len(sweep.axes)
         keys: list[str] = []
         numbers: list[Swept] = []
         kinds: np.ndarray | None = None
-        for place, (axis, which) in enumerate(zip(sweep.axes, rows, strict=True)):
+        for place, (axis, which) in enumerate(zip(sweep.axes, _rows(sweep, chosen), strict=True)):
             if axes.traced(place):
                 keys += axis.columns
                 numbers += axes.columns(place, which)

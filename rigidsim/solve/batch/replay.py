@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.sweeps.values import nearest_double
 from rigidsim.scene.tracing.graph import Graph, Guard
 from rigidsim.solve.batch import double_double as dd
 from rigidsim.solve.batch.double_double import Doubled
@@ -65,6 +66,17 @@ class Swept:
     def of(self, member: int) -> ExactNumber:
         """The number of one member."""
         return self.distinct.values[self.index[member]]
+
+    @property
+    def nearest(self) -> np.ndarray:
+        """The doubles nearest to the numbers, (members,)."""
+        found = self.distinct.doubled
+        parts = Doubled(found.high[self.index], found.low[self.index], found.error[self.index])
+        with np.errstate(all="ignore"):
+            high, certain = dd.nearest_double(parts)
+        for member in np.flatnonzero(~certain).tolist():
+            high[member] = nearest_double(self.of(member))
+        return high
 
 
 class Replay:

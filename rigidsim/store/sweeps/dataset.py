@@ -116,21 +116,10 @@ def label_numbers(axis: Axis, known: np.ndarray | None = None) -> np.ndarray:
     Args:
         known: the same, (count, components), where they are known already.
     """
-    table = _quotients(axis) if known is None else known
+    table = known
     if table is None:
         table = np.array([[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)])
     return table if axis.values.components else table[:, 0]
-
-
-def _quotients(axis: Axis) -> np.ndarray | None:
-    """The same where they are quotients of whole numbers, in a third of the time; None elsewhere."""
-    if axis.values.ratios is None:
-        return None
-    found = axis.values.ratios(range(axis.values.count))
-    try:
-        return np.array([[above / below for above in numerators] for numerators, below in found]).T
-    except OverflowError:
-        return None
 
 
 def _bare(text: str) -> str:

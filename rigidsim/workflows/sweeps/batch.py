@@ -123,20 +123,21 @@ class BatchTiles:
         done.left.sort()
         return done
 
-    def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], bool]:
+    def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], int]:
         """Members that no run accepts; nothing is integrated.
 
         Args:
             most: number after which the search stops.
 
         Returns:
-            What is wrong with each, and whether any member shares its equations with others; nothing is
-            known about members that don't.
+            What is wrong with each, and how many members share their equations with others and can be run;
+            nothing is known about the rest.
         """
         families = Families(Members.of(self._sweep, members, self.axes), most)
         families.known = self._known
         found = families.sort()
-        return {int(members[place]): error for place, error in found.refused.items()}, bool(found.groups)
+        accepted = sum(len(numbers.members) for _, numbers in found.groups)
+        return {int(members[place]): error for place, error in found.refused.items()}, accepted
 
     def _run_of(self, family: Family, member: int) -> tuple[BatchRun, list[Variable]]:
         if id(family) not in self._runs:

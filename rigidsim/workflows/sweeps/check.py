@@ -17,16 +17,18 @@ from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.members import batches_of
 
 _ALL = 200
-"""Up to this many members are all worked out. Of more, each value of each axis is tried once, plus the
-corners, and all members by their numbers alone if these decide.
+"""Up to this many members are all worked out. Of more, all are looked at by their numbers alone if these
+decide, and some are worked out: the corners and values of each axis, ``_OF_AN_AXIS`` of them, or ``_FEW``
+where the numbers of each member were accepted.
 """
 _OF_AN_AXIS = 400
+_FEW = 25
 _MOST_CORNERS = 64
 _MOST_TOLD = 10
 _AT_ONCE = 4096
 QUICK = 1_000_000
 """Up to this many members are all checked for a plan; a sweep checks all."""
-Share = tuple[list[int], bool]
+Share = tuple[list[int], int]
 Each = Callable[[Callable[[tuple[str, int, int]], Share], list[tuple[str, int, int]]], Iterable[Share]]
 
 
@@ -34,34 +36,87 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
     """Refuse a sweep with a member that can't be run; returns the first member, prepared.
 
     Args:
-        every: check each member's numbers even if there are more than ``_ALL``: 20 s per million members.
+        every: check each member's numbers even if there are more than ``_ALL``: 15 s per million members.
         each: like ``map``; may have others look at shares of the members meanwhile.
 
     Raises:
         ConfigError: names members and keys.
     """
-    _refuse_names(sweep)
-    _refuse_what_none_has(sweep)
-    try:
-        first = prepare(sweep.worked_out(0))
-        refuse_taken_names(first)
-    except ConfigError as error:
-        raise sweep.blamed(0, error) from None
-    shares = _of_families(sweep, each) if every and sweep.count > _ALL else []
-    problems: list[Problem] = []
-    for member in _tried(sweep):
+    check = SweepCheck(sweep, every=every, each=each)
+    check.finish()
+    return check.first
+
+
+class SweepCheck:
+    """A check that others may have a part in: it begins at once, and ``finish`` tells what was found.
+
+    Args:
+        every, each: see ``check_sweep``.
+
+    Attributes:
+        first: the first member, prepared.
+
+    Raises:
+        ConfigError: the first member can't be run, or nothing can that all members share.
+    """
+
+    def __init__(self, sweep: Sweep, *, every: bool, each: Each) -> None:
+        _refuse_names(sweep)
+        _refuse_what_none_has(sweep)
+        self._sweep = sweep
         try:
-            experiment = sweep.worked_out(member)
-            check_start(build_scene(experiment))
+            self.first = prepare(sweep.worked_out(0))
+            refuse_taken_names(self.first)
         except ConfigError as error:
-            problems += sweep.blamed(member, error).problems
-            if len(problems) >= _MOST_TOLD:
-                break
-    if not problems:
-        problems = _found(sweep, shares)
-    if problems:
-        raise ConfigError(problems, sweep.experiment.source)
-    return first
+            raise sweep.blamed(0, error) from None
+        self._shares = _of_families(sweep, each) if every and sweep.count > _ALL else []
+
+    def finish(self) -> None:
+        """Look at members that are worked out in full, and wait for the shares of others.
+
+        Raises:
+            ConfigError: names members and keys.
+        """
+        sweep = self._sweep
+        problems = self._worked_out(_FEW)
+        if not problems:
+            shares = list(_as_far_as_told(self._shares))
+            if sweep.count > _ALL and sum(accepted for _, accepted in shares) < sweep.count:
+                problems = self._worked_out(_OF_AN_AXIS)
+            problems = problems or self._found(shares)
+        if problems:
+            raise ConfigError(problems, sweep.experiment.source)
+
+    def _worked_out(self, most: int) -> list[Problem]:
+        """Problems of members that are worked out in full, see ``_tried``."""
+        problems: list[Problem] = []
+        for member in _tried(self._sweep, most):
+            try:
+                experiment = self._sweep.worked_out(member)
+                check_start(build_scene(experiment))
+            except ConfigError as error:
+                problems += self._sweep.blamed(member, error).problems
+                if len(problems) >= _MOST_TOLD:
+                    break
+        return problems
+
+    def _found(self, shares: Iterable[Share]) -> list[Problem]:
+        """Problems of the first share that has any."""
+        sweep = self._sweep
+        for refused, _ in shares:
+            if refused:
+                errors, _ = batches_of(sweep.experiment.text).refused(refused)
+                told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
+                return [problem for error in told for problem in error.problems]
+        return []
+
+
+def _as_far_as_told(shares: Iterable[Share]) -> Iterator[Share]:
+    """Shares up to the first that is refused, or that tells nothing."""
+    for refused, accepted in shares:
+        yield refused, accepted
+        if refused or not accepted:
+            return
 
 
 def _of_families(sweep: Sweep, each: Each) -> Iterable[Share]:
@@ -73,36 +128,28 @@ def _of_families(sweep: Sweep, each: Each) -> Iterable[Share]:
 
 
 def refused_of(share: tuple[str, int, int]) -> Share:
-    """Members of a share of a sweep that no run accepts, at most ``_MOST_TOLD``, and whether any member of it
-    shares its equations with others.
+    """Members of a share of a sweep that no run accepts, at most ``_MOST_TOLD``, and how many can be run and
+    share their equations with others.
 
     Args:
         share: the sweep's config, the first member, and the one after the last.
     """
     config, begin, end = share
-    refused, shared = batches_of(config).refused(range(begin, end), _MOST_TOLD)
-    return sorted(refused)[:_MOST_TOLD], shared
+    refused, accepted = batches_of(config).refused(range(begin, end), _MOST_TOLD)
+    return sorted(refused)[:_MOST_TOLD], accepted
 
 
-def _found(sweep: Sweep, shares: Iterable[Share]) -> list[Problem]:
-    """Problems of the first share that has any."""
-    for refused, shared in shares:
-        if refused:
-            errors, _ = batches_of(sweep.experiment.text).refused(refused)
-            told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
-            return [problem for error in told for problem in error.problems]
-        if not shared:
-            break
-    return []
+def _tried(sweep: Sweep, most: int) -> Iterator[int]:
+    """Members that are worked out in full before anything runs.
 
-
-def _tried(sweep: Sweep) -> Iterator[int]:
-    """Members that are worked out in full before anything runs."""
+    Args:
+        most: number of values of an axis that are tried of many.
+    """
     if sweep.count <= _ALL:
         yield from range(1, sweep.count)
         return
     if not sweep.product:
-        step = max(1, sweep.count // _OF_AN_AXIS)
+        step = max(1, sweep.count // most)
         yield from range(step, sweep.count, step)
         yield sweep.count - 1
         return
@@ -112,7 +159,7 @@ def _tried(sweep: Sweep) -> Iterator[int]:
         strides.insert(0, stride)
         stride *= size
     for size, stride in zip(sweep.shape, strides, strict=True):
-        step = max(1, size // _OF_AN_AXIS)
+        step = max(1, size // most)
         yield from (index * stride for index in range(step, size, step))
     ends = [(0, (size - 1) * stride) for size, stride in zip(sweep.shape, strides, strict=True)]
     yield from (sum(corner) for corner in itertools.islice(itertools.product(*ends), 1, _MOST_CORNERS))

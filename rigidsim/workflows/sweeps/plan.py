@@ -54,8 +54,8 @@ def _side_by_side(sweep: Sweep) -> bool:
     if why_alone(sweep, sweep.table.keep):
         return False
     some = range(0, sweep.count, -(-sweep.count // _TRIED))
-    _, shared = batches_of(sweep.experiment.text).refused(some)
-    return shared
+    _, accepted = batches_of(sweep.experiment.text).refused(some)
+    return accepted > 0
 
 
 def _length(sweep: Sweep, seconds: float, size: float) -> int:

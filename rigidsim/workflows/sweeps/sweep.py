@@ -22,7 +22,7 @@ from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.sweeps.sources import sources_of
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
-from rigidsim.workflows.sweeps.check import check_sweep
+from rigidsim.workflows.sweeps.check import SweepCheck
 from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
 from rigidsim.workflows.sweeps.plan import tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
@@ -168,12 +168,15 @@ def run_sweep(
             observer.nothing_left()
             return open_sweep(folder.path)
     with way.ready_for(wanted):
-        check_sweep(wanted, every=not _known(wanted, folder), each=way.each)
+        known = _known(wanted, folder)
+        check = SweepCheck(wanted, every=not known, each=way.each)
+        length = None if known else tile_length(wanted)
+        check.finish()
         with folder.locked(shared=share is not None):
             if share is None:
                 folder.begin(force=force)
             _refuse_other(wanted, folder)
-            generation = _generation(wanted, folder, exclusive=share is not None)
+            generation = _generation(wanted, folder, length, exclusive=share is not None)
             interrupted = _run_tiles(folder, generation, way, share, observer)
             all_there = bool(folder.present(generation).all())
     if interrupted is not None:
@@ -230,15 +233,19 @@ def identity(sweep: Sweep) -> str:
     return json.dumps([keys, tables, *(["alone"] if alone else [])], sort_keys=True, default=str)
 
 
-def _generation(wanted: Sweep, folder: SweepFolder, *, exclusive: bool) -> Generation:
-    """The generation to work on: the latest if it is of this config, otherwise a new one."""
+def _generation(wanted: Sweep, folder: SweepFolder, length: int | None, *, exclusive: bool) -> Generation:
+    """The generation to work on: the latest if it is of this config, otherwise a new one.
+
+    Args:
+        length: members of a tile of a new one, if known already.
+    """
     generations = folder.generations()
     if generations and generations[-1].config_sha256 == wanted.experiment.sha256:
         return generations[-1]
     sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
     works = sources.works()
     number = generations[-1].number + 1 if generations else 0
-    made = Generation(number, wanted.experiment.text, tile_length(wanted), works)
+    made = Generation(number, wanted.experiment.text, length or tile_length(wanted), works)
     return folder.add(made, exclusive=exclusive)
 
 
@@ -257,10 +264,13 @@ def _run_tiles(
     members = sum(len(generation.members_of(tile)) for tile in ours) if share else generation.members
     done = members - sum(len(generation.members_of(tile)) for tile in missing)
     observer.started(folder.path, members, done)
+    axes = batches_of(generation.config).axes
     try:
         for tile, image in way.images(generation, missing):
             folder.save(generation, tile, image)
-            done += len(generation.members_of(tile))
+            these = generation.members_of(tile)
+            axes.look_at(these)  # for the dataset, beside whoever computes the next tile
+            done += len(these)
             observer.progressed(done)
     except KeyboardInterrupt as interruption:
         return interruption

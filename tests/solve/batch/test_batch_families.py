@@ -1,6 +1,7 @@
 """Families: whoever shares a system has exactly the numbers of its own build; others are told apart."""
 
 import re
+from decimal import Decimal
 from fractions import Fraction
 
 import heyoka as hy
@@ -12,12 +13,16 @@ from support import config
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import parse
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.exact import ExactNumber, decimal_text
+from rigidsim.scene.sweep_table import AxisTable
 from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweeps.values import axis_values
 from rigidsim.scene.tracing.numbers import Traced
 from rigidsim.scene.tracing.whole import TracedWhole
+from rigidsim.solve.batch.double_double import nearest_double
+from rigidsim.solve.batch.exact_doubles import drawn_in_two_doubles
 from rigidsim.solve.batch.family import Alone, Families, batchable
-from rigidsim.solve.batch.members import Members
+from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.solve.batch.replay import Distinct
 from rigidsim.solve.problem import prepare
 
@@ -55,6 +60,8 @@ TORQUE = config(
     output='record = ["angular_velocity", "quaternion"]',
     more='[parameters]\nk = 0.1\n[[events]]\nname = "flip"\nexpression = "wx - k/3"',
 )
+
+COUNT = 500
 
 
 def swept(text: str, axes: dict[str, str], mode: str = "zip") -> Sweep:
@@ -274,3 +281,42 @@ def test_a_swept_number_in_two_doubles_is_within_its_bound(text: str, exact: boo
     assert abs(value - high - low) <= error
     assert error <= abs(value) * Fraction(1, 2**105) + Fraction(5e-324)
     assert (error == 0) == exact
+
+
+@given(
+    way=st.sampled_from(["uniform", "normal"]),
+    ends=st.tuples(*[st.decimals(allow_nan=False, allow_infinity=False, places=7)] * 2),
+    power=st.integers(-320, 290),
+    seed=st.integers(0, 99),
+)
+@settings(max_examples=60, deadline=None)
+def test_numbers_drawn_together_are_within_their_bounds_and_rounded_right(
+    way: str, ends: tuple[Decimal, Decimal], power: int, seed: int
+) -> None:
+    low, high = (Fraction(end) / 10**9 * Fraction(10) ** power for end in sorted(ends))
+    given = [decimal_text(low), decimal_text(high if way == "uniform" else high - low)]
+    count = 5
+    table = AxisTable.model_validate({way: given, "count": count})
+    values = axis_values(table, "body.mass", seed, 0)
+    assert values.drawn is not None
+    found = drawn_in_two_doubles(values.drawn[0], np.arange(count))
+    nearest, sure = nearest_double(found)
+    for index in range(count):
+        exact = values.drawn[0].value(index)
+        if not np.isfinite([found.high[index], found.low[index], found.error[index]]).all():
+            assert not sure[index]
+            continue
+        parts = (Fraction(float(part[index])) for part in (found.high, found.low, found.error))
+        first, second, error = parts
+        assert abs(exact - first - second) <= error
+        assert not sure[index] or nearest[index] == float(exact)
+
+
+def test_labels_are_the_doubles_nearest_to_drawn_values() -> None:
+    rates = f"uniform = [[-1, 0, 0], [1, 1e-3, 0]], count = {COUNT}"
+    sweep = swept(FREE, {"initial.angular_velocity": rates, "time.end": f"normal = [9, 1], count = {COUNT}"})
+    numbers = AxisNumbers(sweep)
+    numbers.look_at(np.arange(0, COUNT, 3))
+    for place, axis in enumerate(sweep.axes):
+        exact = [[float(x.rational) for x in axis.exact(index)] for index in range(COUNT)]
+        assert np.array_equal(numbers.nearest(place), exact)
