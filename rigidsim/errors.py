@@ -56,7 +56,17 @@ class Problem:
 
 
 def _visible(text: str) -> str:
-    """The text with control characters escaped, so that a terminal shows them instead of obeying."""
+    """The text with control characters escaped, so that a terminal shows them instead of obeying; the marks
+    of ``either`` stay.
+    """
+    shown, begin = "", 0
+    for match in _EITHER.finditer(text):
+        shown += _escaped(text[begin : match.start()]) + either(_escaped(match[1]), _escaped(match[2]))
+        begin = match.end()
+    return shown + _escaped(text[begin:])
+
+
+def _escaped(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
 
 

@@ -131,11 +131,20 @@ def _assign(table: dict[str, Any], key: str, value: Any, where: str) -> None:
         elif isinstance(target, list) and isinstance(step, int) and 0 <= step < len(target):
             target = target[step]
         else:
-            raise ConfigError(Problem(where, f'there is nothing at "{step}" to set'))
+            raise ConfigError(Problem(where, _nothing(target, step)))
     last = steps[-1]
     try:
         if isinstance(target, list) == isinstance(last, str):
             raise TypeError
         target[last] = value
     except (TypeError, IndexError):
-        raise ConfigError(Problem(where, f'there is nothing at "{last}" to set')) from None
+        raise ConfigError(Problem(where, _nothing(target, last))) from None
+
+
+def _nothing(target: Any, step: str | int) -> str:
+    """What to say of a place that doesn't exist."""
+    there = ""
+    if isinstance(target, list) and isinstance(step, int):
+        entries = f"entries 0 to {len(target) - 1}" if target else "no entries"
+        there = f"; the array there has {entries}"
+    return f'there is nothing at "{step}" to set{there}'

@@ -26,6 +26,7 @@ RANDOM = ("normal", "uniform", "sphere")
 WAYS = ("linspace", "logspace", "step", "values", *RANDOM)
 """Ways to give an axis's values."""
 LARGEST_AXIS = 10_000_000
+LARGEST_TILE = 100_000_000
 
 
 class AxisTable(ConfigTable):
@@ -117,6 +118,7 @@ class SweepTable(ConfigTable):
     tile: StrictInt | None = Field(
         default=None,
         ge=1,
+        le=LARGEST_TILE,
         description="number of members computed and saved together; by default some seconds of work",
     )
     batch: StrictBool = Field(

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Collection, Iterable, Mapping
 from decimal import Decimal
 from itertools import islice
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -95,8 +95,9 @@ def key_path(location: Iterable[str | int]) -> str:
 
 
 def _key(key: str) -> str:
-    """A key as it is, or quoted and shortened if it is empty, long or invisible."""
-    return key if 0 < len(key) <= 60 and key.isprintable() and key.strip() else shown(key)
+    """A key as it is, or quoted if it contains points, and shortened if it is empty, long or invisible."""
+    plain = 0 < len(key) <= 60 and key.isprintable() and key.strip() and "." not in key
+    return key if plain else shown(key)
 
 
 def _value_at(table: Any, path: tuple[str, ...]) -> Any:
@@ -111,15 +112,19 @@ def _model_at(
     model: type[BaseModel], location: tuple[str | int, ...], alternatives: Collection[str]
 ) -> type[BaseModel] | None:
     """The table that holds the last key of ``location``; alternatives are told apart by their ``kind``."""
-    candidates = [model]
+    candidates, named = [model], False
     for key in location[:-1]:
         if isinstance(key, int):
             continue
         if key in alternatives:
             candidates = [m for m in candidates if key in _kinds(m)] or candidates
             continue
+        if named:  # a key that the user chose: of an axis, say
+            named = False
+            continue
         fields = [m.model_fields[key] for m in candidates if key in m.model_fields]
         candidates = [m for field in fields for m in _models(field.annotation)]
+        named = any(get_origin(field.annotation) is dict for field in fields)
     return candidates[0] if candidates else None
 
 
@@ -149,8 +154,10 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         names = [part.strip() for part in allowed.split(",")]
         near = nearest(given if isinstance(given, str) else shown(given), names)
         return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
-    if kind == "too_short":  # arrays of fixed length report theirs themselves
-        return "given an empty array; at least one entry is needed"
+    if kind in ("too_short", "too_long"):
+        if not given:
+            return "given an empty array; at least one entry is needed"
+        return f"given {shown(given)}; an array{_of_how_many(table, location)} is allowed"
     if kind == "kind_of_value":
         return f"given {shown(given)}; {error['msg']}"
     if kind in ("list_type", "model_type", "model_attributes_type"):
@@ -164,6 +171,8 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         return f"given {shown(given)}; true or false is allowed"
     if kind == "greater_than_equal":
         return f"given {shown(given)}; at least {context['ge']} is allowed"
+    if kind == "less_than_equal":
+        return f"given {shown(given)}; at most {context['le']:g} is allowed"
     return str(error["msg"])
 
 

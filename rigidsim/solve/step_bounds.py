@@ -58,7 +58,7 @@ def bounds_of_sparse_series(sizes: np.ndarray) -> np.ndarray:
         sizes: size of the largest coefficient of each term, (order + 1, members).
     """
     order, bounds = len(sizes) - 1, np.full(sizes.shape[1], np.inf)
-    if order < 3:
+    if order < 5:  # no terms to compare the last two with
         return bounds
     with np.errstate(divide="ignore", invalid="ignore"):
         term = np.arange(order // 2 + 1, order + 1)[:, None]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
 from rigidsim.scene.editor_schema import python_schema
-from rigidsim.scene.overrides import key_steps
+from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.validation_messages import nearest
 
@@ -43,6 +44,38 @@ def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
         nodes = found
         value = _inside(value, step)
     return _unit(nodes, schema), _length(nodes, schema)
+
+
+def refuse_unsettable(key: str, tables: dict[str, Any]) -> None:
+    """Refuse a key that a config has no place for, or whose value changes nothing.
+
+    Args:
+        tables: tables of the config; the key is set there.
+
+    Raises:
+        ValueError, ConfigError: says what there is instead.
+    """
+    steps = key_steps(key, "axes")
+    if steps[0] == "parameters" and len(steps) == 2:
+        name, known = str(steps[1]), list(tables.get("parameters", {}))
+        word = re.compile(rf"\b{re.escape(name)}\b")
+        if name not in known and not any(word.search(text) for text in _texts(tables)):
+            there = f"allowed: {', '.join(known)}" if known else "[parameters] has none"
+            raise ValueError(f'no expression uses the parameter "{name}"{nearest(name, known)}; {there}')
+    apply_overrides(tables, [f"{key}=0"], "axes")
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All texts in a config that may be expressions."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, list):
+        for entry in value:
+            yield from _texts(entry)
+    elif isinstance(value, Mapping):
+        for key, entry in value.items():
+            if key not in ("name", "description", "sweep", "parameters"):
+                yield from _texts(entry)
 
 
 def _refuse_unknown(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
@@ -15,13 +14,12 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
 from rigidsim.scene.sweep_table import SweepTable
-from rigidsim.scene.sweeps.keys import unit_and_length
+from rigidsim.scene.sweeps.keys import refuse_unsettable, unit_and_length
+from rigidsim.scene.sweeps.names import axis_name, clashes
 from rigidsim.scene.sweeps.values import AxisValues, axis_values, nearest_double
 from rigidsim.scene.toml_text import parse_toml
-from rigidsim.scene.validation_messages import shown
 
 MOST_MEMBERS = 100_000_000
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")
 _SAME_FOR_ALL = {
     "name": "the sweep has one name",
     "description": "the sweep has one description",
@@ -98,14 +96,11 @@ class Sweep:
             where = f'[sweep] axes."{key[:60]}"'
             try:
                 plain = _plain_key(key)
-                unit, length = unit_and_length(plain, parse_toml(experiment.text, experiment.source))
+                tables = parse_toml(experiment.text, experiment.source)
+                unit, length = unit_and_length(plain, tables)
+                refuse_unsettable(plain, tables)
                 values = axis_values(given, plain, table.seed, length)
-                name = _default_name(plain) if given.name is None else given.name
-                if not _NAME.fullmatch(name):
-                    raise ValueError(
-                        f"given the name {shown(name)}; allowed: letters, digits and underscores, beginning "
-                        "with a letter"
-                    )
+                name = axis_name(plain, given.name)
                 axes.append(Axis(plain, name, unit, values))
                 if axes[-1].numeric:  # its unit, where it has one, is known
                     axes[-1].exact(0)
@@ -113,7 +108,8 @@ class Sweep:
                 problems.append(Problem(where, str(error)))
             except ConfigError as error:
                 problems += [Problem(where, problem.what) for problem in error.problems]
-        problems += _clashes(axes)
+        events = [event.name for event in experiment.config.events]
+        problems += clashes(axes, events, product=table.mode == "product")
         if not problems:
             problems += _counts(table, axes)
         if problems:
@@ -262,31 +258,6 @@ def _plain_key(key: str) -> str:
     if first in _SAME_FOR_ALL:
         raise ValueError(f"can't be swept: {_SAME_FOR_ALL[first]}")
     return ".".join(part.strip() for part in key.split("."))
-
-
-def _default_name(key: str) -> str:
-    return re.sub(r"\[(\d+)\]", r"_\1", key.rpartition(".")[2]).strip("\"'")
-
-
-def _clashes(axes: Sequence[Axis]) -> list[Problem]:
-    """Names given twice, and keys that contain one another."""
-    problems: list[Problem] = []
-    names: dict[str, str] = {}
-    keys: dict[str, tuple[str | int, ...]] = {}
-    for axis in axes:
-        where = f'[sweep] axes."{axis.key}"'
-        if axis.name in names:
-            what = f'is named "{axis.name}" like axes."{names[axis.name]}"; give one of them another name'
-            problems.append(Problem(where, what))
-        names[axis.name] = axis.key
-        steps = tuple(key_steps(axis.key, "axes"))
-        for other, others in keys.items():
-            shorter = min(len(steps), len(others))
-            if steps[:shorter] == others[:shorter]:
-                what = f'sets what axes."{other}" sets, too; sweep one of them'
-                problems.append(Problem(where, what))
-        keys[axis.key] = steps
-    return problems
 
 
 def _counts(table: SweepTable, axes: Sequence[Axis]) -> list[Problem]:

@@ -211,7 +211,7 @@ def _listed(given: Sequence[Any]) -> AxisValues:
         numbers = [(Written.of(value),) for value in given]
         return AxisValues(len(given), 0, numbers.__getitem__)
     except ValueError:
-        if all(isinstance(value, int | float) or hasattr(value, "is_finite") for value in given):
+        if not any(isinstance(value, bool | str | list | dict) for value in given):
             raise  # for instance nan, which no key takes
         words = [inline_text(value) for value in given]
         return AxisValues(len(given), 0, None, words.__getitem__)

@@ -61,6 +61,15 @@ class SweepFolder(WorkFolder):
         found = [(path, _GENERATION.fullmatch(path.name)) for path in sorted(self.tiles.iterdir())]
         return [Generation.read(path, int(match[1])) for path, match in found if match]
 
+    def finished_config(self) -> list[str]:
+        """The config of a finished sweep whose tiles may be gone, as far as it is there; empty if none is."""
+        if not self.dataset.exists():
+            return []
+        try:
+            return [self.config.read_text(encoding="utf-8")]
+        except (OSError, ValueError):
+            return [""]  # that of no sweep
+
     def add(self, generation: Generation, *, exclusive: bool = False) -> Generation:
         """Write a generation, whose tiles may then be computed.
 
@@ -108,10 +117,13 @@ class SweepFolder(WorkFolder):
             RunFolderError: the tile is damaged, or isn't the one that belongs there.
         """
         path = self.tile(generation, tile)
-        found = read_tile(path, generation.config_sha256)
+        again = f"remove it, and {RESUME} computes it again"
+        try:
+            found = read_tile(path, generation.config_sha256)
+        except RunFolderError as error:
+            raise RunFolderError(f"{error}; {again}") from None
         if not np.array_equal(found.members, generation.members_of(tile)):
-            raise RunFolderError(f"{path}: holds other members than belong there; remove it, and {RESUME} "
-                                 "computes it again")  # fmt: skip
+            raise RunFolderError(f"{path}: holds other members than belong there; {again}")
         return found
 
     def save(self, generation: Generation, tile: int, image: bytes) -> None:

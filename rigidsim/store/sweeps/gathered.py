@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.records import dataclass
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation
@@ -56,6 +56,11 @@ class TileReader:
         self._generations = {generation.number: generation for generation in generations}
         self._held: OrderedDict[tuple[int, int], Tile] = OrderedDict()
 
+    @property
+    def place(self) -> str:
+        """Path of the sweep's folder."""
+        return str(self._folder.path)
+
     def tile(self, generation: int, tile: int) -> Tile:
         """A tile, checked when it is read.
 
@@ -77,14 +82,16 @@ def gather(sources: Sources, reader: TileReader) -> Gathered:
     """Read once every tile that is used.
 
     Raises:
-        RunFolderError: a tile is damaged, or two describe a variable differently.
+        RunFolderError: a tile is gone or damaged, or two describe a variable differently.
     """
     found = Gathered()
-    wanted = {plain(item) for item in sources.found}
+    if len(sources.missing):
+        gone = len(sources.missing)
+        raise RunFolderError(f"{reader.place}: tiles of {gone:,} members are gone; {RESUME} computes them")
     common: np.ndarray | None = None
     alike = True
     always = sources.found[ALWAYS]
-    for generation, number in _tiles(sources):
+    for (generation, number), wanted in _tiles(sources).items():
         tile = reader.tile(generation, number)
         found.made.append(tile.made)
         for name, variable in tile.variables.items():
@@ -99,7 +106,7 @@ def gather(sources: Sources, reader: TileReader) -> Gathered:
                 raise RunFolderError(f"tiles {generation} and {number} disagree about {name}")
             else:
                 known.extra = tuple(map(max, known.extra, values.shape[1:]))
-        if "time" in tile.arrays and alike:
+        if "time" in tile.arrays and "series" in wanted and alike:
             common, alike = _common(common, tile.arrays["time"])
         if tile.reasons:
             mine = (always.generation == generation) & (always.tile == number)
@@ -122,11 +129,12 @@ def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | No
     return known, bool(agree.all()) and np.array_equal(known[: len(longest)], longest)
 
 
-def _tiles(sources: Sources) -> list[tuple[int, int]]:
-    """All tiles in which something is found."""
-    found: set[tuple[int, int]] = set()
-    for source in sources.found.values():
+def _tiles(sources: Sources) -> dict[tuple[int, int], set[str]]:
+    """All tiles in which something is found, with the items found there, in order."""
+    found: dict[tuple[int, int], set[str]] = {}
+    for item, source in sources.found.items():
         there = ~source.missing
         keys = source.generation[there].astype(np.int64) << 32 | source.tile[there]
-        found |= {(int(key) >> 32, int(key) & 0xFFFFFFFF) for key in np.unique(keys)}
-    return sorted(found)
+        for key in np.unique(keys).tolist():
+            found.setdefault((key >> 32, key & 0xFFFFFFFF), set()).add(plain(item))
+    return dict(sorted(found.items()))

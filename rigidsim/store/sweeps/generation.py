@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import FORCE, RunFolderError
 from rigidsim.scene.records import dataclass
 
 
@@ -138,4 +138,7 @@ class Generation:
                 raise ValueError("another format")
             return cls(number, str(content["config"]), length, works)
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise RunFolderError(f"{path}: is damaged or of another version ({error})") from None
+            raise RunFolderError(
+                f"{path}: is damaged or of another version ({error}); a finished sweep does without tiles/, "
+                f"{FORCE} runs another one again"
+            ) from None

@@ -59,7 +59,11 @@ class SavedSweep:
 
         if not self.folder.dataset.exists():
             raise RunFolderError(f"{self.place}: has no dataset.h5 yet; {RESUME} completes it")
-        _, digest = check_whole(self.folder.dataset)
+        try:
+            _, digest = check_whole(self.folder.dataset)
+        except RunFolderError as error:
+            again = f"; remove it, and {RESUME} writes it again" if self.folder.tiles.is_dir() else ""
+            raise RunFolderError(f"{error}{again}") from None
         expected = self.summary.get("dataset_sha256")
         if expected not in (None, digest):
             raise RunFolderError(

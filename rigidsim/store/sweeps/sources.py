@@ -61,6 +61,12 @@ class Sources:
 
     found: dict[str, ItemPlaces] = field(default_factory=dict)
 
+    @property
+    def missing(self) -> np.ndarray:
+        """Members that lack any item, ascending."""
+        lacking = [source.missing for source in self.found.values()]
+        return np.flatnonzero(np.logical_or.reduce(lacking))
+
     def works(self) -> tuple[Work, ...]:
         """What is still to be computed; members that lack the same items go together."""
         items = list(self.found)
@@ -77,16 +83,24 @@ class Sources:
         return tuple(works)
 
 
-def sources_of(sweep: Sweep, folder: SweepFolder, generations: Sequence[tuple[Generation, Sweep]]) -> Sources:
+def sources_of(
+    sweep: Sweep,
+    folder: SweepFolder,
+    generations: Sequence[tuple[Generation, Sweep]],
+    to_come: Generation | None = None,
+) -> Sources:
     """Find everything that a sweep asks for; the oldest copy counts.
 
     Args:
         generations: the folder's generations, with the sweeps that their configs describe.
+        to_come: one whose tiles count whether they exist already or not.
     """
     found = {item: ItemPlaces.nowhere(sweep.count) for item in (ALWAYS, *items_of(sweep))}
     for generation, then in generations:
         old = positions(sweep, then)
         present = folder.present(generation)
+        if to_come is not None and generation.number == to_come.number:
+            present[:] = True
         before = 0
         for work, count in zip(generation.works, generation.tile_counts, strict=True):
             places = work.places(old)

@@ -107,5 +107,5 @@ def read_tile(path: Path, config_sha256: str) -> Tile:
     except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
         raise RunFolderError(f"{path}: can't be read as a tile ({error})") from None
     if tile.config_sha256 != config_sha256:
-        raise RunFolderError(f"{path}: belongs to another sweep; remove it, and resume computes it again")
+        raise RunFolderError(f"{path}: belongs to another sweep")
     return tile

@@ -208,10 +208,16 @@ def _known(wanted: Sweep, folder: SweepFolder) -> bool:
 
 
 def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
-    """Refuse a folder whose sweep has different members altogether."""
-    for generation in folder.generations()[-1:]:
-        then = sweep_of(generation.config)
-        if identity(then) != identity(wanted):
+    """Refuse a folder whose sweep has different members altogether.
+
+    The config beside a finished dataset tells this, too: its tiles may have been deleted.
+    """
+    for config in [g.config for g in folder.generations()[-1:]] or folder.finished_config():
+        try:
+            same = identity(sweep_of(config)) == identity(wanted)
+        except ConfigError:  # edited, or of a version that had other keys
+            same = False
+        if not same:
             raise RunFolderError(
                 f"{folder.path}: holds a sweep of another experiment or of other keys; {FORCE} replaces it, "
                 f"another {OUT} or name puts this one elsewhere"
@@ -234,16 +240,20 @@ def identity(sweep: Sweep) -> str:
 
 
 def _generation(wanted: Sweep, folder: SweepFolder, length: int | None, *, exclusive: bool) -> Generation:
-    """The generation to work on: the latest if it is of this config, otherwise a new one.
+    """The generation to work on: the latest if it is of this config and has all that is missing, otherwise a
+    new one.
 
     Args:
         length: members of a tile of a new one, if known already.
     """
     generations = folder.generations()
-    if generations and generations[-1].config_sha256 == wanted.experiment.sha256:
-        return generations[-1]
-    sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
-    works = sources.works()
+    latest = [g for g in generations[-1:] if g.config_sha256 == wanted.experiment.sha256]
+    if latest and len(generations) == 1:
+        return latest[0]
+    known = [(g, sweep_of(g.config)) for g in generations]
+    if latest and not sources_of(wanted, folder, known, to_come=latest[0]).works():
+        return latest[0]  # otherwise tiles of an earlier one are gone
+    works = sources_of(wanted, folder, known).works()
     number = generations[-1].number + 1 if generations else 0
     made = Generation(number, wanted.experiment.text, length or tile_length(wanted), works)
     return folder.add(made, exclusive=exclusive)

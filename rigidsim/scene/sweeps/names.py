@@ -1,0 +1,87 @@
+"""Names of a sweep's axes, and those that the dataset derives from them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Protocol
+
+from rigidsim.errors import Problem
+from rigidsim.scene.overrides import key_steps
+from rigidsim.scene.registry import OBSERVABLES
+from rigidsim.scene.sweeps.values import AxisValues
+from rigidsim.scene.validation_messages import shown
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")
+_OF_LINES = ("_frequency", "_amplitude", "_rate")
+"""Suffixes of what is kept of signals' frequencies."""
+
+
+class NamedAxis(Protocol):
+    """What is asked of an axis here."""
+
+    @property
+    def key(self) -> str:
+        """Dotted key."""
+
+    @property
+    def name(self) -> str:
+        """Name of its dimension or variable."""
+
+    @property
+    def values(self) -> AxisValues:
+        """Its values."""
+
+
+def axis_name(key: str, given: str | None) -> str:
+    """The name of an axis: the one given, or the last part of its key.
+
+    Raises:
+        ValueError: it can't name a dimension.
+    """
+    name = re.sub(r"\[(\d+)\]", r"_\1", key.rpartition(".")[2]).strip("\"'") if given is None else given
+    if not _NAME.fullmatch(name):
+        raise ValueError(
+            f"given the name {shown(name)}; allowed: letters, digits and underscores, beginning with a letter"
+        )
+    return name
+
+
+def clashes(axes: Sequence[NamedAxis], events: Sequence[str], *, product: bool) -> list[Problem]:
+    """Names that the dataset would need twice, and keys that contain one another.
+
+    Args:
+        events: names of the experiment's events, from which further names are derived.
+        product: whether each axis is a dimension.
+    """
+    problems: list[Problem] = []
+    names: dict[str, str] = {}
+    keys: dict[str, tuple[str | int, ...]] = {}
+    for axis in axes:
+        where = f'[sweep] axes."{axis.key}"'
+        double = next((name for name in _needed(axis, product=product) if name in names), None)
+        if double is not None:
+            also = f'named "{double}"' if double == axis.name else f'named so that it needs "{double}",'
+            what = f'is {also} like axes."{names[double]}"; give one of them another name'
+            problems.append(Problem(where, what))
+        elif axis.name.startswith(tuple(f"{event}_" for event in events)) or (
+            axis.name.endswith(_OF_LINES) and axis.name.startswith(tuple(OBSERVABLES))
+        ):
+            what = f'is named "{axis.name}", a name that the dataset may need itself; give it another name'
+            problems.append(Problem(where, what))
+        names |= dict.fromkeys(_needed(axis, product=product), axis.key)
+        steps = tuple(key_steps(axis.key, "axes"))
+        for other, others in keys.items():
+            shorter = min(len(steps), len(others))
+            if steps[:shorter] == others[:shorter]:
+                what = f'sets what axes."{other}" sets, too; sweep one of them'
+                problems.append(Problem(where, what))
+        keys[axis.key] = steps
+    return problems
+
+
+def _needed(axis: NamedAxis, *, product: bool) -> list[str]:
+    """Names of an axis's dimensions and variables."""
+    if not axis.values.components:
+        return [axis.name]
+    return [axis.name, f"{axis.name}_component", *([f"{axis.name}_value"] if product else [])]

@@ -1,0 +1,197 @@
+"""Sweeps whose folder or config is damaged or wrong: nothing is lost or replaced unasked, and all is told."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigidsim.errors import ConfigError, RunFolderError
+from rigidsim.scene.overrides import apply_overrides
+from rigidsim.solve.problem import prepare
+from rigidsim.store.sweeps.run import SavedSweep
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.sweeps.sweep import SweepObserver
+from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
+
+CONFIG = """\
+name = "box"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.1, 1, 0.05]
+[time]
+end = 8
+samples = 3
+[integrator]
+formulation = "rates"
+[output]
+estimate = false
+record = ["angular_velocity"]
+[[events]]
+name = "flip"
+expression = "wy"
+[sweep]
+tile = 2
+axes."initial.angular_velocity[2]" = {step = [0.1, 0.1, 6], name = "w3"}
+"""
+LONGER = CONFIG.replace("0.1, 6]", "0.1, 7]")
+
+
+class Counting(SweepObserver):
+    def __init__(self) -> None:
+        self.missing = 0
+
+    def started(self, folder: Path, members: int, done: int) -> None:
+        self.missing = members - done
+
+
+def swept(out: Path, text: str = CONFIG) -> tuple[SavedSweep, int]:
+    """The sweep, and how many members were run for it."""
+    counting = Counting()
+    return run_sweep(parse(text), out=out, observer=counting), counting.missing
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("finished")
+    swept(out)
+    return out
+
+
+@pytest.fixture
+def out(finished: Path, tmp_path: Path) -> Path:
+    shutil.copytree(finished / "box", tmp_path / "box")
+    return tmp_path
+
+
+def same(one: SavedSweep, other: SavedSweep) -> bool:
+    return one.dataset.drop_attrs().identical(other.dataset.drop_attrs())
+
+
+def test_another_experiment_replaces_no_finished_sweep_without_tiles(out: Path) -> None:
+    shutil.rmtree(out / "box" / "tiles")
+    before = (out / "box" / "dataset.h5").read_bytes()
+    with pytest.raises(RunFolderError, match=r"holds a sweep of another experiment.*force=True"):
+        swept(out, CONFIG.replace("[1, 2, 3]", "[1, 2, 2.5]"))
+    assert (out / "box" / "dataset.h5").read_bytes() == before
+    found, run = swept(out, LONGER)  # the same experiment goes on, though nothing of it can be used again
+    assert (found.summary["members"], run) == (7, 7)
+    shutil.rmtree(out / "box" / "tiles")
+    (out / "box" / "config.toml").unlink()
+    with pytest.raises(RunFolderError, match="another experiment"):
+        swept(out)
+
+
+def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished: Path) -> None:
+    tile = out / "box" / "tiles" / "g000-0000001.h5"
+    content = bytearray(tile.read_bytes())
+    content[len(content) // 2] ^= 1
+    tile.write_bytes(content)
+    for _ in range(2):
+        with pytest.raises(RunFolderError, match=r"g000-0000001\.h5.*remove it, and rigidsim\.resume"):
+            swept(out, LONGER)
+    tile.unlink()
+    found, run = swept(out, LONGER)
+    assert run == 2
+    fresh, _ = swept(out / "fresh", LONGER)
+    assert same(found, fresh)
+
+
+def test_what_is_gone_from_earlier_tiles_is_computed_again(out: Path) -> None:
+    """The latest generation has none of it, and was complete."""
+    more = CONFIG.replace("[sweep]\n", '[sweep]\nkeep = ["final", "means"]\n')
+    found, run = swept(out, more)
+    whole = found.dataset.load()
+    assert run == 6
+    (out / "box" / "tiles" / "g000-0000002.h5").unlink()
+    (out / "box" / "dataset.h5").unlink()
+    again, run = swept(out, more)
+    assert run == 2
+    assert whole.drop_attrs().identical(again.dataset.drop_attrs())
+
+
+def test_a_damaged_dataset_is_told_with_its_remedy_which_works(out: Path, finished: Path) -> None:
+    dataset = out / "box" / "dataset.h5"
+    content = bytearray(dataset.read_bytes())
+    content[len(content) // 2] ^= 1
+    dataset.write_bytes(content)
+    found, _ = swept(out)
+    with pytest.raises(RunFolderError, match=r"remove it, and rigidsim\.resume"):
+        _ = found.dataset
+    dataset.unlink()
+    again, run = swept(out)
+    assert run == 0
+    assert same(again, swept(finished)[0])
+
+
+def test_fewer_events_kept_than_before_are_fewer(tmp_path: Path) -> None:
+    events = CONFIG.replace("[sweep]\n", '[sweep]\nkeep = ["final", "events"]\nmost_events = 3\n')
+    assert swept(tmp_path, events)[0].dataset.flip_times.sizes["flip_occurrence"] == 3
+    fewer = swept(tmp_path, events.replace("most_events = 3", "most_events = 1"))[0].dataset
+    assert fewer.flip_times.sizes["flip_occurrence"] == 1
+    assert fewer.flip_count.max() > 1
+    np.testing.assert_array_equal(fewer.flip_times[:, 0], fewer.flip_first)
+
+
+REFUSED = {
+    "an index past the end": (
+        'axes."initial.angular_velocity[3]" = {values = [1]}',
+        'velocity[3]": there is nothing at "3" to set; the array there has entries 0 to 2',
+    ),
+    "a load that there isn't": ('axes."loads[0].coefficients[0]" = {values = [1]}', 'nothing at "0" to set'),
+    "a parameter of no expression": (
+        'axes."parameters.k" = {values = [1, 2]}', 'no expression uses the parameter "k"',
+    ),
+    "a name derived from another": (
+        'axes."initial.angular_velocity" = {values = [[1, 2, 3]], name = "w"}\n'
+        'axes."time.end" = {values = [1], name = "w_component"}',
+        'axes."time.end": is named "w_component" like axes."initial.angular_velocity"',
+    ),
+    "a name that needs another's": (
+        'axes."time.end" = {values = [1], name = "w_value"}\n'
+        'axes."initial.angular_velocity" = {values = [[1, 2, 3]], name = "w"}',
+        'is named so that it needs "w_value", like axes."time.end"',
+    ),
+    "an event's name": ('axes."time.end" = {values = [1], name = "flip_energy"}', "may need itself"),
+    "too few": ('axes."time.end" = {linspace = [1, 2]}', "given [1, 2]; an array of 3 is allowed"),
+    "too many": ('axes."time.end" = {uniform = [1, 2, 3], count = 3}', "an array of 2 is allowed"),
+    "a misspelt way": (
+        'axes."time.end" = {value = [1]}',
+        'axes."time.end".value: unknown key; did you mean "values"?',
+    ),
+    "a tile beyond all bounds": (f'tile = 1{30 * "0"}\naxes."time.end" = {{values = [1]}}', "at most 1e+08"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_bad_sweep_is_told_where_and_why(case: str, tmp_path: Path) -> None:
+    table, told = REFUSED[case]
+    with pytest.raises(ConfigError) as caught:
+        swept(tmp_path, CONFIG.partition("[sweep]")[0] + f"[sweep]\n{table}\n")
+    assert told in str(caught.value)
+    assert len(caught.value.problems) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_truths_and_loose_tolerances_are_values_too(tmp_path: Path) -> None:
+    axes = (
+        'axes."integrator.hold_invariants".values = [true, false]\n'
+        'axes."integrator.tolerance".values = [0.03, 1]\n'
+    )
+    found, _ = swept(tmp_path, CONFIG.partition("tile")[0] + axes)
+    assert found.dataset.hold_invariants.values.tolist() == ["true", "false"]
+    assert found.summary["outcomes"] == {"finished": 4}
+
+
+def test_remedies_are_worded_for_whoever_reads_them() -> None:
+    """Also within a config's problems, whose control characters are made visible."""
+    with pytest.raises(ConfigError) as caught:
+        prepare(parse(CONFIG))
+    assert "rigidsim.sweep(...) runs them" in str(caught.value)
+    assert "rigidsim sweep runs them" in caught.value.for_command_line()
+    with pytest.raises(ConfigError) as caught:
+        apply_overrides({}, ["a\x02b\x1b[0].c=1"])
+    assert "a\\x02b\\x1b[0]" in str(caught.value)
