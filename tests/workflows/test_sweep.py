@@ -35,7 +35,7 @@ from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Work, ranges_of
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweeps.members import get_ready, run_members, sweep_of
+from rigidsim.workflows.sweeps.members import batches_of, get_ready, run_members, sweep_of
 from rigidsim.workflows.sweeps.sweep import resume_sweep, scanned
 from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep
@@ -242,6 +242,45 @@ def test_an_indicator_moves_no_bit_of_what_else_is_kept(samples: int) -> None:
     for name, values in without.items():
         assert values.tobytes() == along[name].tobytes(), name
     assert np.isfinite(without["angular_velocity_final"]).all()
+
+
+MANY_ENDS = (
+    CONFIG
+    + """\
+[sweep]
+mode = "zip"
+keep = ["final"]
+axes."initial.angular_velocity[2]" = {step = [0.1, 0.01, COUNT], name = "w3"}
+axes."time.end" = {step = [5, 0.01, COUNT], name = "end"}
+"""
+)
+
+
+def test_whom_a_process_meets_first_decides_nothing() -> None:
+    """Each time of its own needs equations of its own, which soon costs more than a run of its own."""
+    few, many = (sweep_of(MANY_ENDS.replace("COUNT", count)) for count in ("64", "65"))
+    found = {}
+    for order in ([0, 63], [63, 0]):
+        for sweep, engine in ((few, "batch of"), (many, "alone")):
+            batches_of.cache_clear()
+            results = [run_members(sweep, [member], ["final"]) for member in order]
+            assert all(key.startswith(engine) for result in results for key in result.engines)
+            rows = {m: r.kept["angular_velocity_final"].values for m, r in zip(order, results, strict=True)}
+            found.setdefault(sweep.count, []).append(np.concatenate([rows[0], rows[63]]))
+    for one, other in found.values():
+        np.testing.assert_array_equal(one, other)
+    assert run_members(many, [0], ["final"]).why_alone == "families"
+    assert run_members(many, [0], ["final"], apart=False).why_alone == ""
+
+
+@pytest.mark.slow  # sixty-six systems of equations
+def test_members_that_are_added_run_as_those_before(tmp_path: Path) -> None:
+    begun = swept(tmp_path, MANY_ENDS.replace("COUNT", "3"))
+    kept = begun.dataset.angular_velocity_final.values
+    longer = swept(tmp_path, MANY_ENDS.replace("COUNT", "66"))
+    assert all(engine.startswith("batch of") for engine in longer.summary["engines"])
+    np.testing.assert_array_equal(longer.dataset.angular_velocity_final.values[:3], kept)
+    assert verify_sweep(tmp_path / "box", members=9).identical
 
 
 def test_what_is_kept_of_a_member_has_the_same_bits_alone_and_in_company() -> None:

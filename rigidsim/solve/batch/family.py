@@ -23,10 +23,6 @@ from rigidsim.solve.batch.replay import Replay
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.problem import prepare
 
-MOST_FAMILIES = 64
-"""Largest number of families that are traced; if members differ more, the rest is run one by one."""
-_HOPELESS = 8
-"""Members that could not be traced after which no other is tried."""
 _AT_ONCE = 4096  # members whose numbers are worked out together
 
 
@@ -45,7 +41,7 @@ class Alone(Enum):
     LYAPUNOV = "the Lyapunov spectrum has an integrator of its own"
     KEY = "what is swept is not a number of the body, the start, a load or a parameter"
     UNTRACEABLE = "the equations depend on what is swept in a way that can't be told beforehand"
-    FAMILIES = f"the members need more than {MOST_FAMILIES} different systems of equations"
+    FAMILIES = "too few members share a system of equations"
     AVERAGED = "averages over the rotation are worked out for each body by itself"
     RANGE = "a coefficient is outside the range of double precision"
 
@@ -177,8 +173,6 @@ class Families:
         self._most_refused = most_refused
         self._swept = members.numbers
         self.known: list[Family] = []
-        self._hopeless: Alone | None = None
-        self._failures = 0
 
     def sort(self, which: Sequence[int] | np.ndarray | None = None) -> Sorted:
         """Sort members into families.
@@ -199,11 +193,6 @@ class Families:
             waiting = self._taken(family, waiting, result)
         while len(waiting):
             first = int(waiting[0])
-            if self._hopeless is None and len(self.known) >= MOST_FAMILIES:
-                self._hopeless = Alone.FAMILIES
-            if self._hopeless is not None:
-                result.alone |= dict.fromkeys(waiting.tolist(), self._hopeless)
-                return
             made = self._traced(first)
             if isinstance(made, ConfigError):
                 result.refused[first] = made
@@ -213,9 +202,6 @@ class Families:
             elif isinstance(made, Alone):
                 result.alone[first] = made
                 waiting = waiting[1:]
-                self._failures += 1
-                if self._failures >= _HOPELESS:
-                    self._hopeless = made
             else:
                 self.known.append(made)
                 waiting = self._taken(made, waiting, result)

@@ -74,12 +74,15 @@ class Generation:
         config: the config's TOML text.
         length: members per tile.
         works: works in order; tiles are numbered through them.
+        apart: whether all members run one by one though some might share equations, as was found when the
+            sweep was begun; None if an earlier version began it.
     """
 
     number: int
     config: str
     length: int
     works: tuple[Work, ...]
+    apart: bool | None = None
 
     @property
     def config_sha256(self) -> str:
@@ -117,7 +120,9 @@ class Generation:
     def as_text(self) -> str:
         """JSON text for ``gNNN.json``."""
         works = [{"keep": list(work.keep), "ranges": [list(r) for r in work.ranges]} for work in self.works]
-        content = {"format": 1, "config": self.config, "length": self.length, "works": works}
+        content = {
+            "format": 1, "config": self.config, "length": self.length, "apart": self.apart, "works": works,
+        }  # fmt: skip
         return json.dumps(content) + "\n"
 
     @classmethod
@@ -136,7 +141,8 @@ class Generation:
             length = int(content["length"])
             if content["format"] != 1 or length < 1:
                 raise ValueError("another format")
-            return cls(number, str(content["config"]), length, works)
+            apart = content.get("apart")
+            return cls(number, str(content["config"]), length, works, None if apart is None else bool(apart))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise RunFolderError(
                 f"{path}: is damaged or of another version ({error}); a finished sweep does without tiles/, "

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -27,7 +29,7 @@ from rigidsim.session.members import (
     warnings_variable,
 )
 from rigidsim.session.variables import dataset_variables
-from rigidsim.solve.batch.family import Families, Family, batchable
+from rigidsim.solve.batch.family import Alone, Families, Family, Sorted, batchable
 from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
@@ -37,7 +39,11 @@ from rigidsim.store.variables import Variable
 
 _ONE_BY_ONE = ("frequencies",)
 """Items that only single runs can provide."""
-_TRIED, _MOST_AHEAD = 16, 4  # members looked at, and families compiled, before the first tile
+_LOOKED_AT, _COUNTED = 64, 4096  # members by which a sweep is judged, by their equations and by their kinds
+_MOST_KINDS, _LEAST_MEMBERS = 64, 8
+"""Up to so many kinds of members have batches however few members they have; more need so many each."""
+_MOST_AHEAD = 4  # families compiled before the first tile
+_MOST_HELD = 256  # families
 
 
 @dataclass
@@ -90,22 +96,68 @@ class BatchTiles:
         self._runs: dict[int, tuple[BatchRun, list[Variable]]] = {}
         self._estimates: dict[int, MemberEstimates] = {}
 
+    @cached_property
+    def apart(self) -> Alone | None:
+        """Why all members run one by one, if too few could share a batch; None if they don't.
+
+        It is judged by the config alone: who runs in a batch must not depend on which members a process has
+        met before, since single runs have other last bits.
+        """
+        kinds, looked_at = self._kinds()
+        if kinds > _MOST_KINDS and kinds * _LEAST_MEMBERS > looked_at:
+            return Alone.FAMILIES
+        _, found = self._sample
+        if found.alone and not found.groups:
+            return found.alone[min(found.alone)]
+        many = self._sweep.count > _LOOKED_AT and 2 * len(found.groups) > _LOOKED_AT
+        return Alone.FAMILIES if many else None
+
+    def _kinds(self) -> tuple[int, int]:
+        """Number of kinds (see ``Members``) among some members, and the number of these."""
+        sweep = self._sweep
+        apart = [place for place in range(len(sweep.axes)) if not self.axes.traced(place)]
+        if sweep.product or not apart:
+            return math.prod(sweep.axes[place].values.count for place in apart), sweep.count
+        some = np.arange(0, sweep.count, -(-sweep.count // _COUNTED))
+        codes = np.stack([self.axes.codes(place, some) for place in apart])
+        return len(np.unique(codes, axis=1).T), len(some)
+
+    @cached_property
+    def _sample(self) -> tuple[range, Sorted]:
+        """Members from all over the sweep, sorted."""
+        some = range(0, self._sweep.count, -(-self._sweep.count // _LOOKED_AT))
+        return some, self._sorted(some)
+
+    def _sorted(self, members: Sequence[int], most_refused: int | None = None) -> Sorted:
+        if len(self._known) > _MOST_HELD:  # whoever represents a family, it has the same numbers
+            self._known.clear()
+            self._runs.clear()
+            self._estimates.clear()
+        families = Families(Members.of(self._sweep, members, self.axes), most_refused)
+        families.known = self._known
+        return families.sort()
+
     def compile(self) -> None:
         """Trace and compile what members from all over the sweep need."""
-        some = range(0, self._sweep.count, -(-self._sweep.count // _TRIED))
-        families = Families(Members.of(self._sweep, some, self.axes))
-        families.known = self._known
-        for family, numbers in families.sort().groups[:_MOST_AHEAD]:
+        if self.apart is not None:
+            return
+        some, found = self._sample
+        for family, numbers in found.groups[:_MOST_AHEAD]:
             run, _ = self._run_of(family, some[int(numbers.members[0])])
             run.compile()
             if self._estimated:
                 self._estimate_of(family, run).compile()
 
-    def run(self, members: Sequence[int], keep: Sequence[str]) -> Batched:
-        """Run all members that can be run together."""
-        families = Families(Members.of(self._sweep, members, self.axes))
-        families.known = self._known
-        found = families.sort()
+    def run(self, members: Sequence[int], keep: Sequence[str], apart: bool | None = None) -> Batched:
+        """Run all members that can be run together.
+
+        Args:
+            apart: whether none can, if it was judged before, when the sweep may have had fewer members.
+        """
+        if apart or (apart is None and self.apart is not None):
+            why = self.apart or Alone.FAMILIES
+            return Batched([], [], list(range(len(members))), why.name.lower())
+        found = self._sorted(members)
         done = Batched([], [], sorted(found.alone), "")
         if found.alone:
             done.why = found.alone[done.left[0]].name.lower()
@@ -133,9 +185,9 @@ class BatchTiles:
             What is wrong with each, and how many members share their equations with others and can be run;
             nothing is known about the rest.
         """
-        families = Families(Members.of(self._sweep, members, self.axes), most)
-        families.known = self._known
-        found = families.sort()
+        if self.apart is not None:
+            return {}, 0
+        found = self._sorted(members, most)
         accepted = sum(len(numbers.members) for _, numbers in found.groups)
         return {int(members[place]): error for place, error in found.refused.items()}, accepted
 

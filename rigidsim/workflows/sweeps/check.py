@@ -36,7 +36,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
     """Refuse a sweep with a member that can't be run; returns the first member, prepared.
 
     Args:
-        every: check each member's numbers even if there are more than ``_ALL``: 15 s per million members.
+        every: check each member's numbers even if there are more than ``_ALL``: 10 s per million members.
         each: like ``map``; may have others look at shares of the members meanwhile.
 
     Raises:

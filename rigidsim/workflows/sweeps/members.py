@@ -63,19 +63,20 @@ def hidden_of(sweep: Sweep) -> tuple[str, ...]:
     return () if asked is not None and GROWTH in asked else (GROWTH,)
 
 
-def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> bytes:
+def tile_image(config: str, members: Sequence[int], keep: Sequence[str], apart: bool | None) -> bytes:
     """Run some members; returns the sealed file of their tile.
 
     Args:
         config: the sweep's config text.
         keep: items to be kept, as in ``items_of``.
+        apart: see ``run_members``.
 
     Raises:
         KeyboardInterrupt: the computation was interrupted.
     """
     began, cpu = time.perf_counter(), time.process_time()
     sweep = sweep_of(config)
-    results = run_members(sweep, members, [plain(item) for item in keep])
+    results = run_members(sweep, members, [plain(item) for item in keep], apart)
     made = {
         "engines": dict(results.engines),
         "why_alone": results.why_alone,
@@ -96,15 +97,21 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str]) -> byte
     ).image()
 
 
-def run_members(sweep: Sweep, members: Sequence[int], keep: Sequence[str]) -> MemberResults:
-    """Run some members of a sweep and keep the items asked for."""
+def run_members(
+    sweep: Sweep, members: Sequence[int], keep: Sequence[str], apart: bool | None = None
+) -> MemberResults:
+    """Run some members of a sweep and keep the items asked for.
+
+    Args:
+        apart: see ``Generation``; judged by the config if it isn't known.
+    """
     events = [event.name for event in sweep.base.config.events]
     most = sweep.table.most_events
     more = frequencies_of if "frequencies" in keep else None
     hidden = hidden_of(sweep)
     done = Batched([], [], list(range(len(members))), why_alone(sweep, keep))
     if not done.why:
-        done = batches_of(sweep.experiment.text).run(members, keep)
+        done = batches_of(sweep.experiment.text).run(members, keep, apart)
     for place in done.left:
         member = partial(_run_alone, sweep, members[place])
         done.results.append(run_alone(member, keep, most, events, more, hidden))

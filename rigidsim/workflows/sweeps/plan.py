@@ -25,7 +25,6 @@ _TILES_OF_FEW = 16
 _LARGEST_TILE_BYTES = 64e6
 _BUILD_SECONDS = 0.2  # seconds to compile equations for each member that runs by itself
 _BATCH_SECONDS = 2e-5  # seconds of overhead per member of a batch besides its integration
-_TRIED = 64
 _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one without
 
 
@@ -50,12 +49,8 @@ def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
 
 
 def _side_by_side(sweep: Sweep) -> bool:
-    """Whether members run in batches, judged by some of them."""
-    if why_alone(sweep, sweep.table.keep):
-        return False
-    some = range(0, sweep.count, -(-sweep.count // _TRIED))
-    _, accepted = batches_of(sweep.experiment.text).refused(some)
-    return accepted > 0
+    """Whether members run in batches."""
+    return not why_alone(sweep, sweep.table.keep) and batches_of(sweep.experiment.text).apart is None
 
 
 def _length(sweep: Sweep, seconds: float, size: float) -> int:

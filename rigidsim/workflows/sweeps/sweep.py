@@ -22,6 +22,7 @@ from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.sweeps.sources import sources_of
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
+from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import SweepCheck
 from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
 from rigidsim.workflows.sweeps.plan import tile_length
@@ -255,8 +256,16 @@ def _generation(wanted: Sweep, folder: SweepFolder, length: int | None, *, exclu
         return latest[0]  # otherwise tiles of an earlier one are gone
     works = sources_of(wanted, folder, known).works()
     number = generations[-1].number + 1 if generations else 0
-    made = Generation(number, wanted.experiment.text, length or tile_length(wanted), works)
+    length = length or tile_length(wanted)
+    made = Generation(number, wanted.experiment.text, length, works, _apart(wanted, generations))
     return folder.add(made, exclusive=exclusive)
+
+
+def _apart(wanted: Sweep, generations: Sequence[Generation]) -> bool | None:
+    """See ``Generation``: as it was found first, so that more members don't change those that are there."""
+    if generations:
+        return generations[0].apart
+    return not why_alone(wanted, wanted.table.keep) and batches_of(wanted.experiment.text).apart is not None
 
 
 def _run_tiles(

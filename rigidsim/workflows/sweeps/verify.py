@@ -55,10 +55,12 @@ def verify_sweep(
         differing: dict[str, None] = {}
         first: Difference | None = None
         held: dict[str, np.ndarray] = {}
+        generations = saved.folder.generations()
+        apart = generations[0].apart if generations else None
         step = len(chosen) if together is None else together
         for begin in range(0, len(chosen), step):
             some = chosen[begin : begin + step]
-            again = run_members(sweep, some, sweep.table.keep).kept
+            again = run_members(sweep, some, sweep.table.keep, apart).kept
             for name, place, there, here in _differences(dataset, sweep, some, again, held):
                 differing[name] = None
                 if first is None or some[place] < first.sample:

@@ -51,7 +51,7 @@ class OneProcess:
             yield tile, tile_image(*task(generation, tile))
 
 
-def task(generation: Generation, tile: int) -> tuple[str, list[int], tuple[str, ...]]:
+def task(generation: Generation, tile: int) -> tuple[str, list[int], tuple[str, ...], bool | None]:
     """Arguments of ``tile_image`` for a tile."""
     work, _ = generation.work_of(tile)
-    return generation.config, generation.members_of(tile).tolist(), work.keep
+    return generation.config, generation.members_of(tile).tolist(), work.keep, generation.apart
