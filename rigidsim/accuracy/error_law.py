@@ -30,9 +30,22 @@ def round_off_law(tolerance: float, steps: int, rate: float, duration: float) ->
     return tolerance / 2 * math.sqrt(max(steps, 1)) * rate * duration / math.sqrt(3)
 
 
+def stable_law(tolerance: float, steps: int, rate: float, duration: float) -> float:
+    """Attitude error (rad) of a motion that amplifies none: the round-off law and the attitude's own walk.
+
+    The law is one of phases that many radians have gathered. A motion of less than some radians, as a slow
+    precession often is, shows what each step does to the attitude itself: four components of a unit
+    quaternion, each off by eps / 2 of itself, turn it by eps at most, which add up as a random walk.
+    """
+    walk = tolerance * math.sqrt(max(steps, 1))
+    return math.hypot(walk, round_off_law(tolerance, steps, rate, duration))
+
+
 def attitude_error(level: float, steps: int, rate: float, seconds: float, growth: Growth) -> float:
-    """The round-off law times the motion's amplification, rad, for errors of size ``level`` at each step."""
-    return round_off_law(level, steps, rate, seconds) * growth.at(seconds)
+    """The law of stable motions times the motion's amplification, rad, for errors of size ``level`` at each
+    step.
+    """
+    return stable_law(level, steps, rate, seconds) * growth.at(seconds)
 
 
 def held_error(

@@ -238,8 +238,8 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         predictable_seconds=estimate.predictable_seconds,
         amplification_seconds=estimate.seconds,
         examined_share=estimate.share,
-        amplification_how="of the estimated error over the round-off law "
-        "(tolerance/2) sqrt(steps) |w| t / sqrt 3; 1 for a stable motion",
+        amplification_how="of the estimated error over that of a stable motion: the round-off law "
+        "(eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable motion",
         certified=None,
         how=_NOT_CERTIFIED,
     )

@@ -302,3 +302,50 @@ def test_kinks_and_jumps_are_followed() -> None:
     run = run_text(text)
     announced, true = run.summary["accuracy"]["estimated_attitude_error"], true_error(run, text)
     assert true <= COVERED * announced < 1e-11
+
+
+PRECESSION = config(
+    "principal_moments = [0.98, 0.98, 1]",
+    'angular_velocity = [0, 0, 60]\neuler_angles = [0.3, "35 deg", 0]',
+    GRADIENT,
+    "end = 10\nsamples = 2",
+    output='record = ["momentum_axis"]',
+)
+
+
+WEAK = GRADIENT.replace("= 1\n", "= 1e-9\n")
+"""Leaves no closed form, and the motion as it is."""
+
+
+def amplification(text: str, steps: int, *overrides: str) -> float:
+    """What is announced from neighbours alone, as where there is no closed form."""
+    prepared = prepare(rigidsim.parse(text, overrides=overrides))
+    found = estimate_errors(prepared, steps, float(prepared.scene.samples.last))
+    assert found is not None
+    return found.amplification
+
+
+@pytest.mark.parametrize(("level", "steps"), [("spin_averaged", 150), ("orbit_averaged", 1)])
+def test_a_slow_precession_amplifies_nothing(level: str, steps: int) -> None:
+    """By 5e-3 rad: the rounding of the direction itself outweighs what that does to the phase."""
+    assert amplification(PRECESSION, steps, f'model.level = "{level}"') == 1
+
+
+def test_a_short_motion_amplifies_nothing() -> None:
+    """By 1e-3 rad, in one step, followed by neighbours and held against its closed form."""
+    short = scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "1e-3")
+    assert amplification(short, 1) == 1
+    assert run_text(short).summary["accuracy"]["amplification"] == 1
+
+
+@pytest.mark.parametrize("tolerance", [1e-12, 1e-6])
+def test_what_a_tolerance_cuts_off_is_no_amplification(tolerance: float) -> None:
+    """Beside a stable axis: thousands of epsilons are cut off each step."""
+    text = scene("[1, 2, 3]", "[0.1, 0.1, 1]", "40", WEAK)
+    assert amplification(text, 60, f"integrator.tolerance = {tolerance}") == 1
+
+
+def test_the_middle_axis_amplifies_what_a_tolerance_cuts_off() -> None:
+    """Errors across it grow by exp(0.58 t) up to the flip, which comes after some 14 s."""
+    text = scene("[1, 2, 3]", "[1e-3, 1, 1e-3]", "40", WEAK)
+    assert amplification(text, 60, "integrator.tolerance = 1e-12") > 4

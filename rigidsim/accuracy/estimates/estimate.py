@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, round_off_law
+from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
 from rigidsim.accuracy.estimates.carriers import loose
 from rigidsim.accuracy.estimates.course import Course, Followed
 from rigidsim.accuracy.estimates.exact_error import ExactError, exact_error
@@ -22,6 +22,7 @@ from rigidsim.accuracy.estimates.following import follow, leading
 from rigidsim.accuracy.estimates.growth import exponential_growth, power_of_time
 from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
 from rigidsim.scene.records import dataclass
+from rigidsim.solve.neighbours.pushed import Spread
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.trail import SampleTrail, Waypoints
@@ -35,8 +36,8 @@ class Estimate:
         attitude: rad, at most pi; None without an attitude.
         rates: error of the angular velocity, relative to its size.
         position, velocity: m and m/s; None if the body has no position.
-        amplification: ratio of the attitude's error (or the rates') to the round-off law; 1 for a stable
-            motion.
+        amplification: ratio of the attitude's error (or the rates') to the law of stable motions; 1 for
+            these.
         growth_rate: rate of exponential growth, 1/s; 0 if there is none.
         predictable_seconds: time after the start at which digits are gone; None if errors don't
             grow exponentially.
@@ -102,7 +103,10 @@ def estimate_errors(
         form, _ = closed_form_if_any(scene, driven=bool(prepared.python_loads))
         if form is not None:
             duration = reached - float(scene.start)
-            law = round_off_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
+            law = stable_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
+            law = math.hypot(
+                law, CLOSED_FORM * float(prepared.precision.epsilon)
+            )  # of what it is held against
             return _by_comparison(prepared, exact_error(prepared, form, trail), law, duration, margins)
     lost = math.pi / float(prepared.precision.epsilon)
     course = Course(prepared, start, end, steps, waypoints, stepper, nearest, uneven, lost)
@@ -159,7 +163,7 @@ def _size(vector: object) -> float:
 
 
 def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimate:
-    prepared, spread, steps, end = course.prepared, followed.spread, course.steps, course.end
+    prepared, spread, end = course.prepared, followed.spread, course.end
     system, start, exponent = prepared.system, course.start, prepared.system.scaling.time
     level, carried = float(prepared.precision.epsilon), course.carried
     duration = math.ldexp(end - start, exponent)
@@ -189,7 +193,7 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
         return float(min(found + LAST_BITS * level * size + label * pace, most)) if known else most
 
     lead = at_end("attitude" if carried else "rates", 1.0, sys.float_info.max, rate)
-    law = round_off_law(level, steps, float(system.rate_bound), duration)
+    law = _stable(course, spread, longer, float(system.rate_bound) * duration)
     amplification = lead / law if law > 0 else 1.0
     growth, horizon = exponential_growth(times, errors, exponent, margins.power, margins.exponential)
     scaling, size, speed = system.scaling, spread.extent, spread.fastest
@@ -207,6 +211,23 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
         share=followed.share,
         how=_words(course, followed),
     )
+
+
+def _stable(course: Course, spread: Spread, longer: float, turned: float) -> float:
+    """Error at the end (rad) if the motion amplifies none of what its neighbours are pushed by.
+
+    Args:
+        longer: ratio of the run's length to what was followed.
+        turned: angle (rad) that the motion turns through.
+    """
+    prepared, epsilon = course.prepared, float(course.prepared.precision.epsilon)
+    # where steps end on surfaces, the tolerance itself is the size of pushes
+    level = prepared.law_tolerance if prepared.system.stepwise else epsilon
+    # neighbours of a short motion are pushed more often than it has steps, and once at the start
+    pushed = max(course.steps, spread.steps[-1] + 1)
+    # truncation errors may add up one by one, and what they do to the rates with them: n^2 / 2 of phase
+    cut = epsilon * spread.cut[-1] * longer * math.hypot(1.0, turned / 2)
+    return math.hypot(stable_law(level, pushed, turned, 1.0), cut)
 
 
 def _words(course: Course, followed: Followed) -> str:

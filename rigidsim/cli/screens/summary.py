@@ -256,7 +256,9 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         factor = predicted["amplification"]
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
         law = "invariants held" if predicted["held"] else "round-off law"
-        on.line("accuracy", f"attitude uncertain by about {error:.1e} rad at the end ({law}{unstable})")
+        averaged = plan["formulation"].endswith("_averaged")
+        words = "momentum's direction integrated to" if averaged else "attitude uncertain by"
+        on.line("accuracy", f"{words} about {error:.1e} rad at the end ({law}{unstable})")
         seen = predicted["growth_seconds"]
         if seen:
             on.line(

@@ -67,6 +67,8 @@ class Spread:
         steps: steps of the loose tolerance that the motion took until then.
         rates, attitude, position, velocity: root mean square over the neighbours, in epsilons of internal
             units; attitude as an angle, rates relative to their size; zeros if the motion has none.
+        cut: sum of the steps' truncation errors so far, in epsilons of the size of the states they befall;
+            zeros if the tolerance allows none beyond rounding.
         extent, fastest: largest distance from the origin and speed so far, internal units.
         whole: False if the motion could not be followed to the requested end.
     """
@@ -77,6 +79,7 @@ class Spread:
     attitude: list[float] = field(default_factory=list)
     position: list[float] = field(default_factory=list)
     velocity: list[float] = field(default_factory=list)
+    cut: list[float] = field(default_factory=list)
     extent: float = 0.0
     fastest: float = 0.0
     whole: bool = True
@@ -166,6 +169,7 @@ class Neighbours:
         self._pace(end, steps, fewest)
         self._stretch = self._longest
         self._apart: np.ndarray = np.zeros(NEIGHBOURS)
+        self._cut = 0.0
         self.spread = Spread()
 
     def _pace(self, end: float, steps: float, fewest: float) -> None:
@@ -306,6 +310,7 @@ class Neighbours:
             # one step stands for all of the stretch: they add up, or walk where their errors change sign
             times = taken + math.sqrt(taken) * self._random.standard_normal(NEIGHBOURS)
             pushed += wrong[:, None] * times
+            self._cut += taken * math.sqrt(float((self._weights @ (wrong * self._felt) ** 2).max()))
         pushed[~self._felt] = 0.0
         self._states[:, 1:] += self._factor * pushed
         self._apart = self._distances(self._states)
@@ -337,6 +342,7 @@ class Neighbours:
         size = _length(units * motion[rates])
         spread.times.append(self._time)
         spread.steps.append(self.steps)
+        spread.cut.append(self._cut)
         spread.rates.append(_length(units * wrong[rates]) / size if size > 0 else 0.0)
         turned = 0.0 if self._chords is None else self._chords.between(self._states)
         spread.attitude.append(turned / self._factor)
