@@ -11,7 +11,7 @@ FIGURES: dict[str, str] = {
     "polar_motion": "the spin axis about the figure axis: circle, period, m1 and m2 over time",
     "pole_path": "path of the figure axis in space, and about its mean motion where that precesses",
     "nutation": "nutation ellipse: the pole about its mean motion",
-    "obliquity": "obliquity and longitude of the node, each less its mean or secular part",
+    "obliquity": "obliquity and longitude of the node, less what would hide their swings",
     "libration": "libration, or roll, pitch and yaw, over time; the source seen from the body",
     "tip": "trace of a top's tip seen from above, its tilt and precession over time",
     "polhode": "polhode on the surfaces of energy and momentum, separatrix, Poinsot's rolling",

@@ -192,6 +192,27 @@ def test_obliquity_and_longitude_have_axes_of_their_own_and_say_what_was_taken_o
     )
 
 
+@pytest.mark.parametrize(("swing", "whole"), [(50.0, True), (0.5, True), (0.05, False)])
+def test_swings_that_ticks_tell_are_drawn_with_nothing_taken_off(swing: float, whole: bool) -> None:
+    dataset = precessing()
+    wave = np.deg2rad(swing) * np.sin(2 * np.pi * dataset["time"].values / (18.6 * YEAR))
+    dataset["obliquity"].values[:] = np.deg2rad(89.3) + wave[:, None]
+    dataset["node_longitude"].values[:] = np.deg2rad(60) + wave[:, None]
+    page = figures.figure(dataset, "obliquity")
+    upper, lower = (axes.get_lines()[0].get_ydata() for axes in page.axes)
+    assert titles(page)[0].startswith("Obliquity less its mean, ") != whole
+    assert titles(page)[1].startswith("Longitude of the node less its mean motion, ") != whole
+    if whole:
+        assert titles(page) == ["Obliquity", "Longitude of the node"]
+        np.testing.assert_allclose(upper, 89.3 + np.rad2deg(wave), rtol=1e-12)
+        np.testing.assert_allclose(lower, 60 + np.rad2deg(wave), rtol=1e-12)
+    assert [axes.get_ylabel() for axes in page.axes] == (
+        ["obliquity [deg]", "longitude [deg]"]
+        if whole
+        else ["obliquity − mean [arcsec]", "longitude − line [arcsec]"]
+    )
+
+
 def test_the_page_of_a_run_with_axes_alone_is_about_their_precession() -> None:
     dataset = precessing()  # as of an averaged model: neither attitude nor rates
     page = figures.figure(dataset.assign_attrs(formulation="orbit_averaged"))

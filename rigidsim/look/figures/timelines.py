@@ -25,6 +25,8 @@ AXIS_COLORS = {"figure": BLUE, "spin": ORANGE, "momentum": VIOLET}
 _STILL = 1e-9  # of its size, below which what a curve does is rounding
 _VISIBLE = 0.01  # of its start, from which a change is seen on an axis from zero
 _QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is told in the axis' own unit
+_LEGIBLE = 0.01  # of an angle, from which the ticks along its swing need four digits at most
+_AS_FAR = 0.7  # of the whole swing: what a straight line must leave of it to be of no help
 _TURNS = 720.0  # degrees, from which the mean growth of an angle is taken off
 
 
@@ -143,33 +145,49 @@ def polar_motion(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Obliquities less the mean of the first axis shown."""
+    """Obliquities, less the mean of the first axis shown where that would hide their swings."""
     shown = orientations(dataset)
-    _, (tilt, _) = next(iter(shown.items()))
-    mean = secular(signals.seconds(dataset), tilt, level=True).at_start
-    table = np.stack([pair[0] - mean for pair in shown.values()], axis=1)
-    scale, unit = angle_scale(table)
-    hues = [AXIS_COLORS[name] for name in shown]
-    lines(axes, dataset, table / scale, [f"{name} axis" for name in shown], hues)
-    key(axes, f"Obliquity less its mean, {angle_text(mean, 7)}")
-    axes.set_ylabel(f"obliquity − mean [{unit}]")
+    table = np.stack([pair[0] for pair in shown.values()], axis=1)
+    title, label = "Obliquity", "obliquity"
+    if not _legible(table):
+        mean = secular(signals.seconds(dataset), table[:, 0], level=True).at_start
+        table = table - mean
+        title, label = f"Obliquity less its mean, {angle_text(mean, 7)}", "obliquity − mean"
+    _of_axes(axes, dataset, table, title, label)
 
 
 def longitude(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Longitudes of the node less the straight line through that of the first axis shown."""
-    shown = orientations(dataset)
+    """Longitudes of the node, less the straight line through that of the first axis shown unless they swing
+    as far about it as without it.
+    """
     seconds, axis = signals.seconds(dataset), time_axis_of(dataset)
-    _, (_, node) = next(iter(shown.items()))
-    trend = secular(seconds, node)
-    table = np.stack([pair[1] - trend.at(seconds) for pair in shown.values()], axis=1)
-    scale, unit = angle_scale(table)
-    hues = [AXIS_COLORS[name] for name in shown]
-    lines(axes, dataset, table / scale, [f"{name} axis" for name in shown], hues)
+    table = np.stack([pair[1] for pair in orientations(dataset).values()], axis=1)
+    trend = secular(seconds, table[:, 0])
+    rest = table - trend.at(seconds)[:, None]
+    if _legible(table) and np.ptp(rest[np.isfinite(rest)]) > _AS_FAR * np.ptp(table[np.isfinite(table)]):
+        _of_axes(axes, dataset, table, "Longitude of the node", "longitude")
+        return
     # precession is told by the year, whatever the axis of time is in
     per = axis.unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
     rate = angle_text(trend.rate * per.seconds, 3)
-    key(axes, f"Longitude of the node less its mean motion, {rate}/{per.symbol}")
-    axes.set_ylabel(f"longitude − line [{unit}]")
+    title = f"Longitude of the node less its mean motion, {rate}/{per.symbol}"
+    _of_axes(axes, dataset, rest, title, "longitude − line")
+
+
+def _legible(table: Array) -> bool:
+    """Whether ticks along angles (rows, n) tell their swings with few digits, nothing taken off."""
+    finite = table[np.isfinite(table)]
+    return bool(len(finite) and np.ptp(finite) >= _LEGIBLE * np.abs(finite).max())
+
+
+def _of_axes(axes: Axes, dataset: xarray.Dataset, table: Array, title: str, label: str) -> None:
+    """Draw an angle (rows, n), rad, of each axis shown."""
+    shown = orientations(dataset)
+    scale, unit = angle_scale(table)
+    hues = [AXIS_COLORS[name] for name in shown]
+    lines(axes, dataset, table / scale, [f"{name} axis" for name in shown], hues)
+    key(axes, title)
+    axes.set_ylabel(f"{label} [{unit}]")
 
 
 def orientations(dataset: xarray.Dataset) -> dict[str, tuple[Array, Array]]:
