@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.accuracy.braking import forecast_pace
 from rigidsim.accuracy.choice import chosen
 from rigidsim.accuracy.error_law import (
     attitude_error,
@@ -76,7 +77,8 @@ def plan(
     pilot = timed_pilot(prepared, corrected, pilot_seconds)
     step = math.ldexp(pilot.step, prepared.system.scaling.time)
     duration = float(prepared.scene.samples.last - prepared.scene.start)
-    steps = max(1.0, duration / step)
+    pace = forecast_pace(prepared, pilot)
+    steps = max(1.0, duration / step * (pace or 1.0))
     samples = prepared.clock.count
     room = storage(prepared, Path(out) / prepared.scene.name)
     seconds_per_sample = _seconds_per_sample(prepared, parts.corrected, parts.evaluator, room.row)
@@ -132,6 +134,7 @@ def plan(
         },
         "predicted": {
             "steps": steps,
+            "pace": pace,
             "integration_seconds": integrate,
             "recording_seconds": record,
             "total_seconds": compile_seconds + integrate + record,

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from rigidsim.accuracy.braking import forecast_pace
 from rigidsim.accuracy.models.level import CHEAPEST_FIRST, LevelChoice
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.motion import Pilot, run_pilot
@@ -75,5 +76,5 @@ def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seco
 def _cost(prepared: InitialValueProblem) -> dict[str, float]:
     """Steps and seconds of the whole integration."""
     pilot = timed_pilot(prepared, assemble(prepared).corrected, _PILOT_SECONDS)
-    steps = math.ceil(pilot.whole)
+    steps = math.ceil(pilot.whole * (forecast_pace(prepared, pilot) or 1.0))
     return {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}

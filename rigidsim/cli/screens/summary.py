@@ -242,13 +242,21 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     print_levels(plan["levels"], on)
     if plan["accuracy"] is not None:
         on.line("chosen", f"{plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
+    first = "" if predicted["pace"] == 1 else " at first"
     on.line(
         "forecast",
-        f"{predicted['steps']:.3g} steps of about {span_text(pilot['step'])} "
+        f"{predicted['steps']:.3g} steps of about {span_text(pilot['step'])}{first} "
         f"(pilot of {pilot['steps']:.0f}), {span_text(predicted['total_seconds'])}, "
         f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
         f"timeline {size(predicted['timeline_bytes'])}",
     )
+    if predicted["pace"] is None:
+        on.line(
+            "", "at the pace of the start, which torques change: fewer steps where they brake the rotation"
+        )
+    elif predicted["pace"] != 1:
+        told = f"{predicted['pace']:.2g} times as many a second as at first"
+        on.line("", f"torques change the rotation: steps are {told}, on average")
     for warning in plan["warnings"]:
         on.line("warning", warning, "bold red")
     error = predicted["attitude_error_rad"]

@@ -31,6 +31,7 @@ _STEP = 0.05  # of the time in which P or Q change by their own size
 _STABLE = 1.0  # of the inverse rate of what has decayed
 _NEGLIGIBLE = 1e-7  # of the momentum: a wobble that no longer sets the step
 _NEAR = 1e-3  # of a step, to which the time at which the separatrix is reached is told
+_NOTHING = 1e-150  # of the momentum at the start, whose square doubles still hold
 _MOST_STEPS = 20_000
 _EXAMINED = 400  # places along the course
 _GRID = 512  # amplitudes over a turn; harmonics of dn fall like e^(-0.14 j) up to ``PARAMETER``
@@ -245,6 +246,9 @@ def _followed(
     while time < end:
         first = rate(now)
         size = float(np.linalg.norm(now))
+        if size < _NOTHING * float(np.linalg.norm(amplitudes[0])):
+            failure = "the torques bring the body to rest"
+            break
         relative = np.abs(first) / np.maximum(np.abs(now), _NEGLIGIBLE * size)
         speed = np.where(np.abs(now) > _NEGLIGIBLE * size, relative / _STEP, relative / _STABLE)
         fastest = max(fastest, float(np.linalg.norm(first)) / size, float(relative.max()))
