@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import field
 
 from rigidsim.scene.records import dataclass
-from rigidsim.solve.neighbours.pushed import Spread
+from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.trail import Waypoints

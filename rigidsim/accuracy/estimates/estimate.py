@@ -22,7 +22,7 @@ from rigidsim.accuracy.estimates.following import follow, leading
 from rigidsim.accuracy.estimates.growth import exponential_growth, power_of_time
 from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
 from rigidsim.scene.records import dataclass
-from rigidsim.solve.neighbours.pushed import Spread
+from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.trail import SampleTrail, Waypoints

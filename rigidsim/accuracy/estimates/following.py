@@ -26,7 +26,8 @@ from rigidsim.solve.neighbours.lanes import (
     OwnLanes,
     borrowed,
 )
-from rigidsim.solve.neighbours.pushed import Neighbours, Spread
+from rigidsim.solve.neighbours.pushed import Neighbours
+from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.trail import Waypoint
 
 
