@@ -170,8 +170,12 @@ def closing_words(
         middle = float(state[0][prepared.system.states.index("theta")])
         text += (
             f"; the middle Euler angle theta = {middle:.9g} rad came within {abs(float(factors[0])):.2g} of "
-            f'the singularity of {prepared.system.sequence}: choose formulation = "quaternion"'
+            f"the singularity of {prepared.system.sequence}"
         )
+        if progress.status is Status.NON_FINITE and prepared.precision.name == "single":
+            # they go with the distance to the power of the order, and some
+            text += ", where coefficients of the series exceed the range of single precision (3.4e38)"
+        text += ': choose formulation = "quaternion"'
     else:
         if any(load.roots(prepared.system.mechanics) for load in prepared.system.plan.loads):
             text += (

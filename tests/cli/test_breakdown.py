@@ -64,6 +64,7 @@ def test_euler_angles_break_down_in_their_singularity(
     assert "the middle Euler angle theta = 1.570" in message
     assert "of the singularity of xyz" in message
     assert 'choose formulation = "quaternion"' in message
+    assert ("exceed the range of single precision" in message) == (precision == "single")
     assert (
         f"last good state at {summary['engine_time']:.9g} s after {summary['cost']['steps']} steps" in message
     )
