@@ -201,23 +201,15 @@ def _disturbed(
 
 
 def _workers(pid: int) -> list[int]:
-    """Worker processes of a sweep, and the server process whose children they are."""
-    servers = [child for child in _children(pid) if _is_server(child)]
-    return [process for server in servers for process in (*_children(server), server)]
-
-
-def _children(pid: int) -> list[int]:
-    try:
-        return [int(text) for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    except OSError:
-        return []
-
-
-def _is_server(pid: int) -> bool:
-    try:
-        return b"forkserver" in Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return False
+    """Worker processes of a sweep."""
+    found = []
+    for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        try:
+            if b"spawn_main" in Path(f"/proc/{text}/cmdline").read_bytes():
+                found.append(int(text))
+        except OSError:
+            continue
+    return found
 
 
 @contextmanager

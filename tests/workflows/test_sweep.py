@@ -602,11 +602,13 @@ def test_workers_get_ready_before_the_check_and_end_with_a_refusal(tmp_path: Pat
         patch.setattr("rigidsim.workflows.sweeps.sweep.Workers", Noted)
         assert swept(tmp_path, workers=2).finished
         tiles = ["leave_tile"] * 3
-        assert done == ["pool of 2", "get_ready", "get_ready", "check", *tiles, "shutdown"]
+        begun = ["get_imported"] * min(2, os.cpu_count() or 1)
+        assert done == ["pool of 2", *begun, "get_ready", "get_ready", "check", *tiles, "shutdown"]
         done.clear()
         with pytest.raises(ConfigError, match="bad"):
             swept(tmp_path, CONFIG + SWEEP.replace("tile = 2", "tile = 7"), workers=9, force=True)
-        assert done == ["pool of 6", *["get_ready"] * 6, "check", "shutdown"]
+        begun = ["get_imported"] * min(9, os.cpu_count() or 1)
+        assert done == ["pool of 9", *begun, *["get_ready"] * 6, "check", "shutdown"]
         assert not any(place.exists() for place in Noted.places)
 
 

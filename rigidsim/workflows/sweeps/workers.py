@@ -7,19 +7,18 @@ rest for ever; what fits one write (``PIPE_BUF``, at least 512 bytes) arrives wh
 
 from __future__ import annotations
 
-import itertools
 import multiprocessing
 import os
 import shutil
 import signal
 import tempfile
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
-from multiprocessing import forkserver
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -34,15 +33,13 @@ T = TypeVar("T")
 _MOST_DEATHS = 5
 """Deaths of workers after which a tile is given up; each counts against all tiles in work."""
 _WATCH_SECONDS = 1.0
-_IMPORTED = "rigidsim.workflows.sweeps.members"
-"""What the server imports, so that its copies have it."""
 
 
 class Workers:
     """Worker processes that compute tiles, which this process saves.
 
-    What they need is imported from when the context is entered, beside this process's own imports, and traced
-    and compiled while this process still checks; this module itself imports next to nothing.
+    They are started as soon as the context is entered, and import, trace and compile while this process still
+    imports, reads and checks; this module itself imports next to nothing.
 
     Args:
         count: number of processes.
@@ -57,14 +54,21 @@ class Workers:
     def __enter__(self) -> Workers:
         folder = tempfile.TemporaryDirectory(prefix="rigidsim-tiles-")
         self._between = Path(self._ended.enter_context(folder))
+        self._ahead = self._pool(self.count, self._between)
         self._ended.callback(self._end_unused)
-        forkserver.set_forkserver_preload([_IMPORTED])
-        forkserver.ensure_running()
+        self._submit_ahead(min(self.count, os.cpu_count() or 1), get_imported)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ended.close()
         self._between = None
+
+    def _submit_ahead(self, times: int, function: Callable[..., None], *of: Any) -> None:
+        """Have each worker do what tiles will need; whatever goes wrong is told when they need it."""
+        with suppress(BrokenProcessPool):
+            for _ in range(times):
+                if self._ahead is not None:
+                    self._ahead.submit(function, *of)
 
     def _end_unused(self) -> None:
         pool, self._ahead = self._ahead, None
@@ -75,12 +79,7 @@ class Workers:
     def ready_for(self, sweep: Sweep) -> Iterator[None]:
         """See ``Way``."""
         with nullcontext() if self._between is not None else self:
-            assert self._between is not None
-            count = min(self.count, sweep.count)
-            self._ahead = self._pool(count, self._between)
-            with suppress(BrokenProcessPool):  # whatever goes wrong is told when tiles need it
-                for _ in range(count):
-                    self._ahead.submit(get_ready, sweep.experiment.text)
+            self._submit_ahead(min(self.count, sweep.count), get_ready, sweep.experiment.text)
             yield
 
     def each(self, function: Callable[[S], T], tasks: Sequence[S]) -> Iterable[T]:
@@ -105,29 +104,29 @@ class Workers:
     ) -> Iterator[tuple[int, bytes]]:
         from rigidsim.workflows.sweeps.ways import task
 
-        names = itertools.count()
         waiting = list(reversed(tiles))
         deaths: Counter[int] = Counter()
         while waiting:
             pool, self._ahead = self._ahead or self._pool(min(self.count, len(waiting)), between), None
-            running: dict[Future[int], tuple[int, Path]] = {}
+            running: dict[Future[int], int] = {}
             try:
                 while waiting or running:
                     while waiting and len(running) < 2 * self.count:  # one task ahead for each worker
                         tile = waiting[-1]  # keeps waiting if the pool broke just now and takes no more
-                        file = between / str(next(names))  # given to nobody else, whoever still lives
-                        running[pool.submit(leave_tile, file, *task(generation, tile))] = tile, file
+                        file = between / str(tile)
+                        running[pool.submit(leave_tile, file, *task(generation, tile))] = tile
                         waiting.pop()
                     done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
                     if not done:
                         _refuse_dead(pool)
                     for future in done:
                         future.result()
-                        tile, file = running.pop(future)
+                        tile = running.pop(future)
+                        file = between / str(tile)
                         yield tile, file.read_bytes()
                         file.unlink()
             except BrokenProcessPool:
-                lost = [tile for tile, _ in running.values()]
+                lost = list(running.values())
                 deaths.update(lost or waiting[-1:])
                 _refuse_deadly(generation, deaths)
                 waiting += sorted(lost, reverse=True)
@@ -137,9 +136,9 @@ class Workers:
     def _pool(self, count: int, between: Path) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(
             count,
-            mp_context=multiprocessing.get_context("forkserver"),
+            mp_context=multiprocessing.get_context("spawn"),
             initializer=_begin_worker,
-            initargs=(between,),
+            initargs=(os.getpid(), between),
         )
 
 
@@ -154,8 +153,13 @@ def _rest_here(function: Callable[[S], T], tasks: Sequence[S], given: Iterable[T
 
 
 def started(count: int) -> AbstractContextManager[Workers | int]:
-    """Workers whose imports have begun, for commands that have yet to import; 1 if one process is enough."""
+    """Workers that are started already, for commands that have yet to import; 1 if one process is enough."""
     return Workers(count) if count > 1 else nullcontext(1)
+
+
+def get_imported() -> None:
+    """Import what tiles need."""
+    import rigidsim.workflows.sweeps.members  # noqa: F401
 
 
 def get_ready(config: str) -> None:
@@ -206,19 +210,16 @@ def _end(pool: ProcessPoolExecutor) -> None:
         process.join(5)
 
 
-def _begin_worker(between: Path) -> None:
-    """Initialize a worker: ignore Ctrl-C, which is for the parent, and end when parent or server end,
-    however it does.
+def _begin_worker(parent: int, between: Path) -> None:
+    """Initialize a worker: ignore Ctrl-C, which is for the parent, and end when the parent ends, however it
+    does.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent, server = multiprocessing.parent_process(), os.getppid()
-    assert parent is not None
 
     def watch() -> None:
-        while parent.is_alive() and os.getppid() == server:
-            parent.join(_WATCH_SECONDS)
-        if not parent.is_alive():
-            shutil.rmtree(between, ignore_errors=True)  # a parent that was killed can't do this itself
+        while os.getppid() == parent:
+            time.sleep(_WATCH_SECONDS)
+        shutil.rmtree(between, ignore_errors=True)  # a parent that was killed can't do this itself
         os._exit(1)
 
     threading.Thread(target=watch, name="rigidsim watch", daemon=True).start()
