@@ -75,7 +75,7 @@ class Generation:
         length: members per tile.
         works: works in order; tiles are numbered through them.
         apart: whether all members run one by one though some might share equations, as was found when the
-            sweep was begun; None if an earlier version began it.
+            sweep was begun; None if that wasn't asked.
     """
 
     number: int

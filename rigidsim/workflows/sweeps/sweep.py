@@ -265,7 +265,7 @@ def _apart(wanted: Sweep, generations: Sequence[Generation]) -> bool | None:
     """See ``Generation``: as it was found first, so that more members don't change those that are there."""
     if generations:
         return generations[0].apart
-    return not why_alone(wanted, wanted.table.keep) and batches_of(wanted.experiment.text).apart is not None
+    return None if why_alone(wanted, ()) else batches_of(wanted.experiment.text).apart is not None
 
 
 def _run_tiles(
