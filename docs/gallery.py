@@ -12,6 +12,7 @@ import io
 import re
 import sys
 import tempfile
+import textwrap
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ CONFIGS = [
 _DOTS_PER_INCH = 100
 _COLOURS = 256  # of a picture's palette
 _TIMELINE_WIDTH = 1200
+_WIDTH = 140  # of a line of text
+_JOINED = "\0"
 _COLUMNS = (
     "config",
     "states",
@@ -174,7 +177,16 @@ def page(rows: list[list[str]]) -> str:
         parts.append(f"**`{name}`**: {what}.")
         if figure:
             parts.append(f"![{what}](../experiments/figures/{figure}.png)")
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(_wrapped(part) for part in parts) + "\n"
+
+
+def _wrapped(part: str) -> str:
+    """A paragraph in lines as long as those of other pages; anything else as it is."""
+    if part.startswith(("<!--", "#", "```", "![")):
+        return part
+    # a dash or a sum must not begin a line, which would make a list of it
+    kept = re.sub(r" (?=[-+*] )", _JOINED, part)
+    return textwrap.fill(kept, _WIDTH, break_long_words=False, break_on_hyphens=False).replace(_JOINED, " ")
 
 
 def main(given: list[str]) -> None:
