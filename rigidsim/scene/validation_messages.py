@@ -190,6 +190,19 @@ def _of_how_many(table: type[BaseModel] | None, location: tuple[str | int, ...])
     return ""
 
 
+def _of_the_user(
+    location: tuple[str | int, ...], alternatives: Collection[str]
+) -> tuple[str | int, ...]:
+    """A location without the names of alternatives; what stands in one is a key, even one of such a name."""
+    found: list[str | int] = []
+    within = False
+    for part in location:
+        within = part in alternatives and not within
+        if not within:
+            found.append(part)
+    return tuple(found)
+
+
 def config_error(
     model: type[BaseModel], error: ValidationError, alternatives: Collection[str]
 ) -> ConfigError:
@@ -201,7 +214,7 @@ def config_error(
     problems: dict[str, Problem] = {}
     for item in islice(error.errors(include_url=False), _MOST_PROBLEMS):
         # the alternatives of a union each report; their names are no part of the user's key
-        location = tuple(part for part in item["loc"] if part not in alternatives)
+        location = _of_the_user(item["loc"], alternatives)
         given = item["input"]
         if item["type"].startswith("union_tag"):  # a table told apart by its kind: the key at fault is kind
             location = (*location, "kind")
