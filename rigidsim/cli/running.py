@@ -91,7 +91,8 @@ def print_run(result: Run, as_json: bool) -> int:
 def _scanned(experiments: list[Experiment], scan: list[str], out: Path, *, force: bool, as_json: bool) -> int:
     """Sweep each config over the axes that ``--sweep`` gives; returns the exit code."""
     from rigidsim.cli.screens.sweeps import observer, print_sweep
-    from rigidsim.workflows.sweeps.sweep import scanned, sweep
+    from rigidsim.workflows.sweeps.scan import scanned
+    from rigidsim.workflows.sweeps.sweep import sweep
 
     worst = 0
     for experiment in experiments:

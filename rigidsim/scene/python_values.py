@@ -52,7 +52,10 @@ def assignments_of(changes: Mapping[str, Any]) -> list[str]:
     found = []
     for key, value in changes.items():
         if isinstance(value, Mapping):
-            found += assignments_of({f"{key}.{_key(inner)}": given for inner, given in value.items()})
+            mark = '"' if key == "sweep.axes" else ""  # whose keys are dotted themselves
+            found += assignments_of(
+                {f"{key}.{mark}{_key(inner)}{mark}": given for inner, given in value.items()}
+            )
         else:
             found.append(f"{_key(key)}={_inline(value, str(key))}")
     return found

@@ -61,7 +61,9 @@ class AxisTable(ConfigTable):
         description="for sphere: numbers of polar angles (equally spaced in their cosine) and azimuths",
     )  # fmt: skip
     name: StrictStr | None = Field(
-        default=None, description="name of the dimension; by default the last part of the key"
+        default=None,
+        description="name of the dimension; by default the last part of the key, or the whole key where the "
+        "last part is the name of something recorded",
     )
 
     @model_validator(mode="after")

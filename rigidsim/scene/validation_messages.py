@@ -190,9 +190,7 @@ def _of_how_many(table: type[BaseModel] | None, location: tuple[str | int, ...])
     return ""
 
 
-def _of_the_user(
-    location: tuple[str | int, ...], alternatives: Collection[str]
-) -> tuple[str | int, ...]:
+def _of_the_user(location: tuple[str | int, ...], alternatives: Collection[str]) -> tuple[str | int, ...]:
     """A location without the names of alternatives; what stands in one is a key, even one of such a name."""
     found: list[str | int] = []
     within = False

@@ -120,6 +120,11 @@ CASES: dict[str, tuple[dict[str, str | None], str, list[str]]] = {
         "[[loads]] number 1 acceleraton",
         ['did you mean "acceleration"?'],
     ),
+    "load key called like a kind": (
+        {"loads": 'kind = "torque"\ncomponents = [1, 0, 0]\ntorque = [1, 0, 0]'},
+        "[[loads]] number 1 torque",
+        ["unknown key", "allowed: components"],
+    ),
     "point key unknown": (
         {"body": "points = [{mass = 1, position = [0, 0, 1], charge = 1}]"},
         "[body] points[0].charge",

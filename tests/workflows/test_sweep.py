@@ -36,7 +36,8 @@ from rigidsim.store.sweeps.generation import Work, ranges_of
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.members import batches_of, get_ready, run_members, sweep_of
-from rigidsim.workflows.sweeps.sweep import resume_sweep, scanned
+from rigidsim.workflows.sweeps.scan import scanned
+from rigidsim.workflows.sweeps.sweep import resume_sweep
 from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep
 from rigidsim.workflows.sweeps.ways import task
@@ -474,6 +475,12 @@ def test_a_quick_scan() -> None:
     assert ways == ["values", "linspace"]
     with pytest.raises(ConfigError, match="write KEY=SPEC"):
         scanned(base, ["time.end"])
+    drawn = scanned(base, ["time.end=uniform(1, 2, 5)", "initial.angular_velocity=sphere('1 deg/s', 7)"])
+    assert drawn.config.sweep is not None
+    assert [axis.count for axis in drawn.config.sweep.axes.values()] == [5, 7]
+    for spec in ("5", "foo(1, 2)", "1, 2", "linspace(1 s, 2 s, 3)"):
+        with pytest.raises(ConfigError, match=r"--sweep time\.end=.*given .*allowed: \[1, 2, 4\], linspace"):
+            scanned(base, [f"time.end={spec}"])
 
 
 def test_plan_and_check_know_sweeps(tmp_path: Path) -> None:

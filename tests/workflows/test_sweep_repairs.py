@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,8 @@ import pytest
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.scene.overrides import apply_overrides
 from rigidsim.solve.problem import prepare
-from rigidsim.store.sweeps.run import SavedSweep
+from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.sweep import SweepObserver
 from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
@@ -134,6 +137,37 @@ def test_fewer_events_kept_than_before_are_fewer(tmp_path: Path) -> None:
     assert fewer.flip_times.sizes["flip_occurrence"] == 1
     assert fewer.flip_count.max() > 1
     np.testing.assert_array_equal(fewer.flip_times[:, 0], fewer.flip_first)
+
+
+def test_the_rate_is_that_of_the_session_at_work(out: Path) -> None:
+    """Two members in 100 seconds; two other tiles are an hour older."""
+    (out / "box" / "dataset.h5").unlink()
+    (out / "box" / "summary.json").unlink()
+    now = time.time()
+    for number, age in enumerate((3600, 3599, 0)):
+        os.utime(out / "box" / "tiles" / f"g000-{number:07d}.h5", (now - age, now - age))
+    os.utime(out / "box" / "tiles" / "g000.json", (now - 100, now - 100))
+    with SweepFolder(out / "box").locked():
+        found = open_sweep(out / "box").summary
+    assert found["status"] == "running"
+    assert 0.01 < found["members_per_second"] <= 0.02
+    begun = (out / "box" / "tiles" / "g000.json").stat().st_mtime
+    swept(out)
+    assert (out / "box" / "tiles" / "g000.json").stat().st_mtime > begun
+
+
+def test_shares_need_tiles_of_a_length_that_is_told(tmp_path: Path) -> None:
+    many = CONFIG.replace("tile = 2\n", "").replace("0.1, 6]", "0.01, 65]")
+    with pytest.raises(ConfigError, match=r"\[sweep\] tile: missing.*tile = 64"):
+        run_sweep(parse(many), out=tmp_path, tiles=(0, 1))
+    assert not list(tmp_path.iterdir())
+
+
+def test_axes_can_be_given_as_dictionaries(tmp_path: Path) -> None:
+    axes = {"time.end": {"values": [1, 2, 3]}, "initial.angular_velocity": {"sphere": 1, "count": 2}}
+    changes = {"sweep": {"tile": 100, "axes": axes}}
+    found = run_sweep(parse(CONFIG.partition("[sweep]")[0]), out=tmp_path, changes=changes)
+    assert found.dataset.status.dims == ("end", "initial_angular_velocity")
 
 
 REFUSED = {

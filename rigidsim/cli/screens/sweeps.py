@@ -120,6 +120,8 @@ def print_sweep(result: SavedSweep) -> None:
             )
         elif "tiles" in told:
             screen.print(f"tiles    {told['tiles_done']:,} of {told['tiles']:,}", highlight=False)
+        if result.status == "interrupted":
+            screen.print(escape(f"next     rigidsim resume {shlex.quote(result.place)}"), highlight=False)
         return
     shape = " x ".join(f"{name} {size:,}" for name, size in told["shape"].items())
     screen.print(f"axes     {shape}", highlight=False)

@@ -34,12 +34,16 @@ class NamedAxis(Protocol):
 
 
 def axis_name(key: str, given: str | None) -> str:
-    """The name of an axis: the one given, or the last part of its key.
+    """The name of an axis: the one given, or the last part of its key; all of it where the last part is the
+    name of something recorded, such as ``initial_angular_velocity``.
 
     Raises:
         ValueError: it can't name a dimension.
     """
-    name = re.sub(r"\[(\d+)\]", r"_\1", key.rpartition(".")[2]).strip("\"'") if given is None else given
+    name = given
+    if name is None:
+        parts = [re.sub(r"\[(\d+)\]", r"_\1", part).strip("\"'") for part in key.split(".")]
+        name = "_".join(parts) if parts[-1] in OBSERVABLES else parts[-1]
     if not _NAME.fullmatch(name):
         raise ValueError(
             f"given the name {shown(name)}; allowed: letters, digits and underscores, beginning with a letter"

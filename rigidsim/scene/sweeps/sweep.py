@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from functools import cached_property, lru_cache
 
-from rigidsim.errors import ConfigError, MemberError, Problem
+from rigidsim.errors import ConfigError, MemberError, Problem, either
 from rigidsim.scene.config import Experiment, parse, validated
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import apply_overrides, key_steps
@@ -20,6 +20,7 @@ from rigidsim.scene.sweeps.values import AxisValues, axis_values, nearest_double
 from rigidsim.scene.toml_text import parse_toml
 
 MOST_MEMBERS = 100_000_000
+_ASKED = either("is asked for with rigidsim run --sweep KEY=SPEC", "changes={'sweep': {...}} adds one")
 _SAME_FOR_ALL = {
     "name": "the sweep has one name",
     "description": "the sweep has one description",
@@ -88,7 +89,7 @@ class Sweep:
         """
         table = experiment.config.sweep
         if table is None:
-            what = "missing; a sweep has one, or is asked for with --sweep KEY=SPEC"
+            what = f"missing; a sweep has one, or {_ASKED}"
             raise ConfigError(Problem("[sweep]", what), experiment.source)
         problems: list[Problem] = []
         axes = []

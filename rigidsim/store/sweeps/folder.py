@@ -80,7 +80,7 @@ class SweepFolder(WorkFolder):
             The generation that is stored.
         """
         self.tiles.mkdir(parents=True, exist_ok=True)
-        path = self.tiles / f"g{generation.number:03d}.json"
+        path = self.generation_file(generation)
         if exclusive:
             mine = self.tiles / f".{path.name}.{secrets.token_hex(8)}.{os.getpid()}.partial"
             mine.write_text(generation.as_text(), encoding="utf-8")
@@ -94,6 +94,10 @@ class SweepFolder(WorkFolder):
             atomic.write_bytes(path, generation.as_text().encode())
         atomic.write_bytes(self.config, generation.config.encode())
         return generation
+
+    def generation_file(self, generation: Generation) -> Path:
+        """Path of a generation; a session that begins to work on it makes the time of its file its own."""
+        return self.tiles / f"g{generation.number:03d}.json"
 
     def tile(self, generation: Generation, tile: int) -> Path:
         """Path of a tile."""

@@ -12,6 +12,7 @@ from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.records import dataclass
 from rigidsim.store.seal import check_whole
 from rigidsim.store.sweeps.folder import SweepFolder
+from rigidsim.store.sweeps.generation import Generation
 
 if TYPE_CHECKING:
     import xarray
@@ -103,7 +104,7 @@ def so_far(folder: SweepFolder) -> dict[str, Any]:
     done = int(sum(len(latest.members_of(int(t))) for t in np.flatnonzero(present)))
     status = "running" if busy else ("interrupted" if not ended else summary.get("status", "interrupted"))
     words = "a process is at work on it" if busy else "the tiles that are complete are kept"
-    rate = _rate(folder, latest.number, latest.length) if busy else None
+    rate = _rate(folder, latest) if busy else None
     left = latest.members - done
     return {
         "kind": "sweep",
@@ -121,10 +122,14 @@ def so_far(folder: SweepFolder) -> dict[str, Any]:
     }
 
 
-def _rate(folder: SweepFolder, generation: int, length: int) -> float | None:
-    """Members per second, from the times at which the latest tiles were written."""
-    times = sorted(path.stat().st_mtime for path in folder.tiles.glob(f"g{generation:03d}-*.h5"))[-_RECENT:]
+def _rate(folder: SweepFolder, generation: Generation) -> float | None:
+    """Members per second of the session that is at work, from the times at which its latest tiles were
+    written.
+    """
+    begun = folder.generation_file(generation).stat().st_mtime
+    written = (path.stat().st_mtime for path in folder.tiles.glob(f"g{generation.number:03d}-*.h5"))
+    times = sorted([begun, *(when for when in written if when > begun)])[-_RECENT:]
     if len(times) < 2:
         return None
     span = max(time.time(), times[-1]) - times[0]
-    return length * (len(times) - 1) / span if span > 0 else None
+    return generation.length * (len(times) - 1) / span if span > 0 else None

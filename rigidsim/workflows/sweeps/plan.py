@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.batch.lanes import recommended_width
@@ -26,6 +27,22 @@ _LARGEST_TILE_BYTES = 64e6
 _BUILD_SECONDS = 0.2  # seconds to compile equations for each member that runs by itself
 _BATCH_SECONDS = 2e-5  # seconds of overhead per member of a batch besides its integration
 _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one without
+
+
+def refuse_untold_tiles(sweep: Sweep) -> None:
+    """Refuse shares of tiles whose number depends on how fast a machine is.
+
+    Raises:
+        ConfigError: ``[sweep] tile`` is missing.
+    """
+    if sweep.table.tile is None and sweep.count > _FEW:
+        length = max(_FEW, sweep.count // 1000)
+        what = (
+            f"missing, and {either('--tiles needs', 'tiles=(...) needs')} it: otherwise the number of tiles "
+            "depends on how fast a machine is, and shares could miss some; give the number of members of a "
+            f"tile, such as tile = {length}"
+        )
+        raise ConfigError(Problem("[sweep] tile", what), sweep.experiment.source)
 
 
 def tile_length(sweep: Sweep) -> int:

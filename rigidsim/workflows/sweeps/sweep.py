@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import re
+import os
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
-from rigidsim.scene.config import Experiment
+from rigidsim.errors import FORCE, OUT, ConfigError, RunFolderError
 from rigidsim.scene.overrides import apply_overrides
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import parse_toml
@@ -25,7 +23,7 @@ from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import SweepCheck
 from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
-from rigidsim.workflows.sweeps.plan import tile_length
+from rigidsim.workflows.sweeps.plan import refuse_untold_tiles, tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
 from rigidsim.workflows.sweeps.ways import OneProcess, Way
 from rigidsim.workflows.sweeps.workers import Workers
@@ -90,34 +88,6 @@ def sweep(
     )
 
 
-_CALL = re.compile(r"\s*(linspace|logspace|step)\s*\((.*)\)\s*")
-
-
-def scanned(experiment: Experiment, scan: Sequence[str]) -> Experiment:
-    """An experiment with additional sweep axes.
-
-    Args:
-        scan: ``KEY=SPEC`` texts: a TOML array of values, ``linspace(from, to, count)``, ``logspace(..)``,
-            ``step(from, step, count)``, or a TOML table as ``[sweep] axes`` has it.
-
-    Raises:
-        ConfigError: a text can't be read.
-    """
-    settings = []
-    for text in scan:
-        key, equals, spec = text.partition("=")
-        if not equals or not key.strip() or not spec.strip():
-            what = "write KEY=SPEC, such as time.end=[1, 2, 4] or body.mass=linspace(0, 1, 11)"
-            raise ConfigError(Problem(f"--sweep {text[:60]}", what))
-        call = _CALL.fullmatch(spec)
-        if call is not None:
-            spec = f"{{{call[1]} = [{call[2]}]}}"
-        elif spec.strip().startswith("["):
-            spec = f"{{values = {spec.strip()}}}"
-        settings.append(f'sweep.axes."{key.strip()}"={spec.strip()}')
-    return experiment.having(settings)
-
-
 def resume_sweep(
     path: str | Path,
     *,
@@ -162,6 +132,8 @@ def run_sweep(
     """See ``sweep``."""
     if share is not None and force:
         raise RunFolderError(f"{FORCE} is for a sweep as a whole, and its tiles are computed by others, too")
+    if share is not None and not folder.generations():
+        refuse_untold_tiles(wanted)
     observer.checking(wanted)
     began, cpu = time.perf_counter(), time.process_time()
     if _complete(wanted, folder) and not force:
@@ -283,6 +255,7 @@ def _run_tiles(
     members = sum(len(generation.members_of(tile)) for tile in ours) if share else generation.members
     done = members - sum(len(generation.members_of(tile)) for tile in missing)
     observer.started(folder.path, members, done)
+    os.utime(folder.generation_file(generation))
     axes = batches_of(generation.config).axes
     try:
         for tile, image in way.images(generation, missing):
