@@ -223,8 +223,8 @@ def _stable(course: Course, spread: Spread, longer: float, turned: float) -> flo
     prepared, epsilon = course.prepared, float(course.prepared.precision.epsilon)
     # where steps end on surfaces, the tolerance itself is the size of pushes
     level = prepared.law_tolerance if prepared.system.stepwise else epsilon
-    # neighbours of a short motion are pushed more often than it has steps, and once at the start
-    pushed = max(course.steps, spread.steps[-1] + 1)
+    # neighbours may take more steps than the run, of short motions above all, and are pushed at the start
+    pushed = max(course.steps, round(spread.steps[-1] * longer) + 1)
     # truncation errors may add up one by one, and what they do to the rates with them: n^2 / 2 of phase
     cut = epsilon * spread.cut[-1] * longer * math.hypot(1.0, turned / 2)
     return math.hypot(stable_law(level, pushed, turned, 1.0), cut)
