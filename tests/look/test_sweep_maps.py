@@ -100,3 +100,19 @@ def test_members_in_the_order_of_a_swept_number_are_joined_and_drawn_ones_are_no
         axis = xarray.DataArray(values, dims="member", attrs={"swept_key": "time.end"})
         [line] = sweep_figure(dataset.assign_coords(end=axis)).axes[0].lines
         assert (line.get_linewidth() > 0) == width
+
+
+def test_texts_and_vectors_are_told_at_their_ticks() -> None:
+    """Not at fractions of their numbers, and in titles and keys as values, too."""
+    bodies = np.array([[1, 2, 2.5], [1, 2, 3], [1, 1, 1]])
+    page = sweep_figure(members_of(push=np.arange(4.0), body=bodies), "energy_final")
+    ticks = page.axes[0].get_yticklabels()
+    assert [tick.get_text() for tick in ticks] == ["[1, 2, 2.5]", "[1, 2, 3]", "[1, 1, 1]"]
+    assert page.axes[1].get_ylim() == (1, 12)  # all colours: no value lies beyond
+    lines = sweep_figure(members_of(push=np.arange(9.0), body=bodies), "energy_final").axes[0].get_lines()
+    assert [line.get_label() for line in lines][1:] == ["body [1, 2, 3]", "body [1, 1, 1]"]
+    words = members_of(way=np.array(["quaternion", "rates"]), push=np.arange(8.0), k=np.arange(7.0))
+    assert "way = quaternion" in sweep_figure(words, "energy_final").axes[0].get_title(loc="left")
+    many = np.random.default_rng(0).normal(size=(40, 3))
+    page = sweep_figure(members_of(push=np.arange(12.0), body=many), "energy_final")
+    assert all(float(tick) == int(tick) for tick in page.axes[0].get_yticks())

@@ -12,9 +12,13 @@ from rigidsim.look.plots import pretty_unit
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axis import Axis
 
 Array = NDArray[np.float64]
 
+_MOST_TOLD = 12  # values that are told at their ticks
+_CROWDED = 60  # characters side by side
+_LONGEST = 24  # characters of a text
 _DECADES = 1.5  # from which on values of one sign have a logarithmic scale
 
 
@@ -24,14 +28,25 @@ def axes_of(dataset: xarray.Dataset) -> list[str]:
     return names
 
 
-def label_of(variable: xarray.DataArray, dim: str, place: int) -> str:
+def label_of(dataset: xarray.Dataset, dim: str, place: int) -> str:
     """Label of one place along a dimension: the component x of a vector, or a value of an axis."""
-    if dim not in variable.coords:
+    told = value_text(dataset, dim, place)
+    if told is None:
         return str(place)
-    value = variable.coords[dim].values[place]
-    if np.asarray(value).dtype.kind == "f":  # of an axis of the sweep
-        return f"{dim.replace('_', ' ')} {value:.4g}"
-    return str(value)
+    return told if dataset[dim].dtype.kind not in "fi" else f"{dim.replace('_', ' ')} {told}"
+
+
+def value_text(dataset: xarray.Dataset, dim: str, place: int) -> str | None:
+    """The value at one place along a dimension: a number, a text or a vector; None if there is none."""
+    name = next((name for name in (f"{dim}_value", dim) if name in dataset.coords), None)
+    if name is None:
+        return None
+    value = dataset[name].values[place]
+    if np.ndim(value):
+        return f"[{', '.join(format(float(x), '.4g') for x in value)}]"
+    if dataset[name].dtype.kind in "fi":
+        return format(float(value), ".4g")
+    return str(value) if len(str(value)) <= _LONGEST else str(value)[: _LONGEST - 3] + "..."
 
 
 def along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
@@ -42,7 +57,31 @@ def along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
     for name, coordinate in dataset.coords.items():  # a zip's axes lie along its members
         if coordinate.dims == (dim,) and coordinate.dtype.kind == "f" and "swept_key" in coordinate.attrs:
             return np.asarray(coordinate.values, dtype=np.float64), named(coordinate, str(name))
-    return np.arange(dataset.sizes[dim], dtype=np.float64), f"{dim}, counted from 0"
+    return np.arange(dataset.sizes[dim], dtype=np.float64), _label(dataset, dim)
+
+
+def _label(dataset: xarray.Dataset, dim: str) -> str:
+    """Label of an axis whose values are numbered."""
+    name = next((name for name in (f"{dim}_value", dim) if name in dataset.coords), None)
+    if name is None or dataset.sizes[dim] > _MOST_TOLD:
+        return f"{dim.replace('_', ' ')}, counted from 0"
+    return named(dataset[name], dim)
+
+
+def number_ticks(axis: Axis, dataset: xarray.Dataset, dim: str) -> None:
+    """Ticks at whole numbers where an axis's values are texts or vectors, few of them with their values."""
+    place, label = along(dataset, dim)
+    if label != _label(dataset, dim) or (dim in dataset.coords and dataset[dim].dtype.kind in "fi"):
+        return
+    texts = [value_text(dataset, dim, i) for i in range(len(place))] if len(place) <= _MOST_TOLD else []
+    if not texts or texts[0] is None:
+        from matplotlib.ticker import MaxNLocator
+
+        axis.set_major_locator(MaxNLocator(8, integer=True))
+        return
+    crowded = axis.axis_name == "x" and sum(len(text or "") for text in texts) > _CROWDED
+    slanted = {"rotation": 25, "ha": "right", "rotation_mode": "anchor"} if crowded else {}
+    axis.set_ticks(place.tolist(), texts, **slanted)
 
 
 def named(variable: xarray.DataArray, name: str | None = None) -> str:

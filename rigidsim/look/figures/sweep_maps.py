@@ -23,8 +23,10 @@ from rigidsim.look.figures.sweep_axes import (
     geometric,
     label_of,
     named,
+    number_ticks,
     spans_decades,
     title_of,
+    value_text,
 )
 
 if TYPE_CHECKING:
@@ -41,6 +43,7 @@ _SECTION = "_occurrence"  # dimension of the points of a section
 _MOST_LINES = 16
 _FIRST = "_first"
 _FEW = 6  # values of a second axis up to which each has a line, and there is no map
+_MANY = 400  # values of which a few may lie beyond the colours
 _MOST_POINTS = 400_000
 
 
@@ -91,14 +94,14 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
             return _points(dataset, variable)
         axes, cut, said = _cut(dataset, variable)
         if component is not None:
-            cut, said = _component(cut, axes, component, said)
+            cut, said = _component(dataset, cut, axes, component, said)
         if len(axes) == 1 and directions(dataset, axes[0]) is not None:
             return _sphere(dataset, cut, axes[0], said)
         longest = max(axes, key=lambda dim: cut.sizes[dim])
         others = [dim for dim in axes if dim != longest]
         if len(axes) == 1 or min(cut.sizes[dim] for dim in axes) <= _FEW < cut.sizes[longest]:
             if others and set(map(str, cut.dims)) != set(axes):
-                cut, said = _component(cut, axes, 0, said)
+                cut, said = _component(dataset, cut, axes, 0, said)
             return _lines(dataset, cut, longest, said)
         return _map(dataset, cut, axes, said)
 
@@ -123,13 +126,14 @@ def _cut(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[list[str]
     said = []
     for dim in axes:
         if dim not in kept:
-            value = dataset[dim].values[0] if dim in dataset.coords else 0
-            said.append(f"{dim} = {value if isinstance(value, str) else format(float(value), '.4g')}")
+            said.append(f"{dim.replace('_', ' ')} = {value_text(dataset, dim, 0) or 0}")
             variable = variable.isel({dim: 0})
     return kept, variable, ", ".join(said)
 
 
-def _component(cut: xarray.DataArray, axes: list[str], index: int, said: str) -> tuple[xarray.DataArray, str]:
+def _component(
+    dataset: xarray.Dataset, cut: xarray.DataArray, axes: list[str], index: int, said: str
+) -> tuple[xarray.DataArray, str]:
     extra = [str(dim) for dim in cut.dims if dim not in axes]
     count = math.prod(cut.sizes[dim] for dim in extra)
     if index >= count:
@@ -137,7 +141,7 @@ def _component(cut: xarray.DataArray, axes: list[str], index: int, said: str) ->
     places = np.unravel_index(index, [cut.sizes[dim] for dim in extra]) if extra else ()
     words = [said] if said else []
     for dim, place in zip(extra, places, strict=True):
-        words.append(f"{dim.replace('_', ' ')} {label_of(cut, dim, int(place))}")
+        words.append(f"{dim.replace('_', ' ')} {label_of(dataset, dim, int(place))}")
         cut = cut.isel({dim: int(place)})
     return cut, ", ".join(words)
 
@@ -153,7 +157,7 @@ def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str)
     extra = [str(dim) for dim in cut.dims if dim != axis]
     labels = [
         " ".join(parts)
-        for parts in product(*([label_of(cut, d, i) for i in range(cut.sizes[d])] for d in extra))
+        for parts in product(*([label_of(dataset, d, i) for i in range(cut.sizes[d])] for d in extra))
     ]
     order = np.argsort(place, kind="stable")
     joined = _ordered(dataset, axis)
@@ -168,6 +172,7 @@ def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str)
     if values.shape[1] > _MOST_LINES:
         title += f" (the first {_MOST_LINES} of {values.shape[1]})"
     key(axes, title)
+    number_ticks(axes.xaxis, dataset, axis)
     axes.set_xlabel(label)
     axes.set_ylabel(named(cut))
     if spans_decades(place) and geometric(np.unique(place)):
@@ -194,7 +199,7 @@ def _ordered(dataset: xarray.Dataset, dim: str) -> bool:
 def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: str) -> Figure:
     extra = [str(dim) for dim in cut.dims if dim not in dims]
     if extra:  # one component at a time; another is asked for by its index
-        cut, said = _component(cut, dims, 0, said)
+        cut, said = _component(dataset, cut, dims, 0, said)
     figure = blank(dataset, 8.4, 6.0)
     axes = figure.add_subplot()
     (x, x_label), (y, y_label) = (along(dataset, dim) for dim in dims)
@@ -209,6 +214,8 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
     for log, setting in zip(logs, (axes.set_xscale, axes.set_yscale), strict=True):
         if log:
             setting("log")
+    for axis, dim in zip((axes.xaxis, axes.yaxis), dims, strict=True):
+        number_ticks(axis, dataset, dim)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     title = title_of(cut, said)
@@ -224,17 +231,18 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
 def _colours(values: Array) -> dict[str, Any]:
     """Scale of a map's colours: logarithmic if the values span decades, diverging if both signs occur.
 
-    A hundredth of the values at either end doesn't take the colours from all others.
+    Of many, a hundredth of the values at the ends doesn't take the colours from all others.
     """
     from matplotlib.colors import LogNorm
 
     finite = values[np.isfinite(values)]
     if not len(finite):
         return {"vmin": 0.0, "vmax": 1.0}
+    ends = [0.5, 99.5] if len(finite) >= _MANY else [0, 100]
     if spans_decades(values):
-        low, high = np.percentile(finite[finite > 0], [0.5, 99.5])
+        low, high = np.percentile(finite[finite > 0], ends)
         return {"norm": LogNorm(low, high)}
-    low, high = np.percentile(finite, [0.5, 99.5])
+    low, high = np.percentile(finite, ends)
     if high - low < 0.5 * np.ptp(finite) or low == high:  # few different values: all of them
         low, high = finite.min(), finite.max()
     return {"vmin": low, "vmax": high if high > low else low + 1.0}
@@ -251,7 +259,7 @@ def _extended(values: Array, scale: dict[str, Any]) -> str:
 def _sphere(dataset: xarray.Dataset, cut: xarray.DataArray, dim: str, said: str) -> Figure:
     extra = [str(other) for other in cut.dims if other != dim]
     if extra:
-        cut, said = _component(cut, [dim], 0, said)
+        cut, said = _component(dataset, cut, [dim], 0, said)
     figure = blank(dataset, 8.4, 4.8)
     values = np.asarray(cut.values, dtype=np.float64)
     scale = _colours(values)
@@ -283,7 +291,7 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
     rows = table.reshape(-1, table.shape[2])[::stride]
     style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
     if rows.shape[1] > 1:
-        first, second = (label_of(variable, rest[0], i) for i in (0, 1)) if len(rest) == 1 else ("0", "1")
+        first, second = (label_of(dataset, rest[0], i) for i in (0, 1)) if len(rest) == 1 else ("0", "1")
         axes.scatter(rows[:, 0], rows[:, 1], c=which, cmap="viridis", **style)
         axes.set_xlabel(f"{named(variable)}, {first}")
         axes.set_ylabel(f"{named(variable)}, {second}")
