@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -67,10 +68,15 @@ def limit_disk_cache() -> None:
     """Limit heyoka's cache on disk before anything is compiled; the least recently used code is dropped when
     it is full.
 
-    A limit that somebody has set, with ``heyoka.llvm_state.set_diskcache_limit``, is left as it is.
+    A limit that somebody has set, with ``heyoka.llvm_state.set_diskcache_limit``, is left as it is. Where the
+    cache can't be used, on a full disk for instance, compiled code isn't kept.
     """
-    if hy.llvm_state.get_diskcache_limit() == _HEYOKAS_LIMIT:
-        hy.llvm_state.set_diskcache_limit(DISK_LIMIT)
+    try:
+        if hy.llvm_state.get_diskcache_limit() == _HEYOKAS_LIMIT:
+            hy.llvm_state.set_diskcache_limit(DISK_LIMIT)
+    except RuntimeError as error:
+        hy.llvm_state.set_diskcache_enabled(False)
+        warnings.warn(f"compiled code isn't kept for the next process: {error}", RuntimeWarning, stacklevel=3)
 
 
 class CodeStore:

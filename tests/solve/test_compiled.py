@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import heyoka as hy
@@ -111,3 +115,21 @@ def test_the_cache_on_disk_stays_small_unless_somebody_set_its_limit() -> None:
             assert hy.llvm_state.get_diskcache_limit() == limit
     finally:
         hy.llvm_state.set_diskcache_limit(DISK_LIMIT)
+
+
+def test_a_cache_that_cannot_be_written_stops_no_run(tmp_path: Path) -> None:
+    """As on a full disk; a file in the cache's place does the same. The cache is chosen once per process."""
+    (tmp_path / "file").touch()
+    script = (
+        "import warnings, heyoka as hy\n"
+        "from rigidsim.solve.compiled import compiled_function\n"
+        "x = hy.make_vars('x')\n"
+        "with warnings.catch_warnings(record=True) as told:\n"
+        "    warnings.simplefilter('always')\n"
+        "    print(compiled_function([x * x], [x])([3.0])[0], [str(w.message) for w in told])\n"
+    )
+    cache = {"HEYOKA_CACHE_DIR": str(tmp_path / "file" / "cache")}
+    found = subprocess.run(
+        [sys.executable, "-c", script], env=os.environ | cache, capture_output=True, text=True, check=True
+    )
+    assert found.stdout.startswith("9.0 [\"compiled code isn't kept for the next process")
