@@ -68,20 +68,21 @@ def _label(dataset: xarray.Dataset, dim: str) -> str:
     return named(dataset[name], dim)
 
 
-def number_ticks(axis: Axis, dataset: xarray.Dataset, dim: str) -> None:
+def number_ticks(axis: Axis, dataset: xarray.Dataset, dim: str, *, along_x: bool) -> None:
     """Ticks at whole numbers where an axis's values are texts or vectors, few of them with their values."""
     place, label = along(dataset, dim)
     if label != _label(dataset, dim) or (dim in dataset.coords and dataset[dim].dtype.kind in "fi"):
         return
-    texts = [value_text(dataset, dim, i) for i in range(len(place))] if len(place) <= _MOST_TOLD else []
-    if not texts or texts[0] is None:
+    texts = [value_text(dataset, dim, i) or "" for i in range(len(place))] if len(place) <= _MOST_TOLD else []
+    if not any(texts):
         from matplotlib.ticker import MaxNLocator
 
         axis.set_major_locator(MaxNLocator(8, integer=True))
         return
-    crowded = axis.axis_name == "x" and sum(len(text or "") for text in texts) > _CROWDED
-    slanted = {"rotation": 25, "ha": "right", "rotation_mode": "anchor"} if crowded else {}
-    axis.set_ticks(place.tolist(), texts, **slanted)
+    axis.set_ticks(place.tolist(), texts)
+    if along_x and sum(map(len, texts)) > _CROWDED:
+        for tick in axis.get_ticklabels():
+            tick.set(rotation=25, ha="right", rotation_mode="anchor")
 
 
 def named(variable: xarray.DataArray, name: str | None = None) -> str:

@@ -172,7 +172,7 @@ def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str)
     if values.shape[1] > _MOST_LINES:
         title += f" (the first {_MOST_LINES} of {values.shape[1]})"
     key(axes, title)
-    number_ticks(axes.xaxis, dataset, axis)
+    number_ticks(axes.xaxis, dataset, axis, along_x=True)
     axes.set_xlabel(label)
     axes.set_ylabel(named(cut))
     if spans_decades(place) and geometric(np.unique(place)):
@@ -215,7 +215,7 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
         if log:
             setting("log")
     for axis, dim in zip((axes.xaxis, axes.yaxis), dims, strict=True):
-        number_ticks(axis, dataset, dim)
+        number_ticks(axis, dataset, dim, along_x=axis is axes.xaxis)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     title = title_of(cut, said)
