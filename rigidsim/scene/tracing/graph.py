@@ -59,6 +59,7 @@ class Graph:
     whole_values: list[int] = field(default_factory=list)
     guards: dict[Guard, None] = field(default_factory=dict)
     _known: dict[Any, int] = field(default_factory=dict)
+    _columns: list[frozenset[int]] = field(default_factory=list)
 
     def node(self, operation: str, arguments: tuple[Any, ...], value: Any) -> int:
         """Number of a node, new or known."""
@@ -85,6 +86,30 @@ class Graph:
 
     def _fraction(self, value: Fraction) -> Any:
         return self.context.mpf(value.numerator) / self.context.mpf(value.denominator)
+
+    def columns_of(self, node: int, *, whole: bool = False) -> frozenset[int]:
+        """The columns that a node depends on."""
+        for operation, arguments in self.nodes[len(self._columns) :]:
+            self._columns.append(self._columns_read(operation, arguments))
+        return self._columns_of_whole(node) if whole else self._columns[node]
+
+    def _columns_read(self, operation: str, arguments: tuple[Any, ...]) -> frozenset[int]:
+        if operation == "column":
+            return frozenset(arguments)
+        if operation == "constant":
+            return frozenset()
+        if operation == "power_of_two":
+            return self._columns_of_whole(arguments[0])
+        nodes = {"power": arguments[:1], "call": arguments[1:]}.get(operation, arguments)
+        return frozenset().union(*(self._columns[node] for node in nodes))
+
+    def _columns_of_whole(self, node: int) -> frozenset[int]:
+        operation, arguments = self.wholes[node]
+        if operation == "constant":
+            return frozenset()
+        if operation in ("exponent", "magnitude"):
+            return self._columns[arguments[0]]
+        return frozenset().union(*(self._columns_of_whole(a) for a in arguments))
 
     def decide(self, kind: str, left: int, right: int, outcome: bool, *, whole: bool = False) -> bool:
         """Note a decision of the representative."""

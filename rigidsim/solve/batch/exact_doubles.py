@@ -1,8 +1,9 @@
-"""Exact numbers in two doubles, each with a bound of its error (``double_double``)."""
+"""Exact numbers in two doubles, each with a bound of its error (``double_double``); those that are swept."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweeps.draws import DrawnValues
+from rigidsim.scene.sweeps.values import nearest_double
 from rigidsim.solve.batch import double_double as dd
 from rigidsim.solve.batch.double_double import Doubled
 
@@ -79,3 +81,54 @@ def _parts_of_quotient(above: int, below: int) -> tuple[float, float, float]:
     if under & (under - 1) == 0 and rest.bit_length() <= _MANTISSA and abs(low) > _NORMAL:
         return high, low, 0.0
     return high, low, abs(low) * 2.0**-_MANTISSA + 5e-324
+
+
+class Distinct:
+    """The distinct values of one swept number.
+
+    Args:
+        values: the values, which may be worked out when they are asked for.
+        doubled: the same in two doubles, where they are known already.
+        kept: whether other members have them too, so that what follows from each is worth keeping.
+    """
+
+    def __init__(
+        self, values: Sequence[ExactNumber], doubled: Doubled | None = None, *, kept: bool = False
+    ) -> None:
+        self.values, self.kept = values, kept
+        self._doubled = doubled
+
+    @property
+    def doubled(self) -> Doubled:
+        """All values in two doubles."""
+        if self._doubled is None:
+            self._doubled = in_two_doubles(self.values)
+        return self._doubled
+
+
+@dataclass(frozen=True)
+class Swept:
+    """One swept number for all members.
+
+    Attributes:
+        distinct: the values that it takes.
+        index: index of each member's value, (members,).
+    """
+
+    distinct: Distinct
+    index: np.ndarray
+
+    def of(self, member: int) -> ExactNumber:
+        """The number of one member."""
+        return self.distinct.values[self.index[member]]
+
+    @property
+    def nearest(self) -> np.ndarray:
+        """The doubles nearest to the numbers, (members,)."""
+        found = self.distinct.doubled
+        parts = Doubled(found.high[self.index], found.low[self.index], found.error[self.index])
+        with np.errstate(all="ignore"):
+            high, certain = dd.nearest_double(parts)
+        for member in np.flatnonzero(~certain).tolist():
+            high[member] = nearest_double(self.of(member))
+        return high

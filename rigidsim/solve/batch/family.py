@@ -19,7 +19,7 @@ from rigidsim.scene.tracing.graph import Guard, Untraceable
 from rigidsim.scene.tracing.numbers import Traced
 from rigidsim.scene.tracing.whole import TracedWhole
 from rigidsim.solve.batch.members import Members
-from rigidsim.solve.batch.replay import Replay
+from rigidsim.solve.batch.replay import ColumnReplays, Replay
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.problem import prepare
 
@@ -114,6 +114,11 @@ class Family:
     def guards(self) -> list[Guard]:
         """Decisions that its members share, the most selective first."""
         return list(self.traced.graph.guards)
+
+    @cached_property
+    def columns(self) -> ColumnReplays:
+        """What depends on one swept number alone, for each of its values."""
+        return ColumnReplays(self.traced.graph)
 
 
 @dataclass(frozen=True)
@@ -257,7 +262,7 @@ class Families:
         return waiting[:0] if len(taken) == len(waiting) else waiting[~np.isin(waiting, taken)]
 
     def _replay(self, family: Family, members: np.ndarray) -> Replay:
-        return Replay(family.traced.graph, self._swept, members)
+        return Replay(family.traced.graph, self._swept, members, family.columns)
 
 
 def _numbers_of(family: Family, members: np.ndarray, replay: Replay) -> Numbers:

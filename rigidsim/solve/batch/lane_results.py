@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,6 +60,25 @@ class LaneResults:
         ):
             mine[places] = theirs
 
+    def lost(self, inside: Sequence[int], taken: Sequence[int], gone: Sequence[bool]) -> list[int]:
+        """Note the members whose state was lost, which stopped all lanes; returns the others, which have to
+        begin again.
+
+        Args:
+            inside, taken, gone: each lane's member, its steps, and whether its state was lost.
+        """
+        others = []
+        for member, steps, lost in zip(inside, taken, gone, strict=True):
+            if member == IDLE:
+                continue
+            if lost:
+                self.steps[member] = steps
+                self.finite[member] = self.arrived[member] = False
+            else:
+                self.found.pop(member, None)
+                others.append(member)
+        return others
+
 
 def put_in_place(bundle: np.ndarray, states: np.ndarray) -> None:
     """Groups (groups, samples, states, width) as members side by side, (samples, states, members)."""
@@ -88,6 +108,7 @@ def until_next(
             to have as well; 0 where none did.
     """
     expected = []
+    # no min or max in here: this is done for every call of the integrator
     for member, moment, target, begin, before in zip(inside, moments, targets, begun, taken, strict=True):
         if member == IDLE:
             continue
@@ -95,6 +116,14 @@ def until_next(
             steps = int((target - moment) / (moment - begin) * before) + 2
         else:
             steps = int((target - moment) * pace) if pace else _FIRST_STEPS
-        expected.append(min(max(steps, _LEAST_STEPS), most_steps - before))
-    last = min(expected) + _SHORTLY
-    return max(max([steps for steps in expected if steps <= last]), 1)
+        if steps < _LEAST_STEPS:
+            steps = _LEAST_STEPS
+        expected.append(steps if steps < most_steps - before else most_steps - before)
+    expected.sort()
+    last = expected[0] + _SHORTLY
+    found = 1
+    for steps in expected:
+        if steps > last:
+            break
+        found = steps
+    return found if found > 1 else 1

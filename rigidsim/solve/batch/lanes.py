@@ -175,13 +175,22 @@ class BatchEngine:
             initial: (states, members); parameters likewise; start: (members,), internal units.
         """
         count = initial.shape[1]
-        sizes = np.empty((self._integrator.order + 1, count))
-        for first in range(0, count, self.width):
-            lanes = np.minimum(np.arange(first, first + self.width), count - 1)
-            self._set(initial[:, lanes], parameters[:, lanes], start[lanes])
-            self._integrator.step(np.zeros(self.width), write_tc=True)  # compute a series without moving
-            found = np.abs(self._integrator.tc).max(axis=0)
-            sizes[:, first : first + self.width] = found[:, : count - first]
+        terms = self._integrator.tc  # (states, terms, lanes)
+        series = np.empty((_GROUPS, *terms.shape))
+        sizes = np.empty((terms.shape[1], count))
+        still = np.zeros(self.width)
+        for begin in range(0, count, _GROUPS * self.width):
+            end = min(begin + _GROUPS * self.width, count)
+            for group, first in enumerate(range(begin, end, self.width)):
+                lanes: Any = slice(first, first + self.width)
+                if first + self.width > count:
+                    lanes = np.minimum(np.arange(first, first + self.width), count - 1)
+                self._set(initial[:, lanes], parameters[:, lanes], start[lanes])
+                self._integrator.step(still, write_tc=True)  # compute a series without moving
+                series[group] = terms
+            groups = -(-(end - begin) // self.width)
+            found = np.abs(series[:groups]).max(axis=1)
+            sizes[:, begin:end] = np.moveaxis(found, 0, 1).reshape(len(sizes), -1)[:, : end - begin]
         self._log.clear()
         return np.minimum(bounds_of_sparse_series(sizes), self._longest)
 
@@ -228,6 +237,7 @@ class BatchEngine:
         inside, taken = [IDLE] * width, [0] * width
         target, bounds, begun = np.zeros(width), np.empty(width), [0.0] * width
         high, low = np.zeros(width), np.zeros(width)
+        starts, ends, bounded = start.tolist(), end.tolist(), longest.tolist()
         pace = 0.0
 
         def enter(lanes: Sequence[int]) -> None:
@@ -238,10 +248,10 @@ class BatchEngine:
                 state[:, lane] = initial[:, there]
                 if used:
                     numbers[:, lane] = parameters[:used, there]
-                bounds[lane] = longest[there]
+                bounds[lane] = bounded[there]
                 inside[lane], taken[lane] = member, 0
-                begun[lane] = high[lane] = start[there]
-                low[lane], target[lane] = 0.0, start[there] if member == IDLE else end[there]
+                begun[lane] = high[lane] = starts[there]
+                low[lane], target[lane] = 0.0, starts[there] if member == IDLE else ends[there]
             integrator.set_dtime(high, low)
 
         enter(range(width))
@@ -258,7 +268,7 @@ class BatchEngine:
                 if inside[crossing.lane] != IDLE:
                     result.found.setdefault(inside[crossing.lane], []).append(crossing)
             if _LOST in [now[0] for now in outcomes]:
-                self._after_loss(result, inside, taken, outcomes, waiting)
+                waiting.extendleft(result.lost(inside, taken, [now[0] == _LOST for now in outcomes]))
                 lanes = list(range(width))
             else:
                 lanes = [
@@ -275,21 +285,6 @@ class BatchEngine:
             if lanes:
                 enter(lanes)
                 moments, targets = high.tolist(), target.tolist()
-
-    @staticmethod
-    def _after_loss(
-        result: LaneResults, inside: list[int], taken: list[int], outcomes: Any, waiting: deque[int]
-    ) -> None:
-        """Restart the other members after a state was lost, which stopped all lanes."""
-        for member, steps, outcome in zip(inside, taken, outcomes, strict=True):
-            if member == IDLE:
-                continue
-            if outcome[0] == _LOST:
-                result.steps[member] = steps
-                result.finite[member] = result.arrived[member] = False
-            else:
-                result.found.pop(member, None)
-                waiting.appendleft(member)
 
     def _together(
         self,

@@ -14,8 +14,7 @@ from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.sweeps.draws import DrawnValues
 from rigidsim.scene.sweeps.sweep import Axis, Sweep
 from rigidsim.solve.batch.double_double import Doubled
-from rigidsim.solve.batch.exact_doubles import drawn_in_two_doubles
-from rigidsim.solve.batch.replay import Distinct, Swept
+from rigidsim.solve.batch.exact_doubles import Distinct, Swept, drawn_in_two_doubles
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 
 _HELD = 1 << 21
@@ -87,7 +86,7 @@ class AxisNumbers:
         if drawn is not None:
             return drawn.columns(which)
         if place not in self._whole and axis.values.count <= len(which):
-            self._whole[place] = self._distinct(place, range(axis.values.count))
+            self._whole[place] = self._distinct(place, range(axis.values.count), kept=True)
         if place in self._whole:
             return [Swept(distinct, which) for distinct in self._whole[place]]
         needed, index = np.unique(which, return_inverse=True)
@@ -110,15 +109,15 @@ class AxisNumbers:
             if drawn is not None:
                 drawn.columns(which)
 
-    def _distinct(self, place: int, indices: Sequence[int]) -> list[Distinct]:
+    def _distinct(self, place: int, indices: Sequence[int], *, kept: bool = False) -> list[Distinct]:
         axis = self._sweep.axes[place]
         columns = range(len(axis.columns))
         if axis.values.drawn is not None:
             which = np.asarray(indices, dtype=np.int64)
             found = [drawn_in_two_doubles(values, which) for values in axis.values.drawn]
-            return [Distinct(_AxisColumn(axis, n, indices), found[n]) for n in columns]
+            return [Distinct(_AxisColumn(axis, n, indices), found[n], kept=kept) for n in columns]
         entries = [axis.exact(index) for index in indices]
-        return [Distinct([entry[n] for entry in entries]) for n in columns]
+        return [Distinct([entry[n] for entry in entries], kept=kept) for n in columns]
 
     def nearest(self, place: int) -> np.ndarray | None:
         """The doubles nearest to all values of an axis, (values, components); None if they aren't drawn at

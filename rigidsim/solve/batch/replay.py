@@ -7,18 +7,15 @@ scene's own arithmetic, so that the result is that of the member's own build, al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.sweeps.values import nearest_double
 from rigidsim.scene.tracing.graph import Graph, Guard
 from rigidsim.solve.batch import double_double as dd
 from rigidsim.solve.batch.double_double import Doubled
-from rigidsim.solve.batch.exact_doubles import in_two_doubles, in_two_parts, parts_of
+from rigidsim.solve.batch.exact_doubles import Distinct, Swept, in_two_parts, parts_of
 from rigidsim.solve.precision import precision_of
 
 _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
@@ -31,65 +28,25 @@ _BINARY: dict[str, Callable[[Doubled, Doubled], Doubled]] = {
 }
 
 
-class Distinct:
-    """The distinct values of one swept number.
-
-    Args:
-        values: the values, which may be worked out when they are asked for.
-        doubled: the same in two doubles, where they are known already.
-    """
-
-    def __init__(self, values: Sequence[ExactNumber], doubled: Doubled | None = None) -> None:
-        self.values = values
-        self._doubled = doubled
-
-    @property
-    def doubled(self) -> Doubled:
-        """All values in two doubles."""
-        if self._doubled is None:
-            self._doubled = in_two_doubles(self.values)
-        return self._doubled
-
-
-@dataclass(frozen=True)
-class Swept:
-    """One swept number for all members.
-
-    Attributes:
-        distinct: the values that it takes.
-        index: index of each member's value, (members,).
-    """
-
-    distinct: Distinct
-    index: np.ndarray
-
-    def of(self, member: int) -> ExactNumber:
-        """The number of one member."""
-        return self.distinct.values[self.index[member]]
-
-    @property
-    def nearest(self) -> np.ndarray:
-        """The doubles nearest to the numbers, (members,)."""
-        found = self.distinct.doubled
-        parts = Doubled(found.high[self.index], found.low[self.index], found.error[self.index])
-        with np.errstate(all="ignore"):
-            high, certain = dd.nearest_double(parts)
-        for member in np.flatnonzero(~certain).tolist():
-            high[member] = nearest_double(self.of(member))
-        return high
-
-
 class Replay:
     """A graph's numbers for some members.
 
     Args:
         swept: for each column of the graph, the numbers of all members of the sweep.
         members: indices of the members.
+        columns: what depends on one column alone, for each of its values.
     """
 
-    def __init__(self, graph: Graph, swept: Sequence[Swept], members: np.ndarray) -> None:
+    def __init__(
+        self,
+        graph: Graph,
+        swept: Sequence[Swept] | Mapping[int, Swept],
+        members: np.ndarray,
+        columns: ColumnReplays | None = None,
+    ) -> None:
         self._graph, self._swept, self._count = graph, swept, len(members)
         self._members = members
+        self._columns = columns
         self._numbers: dict[int, Doubled] = {}
         self._wholes: dict[int, np.ndarray] = {}
         self._doubles: dict[int, np.ndarray] = {}
@@ -100,7 +57,7 @@ class Replay:
         """Mask of the members that make all decisions as the representative does, (members,)."""
         found = np.ones(self._count, dtype=bool)
         for guard in guards:
-            found &= self._decided(guard) == guard.outcome
+            found &= self.decided(guard) == guard.outcome
             if not found.any():
                 break
         return found
@@ -108,12 +65,13 @@ class Replay:
     def doubles(self, node: int) -> np.ndarray:
         """A number rounded once, (members,); nan if it is outside a double's range."""
         if node not in self._doubles:
-            self._doubles[node] = self._rounded(node)
+            found = self._by_value((node,))
+            self._doubles[node] = self._rounded(node) if found is None else found[0].doubles(node)[found[1]]
         return self._doubles[node]
 
     def _rounded(self, node: int) -> np.ndarray:
         with np.errstate(all="ignore"):
-            high, certain = dd.nearest_double(self._number(node))
+            high, certain = dd.nearest_double(self.number(node))
         values = np.array(np.broadcast_to(high, self._count))
         for member in np.flatnonzero(~np.broadcast_to(certain, self._count)).tolist():
             try:
@@ -126,14 +84,34 @@ class Replay:
         """Whole numbers, shape (members,)."""
         return np.array(np.broadcast_to(self._whole(node), self._count))
 
+    def _by_value(self, nodes: Sequence[int], *, whole: bool = False) -> tuple[Replay, np.ndarray] | None:
+        """The replay over the values of the one column that nodes depend on, and which of them each member
+        has; None where there is no such column, or its values aren't kept.
+        """
+        if self._columns is None:
+            return None
+        columns = frozenset().union(*(self._graph.columns_of(node, whole=whole) for node in nodes))
+        if len(columns) != 1:
+            return None
+        (column,) = columns
+        swept = self._swept[column]
+        if not swept.distinct.kept:
+            return None
+        return self._columns.of(column, swept.distinct), swept.index[self._members]
+
     # --- decisions ------------------------------------------------------------------------------------------
 
-    def _decided(self, guard: Guard) -> np.ndarray:
+    def decided(self, guard: Guard) -> np.ndarray:
+        """The decision of each member, (members,)."""
+        by_value = self._by_value((guard.left, guard.right), whole=guard.whole)
+        if by_value is not None:
+            decided: np.ndarray = by_value[0].decided(guard)[by_value[1]]
+            return decided
         if guard.whole:
             left, right = self._whole(guard.left), self._whole(guard.right)
             return np.broadcast_to(left < right if guard.kind == "<" else left == right, self._count)
         with np.errstate(all="ignore"):
-            sign, certain = dd.sign_of(dd.subtract(self._number(guard.left), self._number(guard.right)))
+            sign, certain = dd.sign_of(dd.subtract(self.number(guard.left), self.number(guard.right)))
         wanted = -1 if guard.kind == "<" else 0
         found = np.array(np.broadcast_to(sign == wanted, self._count))
         for member in np.flatnonzero(~np.broadcast_to(certain, self._count)).tolist():
@@ -146,10 +124,15 @@ class Replay:
 
     # --- numbers --------------------------------------------------------------------------------------------
 
-    def _number(self, node: int) -> Doubled:
+    def number(self, node: int) -> Doubled:
+        """A number in two doubles, (members,), or one for all."""
         if node not in self._numbers:
             operation, arguments = self._graph.nodes[node]
-            self._numbers[node] = self._worked_out(node, operation, arguments)
+            found = None if operation == "column" else self._by_value((node,))
+            if found is None:
+                self._numbers[node] = self._worked_out(node, operation, arguments)
+            else:
+                self._numbers[node] = _taken(found[0].number(node), found[1])
         return self._numbers[node]
 
     def _worked_out(self, node: int, operation: str, arguments: tuple[Any, ...]) -> Doubled:
@@ -157,27 +140,26 @@ class Replay:
             return in_two_parts(arguments[0])
         if operation == "column":
             column = self._swept[arguments[0]]
-            index, found = column.index[self._members], column.distinct.doubled
-            return Doubled(found.high[index], found.low[index], found.error[index])
+            return _taken(column.distinct.doubled, column.index[self._members])
         if operation == "power_of_two":
             return Doubled(np.ldexp(1.0, self._whole(arguments[0])), 0.0, 0.0)
         if operation == "power":
-            return self._power(self._number(arguments[0]), arguments[1])
+            return self._power(self.number(arguments[0]), arguments[1])
         if operation == "multiply":
             for a, b in (arguments, arguments[::-1]):
                 if _is_power_of_two(self._graph, b):
-                    return dd.scale(self._number(a), self._number(b).high)
+                    return dd.scale(self.number(a), self.number(b).high)
         if operation in _BINARY:
-            return _BINARY[operation](self._number(arguments[0]), self._number(arguments[1]))
+            return _BINARY[operation](self.number(arguments[0]), self.number(arguments[1]))
         if operation == "negative":
-            return dd.negative(self._number(arguments[0]))
+            return dd.negative(self.number(arguments[0]))
         if operation == "absolute":
-            return dd.absolute(self._number(arguments[0]))
+            return dd.absolute(self.number(arguments[0]))
         if operation in ("maximum", "minimum"):
-            pair = (self._number(a) for a in arguments)
+            pair = (self.number(a) for a in arguments)
             return dd.extreme(*pair, largest=operation == "maximum")
         if operation == "sqrt":
-            return dd.root(self._number(arguments[0]))
+            return dd.root(self.number(arguments[0]))
         return self._one_by_one(node)
 
     def _power(self, base: Doubled, exponent: int) -> Doubled:
@@ -194,7 +176,7 @@ class Replay:
         """An operation that arrays lack, such as a sine, once for each combination of the columns that it
         reads.
         """
-        columns = sorted(_columns(self._graph, node))
+        columns = sorted(self._graph.columns_of(node))
         codes = np.zeros(self._count, dtype=np.int64)
         for column in columns:
             swept = self._swept[column]
@@ -212,8 +194,11 @@ class Replay:
 
     def _whole(self, node: int) -> np.ndarray:
         if node not in self._wholes:
-            operation, arguments = self._graph.wholes[node]
-            self._wholes[node] = self._whole_worked_out(operation, arguments)
+            found = self._by_value((node,), whole=True)
+            if found is None:
+                self._wholes[node] = self._whole_worked_out(*self._graph.wholes[node])
+            else:
+                self._wholes[node] = found[0].whole_numbers(node)[found[1]]
         return self._wholes[node]
 
     def _whole_worked_out(self, operation: str, arguments: tuple[int, ...]) -> np.ndarray:
@@ -231,7 +216,7 @@ class Replay:
     def _exponents(self, node: int, *, above: bool) -> np.ndarray:
         """The smallest e with abs(x) <= 2**e, or with ``above``, abs(x) < 2**e."""
         with np.errstate(all="ignore"):
-            number = dd.absolute(self._number(node))
+            number = dd.absolute(self.number(node))
             mantissa, exponent = np.frexp(number.high)
         boundary = mantissa == 0.5  # where the second part tells
         sure = np.isfinite(number.high) & np.isfinite(number.error) & (number.high > 0)
@@ -277,6 +262,33 @@ class Replay:
         return found
 
 
+class ColumnReplays:
+    """Replays of a graph over the values of one column each, for what depends on that column alone: in a
+    sweep over a product of axes members share them.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._held: dict[int, tuple[Distinct, Replay]] = {}
+
+    def of(self, column: int, distinct: Distinct) -> Replay:
+        """The replay over a column's values."""
+        held = self._held.get(column)
+        if held is None or held[0] is not distinct:
+            every = np.arange(len(distinct.values))
+            held = distinct, Replay(self._graph, {column: Swept(distinct, every)}, every)
+            self._held[column] = held
+        return held[1]
+
+
+def _taken(found: Doubled, index: np.ndarray) -> Doubled:
+    """Numbers of members from those of values."""
+    if np.ndim(found.high) == 0:
+        return found
+    low, error = (np.broadcast_to(part, found.high.shape)[index] for part in (found.low, found.error))
+    return Doubled(found.high[index], low, error)
+
+
 _EXACT: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
@@ -295,27 +307,3 @@ def _is_power_of_two(graph: Graph, node: int) -> bool:
         mantissa, _ = graph.context.frexp(abs(arguments[0]))
         return bool(mantissa == 0.5 and arguments[0] > 0)
     return operation == "power_of_two"
-
-
-def _columns(graph: Graph, node: int) -> set[int]:
-    """The columns that a node depends on."""
-    found: set[int] = set()
-    waiting, seen = [("n", node)], set()
-    while waiting:
-        item = waiting.pop()
-        if item in seen:
-            continue
-        seen.add(item)
-        kind, index = item
-        operation, arguments = (graph.nodes if kind == "n" else graph.wholes)[index]
-        if operation == "column":
-            found.add(arguments[0])
-        elif operation == "power_of_two":
-            waiting.append(("w", arguments[0]))
-        elif (kind == "w" and operation in ("exponent", "magnitude")) or operation == "power":
-            waiting.append(("n", arguments[0]))
-        elif operation == "call":
-            waiting += [("n", a) for a in arguments[1:]]
-        elif operation != "constant":
-            waiting += [(kind, a) for a in arguments]
-    return found

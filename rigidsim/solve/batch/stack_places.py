@@ -41,6 +41,7 @@ class StackPlaces:
         self._integrator = integrator
         self._calls = 0
         self._least = {_straight: float("inf"), _shifted: float("inf")}
+        self._better: Callable[[Callable[[], Any]], Any] = _straight
 
     def __call__(self, method: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
         """Result of one of the integrator's methods that take steps."""
@@ -48,7 +49,7 @@ class StackPlaces:
         self._calls += 1
         steps = partial(method, *arguments, **options)
         if place >= 2 * _TRIED:
-            return min(self._least, key=self._least.__getitem__)(steps)
+            return self._better(steps)
         if place == 0:
             self._least = dict.fromkeys(self._least, float("inf"))
         way = _shifted if place % 2 else _straight
@@ -60,4 +61,5 @@ class StackPlaces:
             self._calls -= 1
         else:
             self._least[way] = min(self._least[way], seconds / taken)
+            self._better = min(self._least, key=self._least.__getitem__)
         return found

@@ -20,10 +20,9 @@ from rigidsim.scene.sweeps.values import axis_values
 from rigidsim.scene.tracing.numbers import Traced
 from rigidsim.scene.tracing.whole import TracedWhole
 from rigidsim.solve.batch.double_double import nearest_double
-from rigidsim.solve.batch.exact_doubles import drawn_in_two_doubles
+from rigidsim.solve.batch.exact_doubles import Distinct, drawn_in_two_doubles
 from rigidsim.solve.batch.family import Alone, Families, batchable
 from rigidsim.solve.batch.members import AxisNumbers, Members
-from rigidsim.solve.batch.replay import Distinct
 from rigidsim.solve.problem import prepare
 
 FREE = config(
