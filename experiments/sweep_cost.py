@@ -1,24 +1,29 @@
-"""What do 4096 free bodies cost side by side, and what does a second worker gain?
+"""What do 4096 free bodies cost side by side, what does a second worker gain, and what is all else a member?
 
 Question: final state and drifts of T = 1000 s each, beside one compiled integrator that takes the members one
-by one; and the wall time of a sweep of a minute or more with two workers beside that with one.
+by one; the wall time of a sweep of a minute or more with two workers beside that with one; the CPU time of a
+member of a planar map besides its steps.
 
 Method: CPU time of one core, medians over runs in turn: batches with all that comes before (families, their
 numbers, samples, drifts), against bare heyoka with ``par[]`` and nothing recorded; and once more with
 estimates of errors, which aren't part of what is asked. With ``--workers``: whole processes of ``rigidsim
 sweep``, one worker and several in turn, wall time by stages, and CPU time; nothing else should run beside
-them.
+them. With ``--overhead``: CPU time of ``rigidsim sweep`` of Hyperion's map with final states, each member's
+as the difference of a large map and a small one, over 10 and 20 orbits; the second ten cost steps alone, so
+that the first cost all else besides.
 
 Held against: at most 0.25 of the CPU at width 8, 0.35 at width 4; with two workers at most 0.55 of the wall
-time of one.
+time of one; 20 us a member of a planar map.
 
 Run: python -m experiments.sweep_cost [4096]
      python -m experiments.sweep_cost --workers 2 [150000]
+     python -m experiments.sweep_cost --overhead
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import resource
 import shutil
 import statistics
@@ -159,13 +164,47 @@ def shared(count: int, workers: int) -> list[Check]:
     return [Check(name, statistics.median(ratios), 0, most, "1", _ASKED, "absolute")]
 
 
+MAP = Path(__file__).parents[1] / "configs" / "sweeps" / "hyperion_map.toml"
+ORBIT, SMALL, LARGE = 2 * math.pi, 100, 400
+_MOST_OVERHEAD = 20.0  # us
+
+
+def overhead() -> list[Check]:
+    """CPU time of a member of a planar map besides its steps, files and labels included."""
+    with tempfile.TemporaryDirectory(prefix="rigidsim-overhead-") as temporary:
+        found = [_overhead(Path(temporary)) for _ in range(ROUNDS)]
+    print(f"us a member, in turn: {', '.join(f'{value:.1f}' for value in found)}")
+    name = "CPU time of a planar member besides its steps"
+    return [Check(name, statistics.median(found), 0, _MOST_OVERHEAD, "us", _ASKED, "absolute")]
+
+
+def _overhead(place: Path) -> float:
+    seconds = {}
+    for side in (SMALL, LARGE):
+        for orbits in (10, 20):
+            axes = 'sweep.axes."initial.{}".linspace=[0, {}, {}]'
+            settings = [
+                axes.format("euler_angles[2]", "3.141592653589793", side),
+                axes.format("angular_velocity[2]", "3", side),
+                f"time.end={orbits * ORBIT}", "time.samples=2", 'sweep.keep=["final"]',
+            ]  # fmt: skip
+            command = [sys.executable, "-m", "rigidsim", "sweep", str(MAP), "--out", str(place), "--force"]
+            command += [word for setting in settings for word in ("--set", setting)]
+            seconds[side, orbits] = staged(command)["cpu"]
+    ten, twenty = (seconds[LARGE, orbits] - seconds[SMALL, orbits] for orbits in (10, 20))
+    return 1e6 * (2 * ten - twenty) / (LARGE**2 - SMALL**2)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and print; exit code 1 where more was taken than is asked."""
     parser = argparse.ArgumentParser(prog="python -m experiments.sweep_cost")
     parser.add_argument("members", type=int, nargs="?", help=f"{MEMBERS} by default, {MANY} with --workers")
     parser.add_argument("--workers", type=int, help="compare a sweep by so many with one by one worker")
+    parser.add_argument("--overhead", action="store_true", help="what a planar member costs besides steps")
     given = parser.parse_args(argv)
-    if given.workers is None:
+    if given.overhead:
+        checks = overhead()
+    elif given.workers is None:
         checks = side_by_side(given.members or MEMBERS)
     else:
         checks = shared(given.members or MANY, given.workers)
