@@ -201,6 +201,8 @@ def test_swings_that_ticks_tell_are_drawn_with_nothing_taken_off(swing: float, w
     page = figures.figure(dataset, "obliquity")
     upper, lower = (axes.get_lines()[0].get_ydata() for axes in page.axes)
     assert titles(page)[0].startswith("Obliquity less its mean, ") != whole
+    # half a radian from the mean motion is no small path about it
+    assert ("nutation" in figures.available(dataset)) == (swing < 30)
     assert titles(page)[1].startswith("Longitude of the node less its mean motion, ") != whole
     if whole:
         assert titles(page) == ["Obliquity", "Longitude of the node"]

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STEEP = 1.5  # rad of pitch, near which roll and yaw are ill-defined
+_FAR = 0.5  # rad from its mean motion, up to which a pole's path is as on a plane to a tenth
 
 
 def _has_rates_on_surfaces(dataset: xarray.Dataset) -> bool:
@@ -44,6 +45,14 @@ def _has_orientation(dataset: xarray.Dataset) -> bool:
 
 def _precesses(dataset: xarray.Dataset) -> bool:
     return _has_orientation(dataset) and signals.steady_momentum(dataset) is None
+
+
+def _nods(dataset: xarray.Dataset) -> bool:
+    """Whether a pole that precesses stays near its mean motion, where a plane can be laid on the sphere."""
+    if not _precesses(dataset):
+        return False
+    path = poles.nutation(dataset)
+    return path is not None and bool(np.nanmax(np.hypot(*path.T)) < _FAR)
 
 
 def is_top(dataset: xarray.Dataset) -> bool:
@@ -97,7 +106,7 @@ WOBBLE = Panel(_has_wobble, timelines.wobble)
 
 CIRCLE = Panel(signals.near_axis, poles.polar_motion_panel)
 PATH = Panel(_has_pole, poles.pole_path_panel)
-NUTATION = Panel(_precesses, poles.nutation_panel)
+NUTATION = Panel(_nods, poles.nutation_panel)
 TIP = Panel(is_top, poles.tip_panel)
 NADIR = Panel(has("nadir"), poles.nadir_panel)
 PHASES = Panel(_swings, poles.phase_panel)
@@ -133,7 +142,7 @@ _AXIS = "an attitude or an axis (figure_axis, momentum_axis, obliquity) recorded
 KINDS: dict[str, Kind] = {
     "polar_motion": Kind("a spin near a principal axis", (POLAR_MOTION,), (CIRCLE,)),
     "pole_path": Kind(_AXIS, (), (PATH, NUTATION)),
-    "nutation": Kind("a pole that a torque moves", (), (NUTATION,)),
+    "nutation": Kind("a pole that a torque moves, within half a radian of its mean motion", (), (NUTATION,)),
     "obliquity": Kind(_AXIS, (OBLIQUITY, LONGITUDE)),
     "libration": Kind(
         "libration, roll_pitch_yaw or nadir recorded", (LIBRATION, ROLL_PITCH_YAW), (NADIR, PHASES)
