@@ -22,11 +22,14 @@ KEPT = (
     "series",
 )
 """Items that can be kept of a member; drifts, steps and warnings always are."""
+INDICATORS = ("megno", "fli", "lyapunov")
+"""Items that need a tangent vector's growth, which is recorded for them."""
 RANDOM = ("normal", "uniform", "sphere")
 WAYS = ("linspace", "logspace", "step", "values", *RANDOM)
 """Ways to give an axis's values."""
 LARGEST_AXIS = 10_000_000
 LARGEST_TILE = 100_000_000
+MOST_EVENTS = 100_000
 
 
 class AxisTable(ConfigTable):
@@ -115,7 +118,10 @@ class SweepTable(ConfigTable):
         json_schema_extra={"items": {"type": "string", "enum": list(KEPT)}, "default": ["final"]},
     )
     most_events: StrictInt = Field(
-        default=16, ge=1, description="largest number of times (events) or points (section) kept of an event"
+        default=16,
+        ge=1,
+        le=MOST_EVENTS,
+        description="largest number of times (events) or points (section) kept of an event",
     )
     tile: StrictInt | None = Field(
         default=None,

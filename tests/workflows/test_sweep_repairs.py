@@ -12,6 +12,7 @@ import pytest
 
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.scene.overrides import apply_overrides
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.problem import prepare
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
@@ -196,6 +197,18 @@ REFUSED = {
         'axes."time.end" = {value = [1]}',
         'axes."time.end".value: unknown key; did you mean "values"?',
     ),
+    "an indicator that can't be": (
+        'keep = ["megno"]\naxes."time.end".values = [1]',
+        '[sweep] keep: given "megno": needs the attitude',
+    ),
+    "more events than memory": (
+        'most_events = 1000000000\naxes."time.end".values = [1]',
+        "most_events: given 1000000000; at most 100000 is allowed",
+    ),
+    "a unit that there isn't": (
+        'axes."time.end".values = ["1 zork"]',
+        'member 0 (end = "1 zork"): [time] end: given "1 zork": unknown unit',
+    ),
     "a tile beyond all bounds": (f'tile = 1{30 * "0"}\naxes."time.end" = {{values = [1]}}', "at most 1e+08"),
 }  # fmt: skip
 
@@ -218,6 +231,13 @@ def test_truths_and_loose_tolerances_are_values_too(tmp_path: Path) -> None:
     found, _ = swept(tmp_path, CONFIG.partition("tile")[0] + axes)
     assert found.dataset.hold_invariants.values.tolist() == ["true", "false"]
     assert found.summary["outcomes"] == {"finished": 4}
+
+
+def test_dates_are_values_too() -> None:
+    axes = 'axes."time.epoch".values = ["2029-04-13T21:46:00 TDB", "J2000"]'
+    sweep = Sweep.of(parse(CONFIG.partition("tile")[0] + axes))
+    assert [sweep.experiment_of(i).config.time.epoch is not None for i in range(2)] == [True, True]
+    assert sweep.told(0) == 'epoch = "2029-04-13T21:46:00 TDB"'
 
 
 def test_remedies_are_worded_for_whoever_reads_them() -> None:

@@ -13,7 +13,7 @@ from rigidsim.scene.config import Experiment, parse, validated
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
-from rigidsim.scene.sweep_table import SweepTable
+from rigidsim.scene.sweep_table import INDICATORS, SweepTable
 from rigidsim.scene.sweeps.keys import refuse_unsettable, unit_and_length
 from rigidsim.scene.sweeps.names import axis_name, clashes
 from rigidsim.scene.sweeps.values import AxisValues, axis_values, nearest_double
@@ -73,11 +73,13 @@ class Sweep:
         experiment: the config as it was given, with its ``[sweep]``.
         base: the single experiment that the members vary.
         axes: axes in the order of the config; the last varies fastest in a product.
+        added: name of what members record only for indicators, if anything.
     """
 
     experiment: Experiment
     base: Experiment
     axes: tuple[Axis, ...]
+    added: str = ""
 
     @classmethod
     def of(cls, experiment: Experiment) -> Sweep:
@@ -207,10 +209,17 @@ class Sweep:
             for axis, text in zip(self.axes, self.texts(member), strict=True)
         )
         problems = [
-            Problem(f"[sweep] member {member} ({named})", f"{problem.where}: {problem.what}")
-            for problem in error.problems
+            Problem(f"[sweep] member {member} ({named})", self._reason(problem)) for problem in error.problems
         ]
         return MemberError(problems, self.experiment.source)
+
+    def _reason(self, problem: Problem) -> str:
+        """What is wrong with a member; of what is recorded only for indicators, the indicators are told."""
+        added = f'given "{self.added}": '
+        if not self.added or not problem.what.startswith(added):
+            return f"{problem.where}: {problem.what}"
+        names = ", ".join(f'"{name}"' for name in self.table.keep if name in INDICATORS)
+        return f"[sweep] keep: given {names}: {problem.what.removeprefix(added)}"
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ is prolonged keeps those that it had, random ones included, which depend on seed
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -207,14 +207,22 @@ def _listed(given: Sequence[Any]) -> AxisValues:
     try:
         if all(isinstance(value, list) for value in given) and len({len(value) for value in given}) == 1:
             vectors = [tuple(Written.of(x) for x in value) for value in given]
+            _refuse_unknown_units(x for vector in vectors for x in vector)
             return AxisValues(len(given), len(vectors[0]), vectors.__getitem__)
         numbers = [(Written.of(value),) for value in given]
+        _refuse_unknown_units(number for (number,) in numbers)
         return AxisValues(len(given), 0, numbers.__getitem__)
     except ValueError:
         if not any(isinstance(value, bool | str | list | dict) for value in given):
             raise  # for instance nan, which no key takes
         words = [inline_text(value) for value in given]
         return AxisValues(len(given), 0, None, words.__getitem__)
+
+
+def _refuse_unknown_units(numbers: Iterable[Written]) -> None:
+    """Raise UnitError for numbers that are none, such as the year that a date begins with."""
+    for unit in {number.unit for number in numbers} - {""}:
+        to_si(unit)
 
 
 def _geometric(first: Fraction, last: Fraction, count: int) -> Callable[[int], Fraction]:

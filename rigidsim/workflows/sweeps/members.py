@@ -14,6 +14,7 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.sweep_table import INDICATORS
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.kept import Kept, KeptVariable
 from rigidsim.session.members import MemberResults, run_alone
@@ -36,10 +37,6 @@ def sweep_of(config: str) -> Sweep:
     return recording(Sweep.of(parse(config, source="the sweep's config")))
 
 
-INDICATORS = ("megno", "fli", "lyapunov")
-"""Items that need a tangent vector's growth, which is recorded for them."""
-
-
 def recording(sweep: Sweep) -> Sweep:
     """The sweep with its members recording everything that is to be kept.
 
@@ -54,7 +51,7 @@ def recording(sweep: Sweep) -> Sweep:
     except ConfigError as error:
         raise sweep.blamed(0, error) from None
     names = ", ".join(f'"{name}"' for name in [*recorded, GROWTH])
-    return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]))
+    return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]), added=GROWTH)
 
 
 def hidden_of(sweep: Sweep) -> tuple[str, ...]:
