@@ -15,7 +15,8 @@ from rigidsim.errors import ConfigError
 from rigidsim.scene.exact import decimal_text, parse_number
 from rigidsim.scene.sweep_table import AxisTable
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.scene.sweeps.values import axis_values, nearest_double
+from rigidsim.scene.sweeps.values import axis_values
+from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.workflows.read import parse
 
 BASE = """\

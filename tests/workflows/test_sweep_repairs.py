@@ -240,6 +240,25 @@ def test_dates_are_values_too() -> None:
     assert sweep.told(0) == 'epoch = "2029-04-13T21:46:00 TDB"'
 
 
+def test_expressions_that_look_like_numbers_with_units_are_expressions() -> None:
+    load = '[[loads]]\nkind = "torque"\ncomponents = ["t", "0", "0"]\n'
+    base = CONFIG.partition("[[events]]")[0] + load + "[sweep]\n"
+    sweep = Sweep.of(parse(base + 'axes."loads[0].components[0]".values = ["0.5*t", "2*pi*t"]'))
+    assert sweep.texts(0) == ('"0.5*t"',)
+    prepare(sweep.experiment_of(1))
+    rates = Sweep.of(parse(base + 'axes."initial.angular_velocity[0]".values = ["2*rad/s", "1 deg/s"]'))
+    assert rates.numeric
+    quoted = Sweep.of(parse(base + "axes.\"initial.'angular_velocity'[0]\".values = [1]"))
+    assert quoted.dims == ("angular_velocity_0",)
+
+
+def test_a_limit_of_time_is_kept_where_it_is_swept(tmp_path: Path) -> None:
+    axes = 'axes."limits.wall_time" = {values = ["1e-9 s", "1 h"], name = "limit"}\n'
+    found, _ = swept(tmp_path, CONFIG.partition("tile")[0] + axes)
+    assert found.summary["outcomes"] == {"finished": 1, "stopped: wall_time": 1}
+    assert found.summary["why_alone"] == "wall_time"
+
+
 def test_remedies_are_worded_for_whoever_reads_them() -> None:
     """Also within a config's problems, whose control characters are made visible."""
     with pytest.raises(ConfigError) as caught:

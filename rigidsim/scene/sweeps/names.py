@@ -42,7 +42,7 @@ def axis_name(key: str, given: str | None) -> str:
     """
     name = given
     if name is None:
-        parts = [re.sub(r"\[(\d+)\]", r"_\1", part).strip("\"'") for part in key.split(".")]
+        parts = [re.sub(r"\[(\d+)\]", r"_\1", re.sub("[\"']", "", part)) for part in key.split(".")]
         name = "_".join(parts) if parts[-1] in OBSERVABLES else parts[-1]
     if not _NAME.fullmatch(name):
         raise ValueError(

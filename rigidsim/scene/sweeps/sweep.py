@@ -16,7 +16,8 @@ from rigidsim.scene.python_values import toml_text
 from rigidsim.scene.sweep_table import INDICATORS, SweepTable
 from rigidsim.scene.sweeps.keys import refuse_unsettable, unit_and_length
 from rigidsim.scene.sweeps.names import axis_name, clashes
-from rigidsim.scene.sweeps.values import AxisValues, axis_values, nearest_double
+from rigidsim.scene.sweeps.values import AxisValues, axis_values
+from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.scene.toml_text import parse_toml
 
 MOST_MEMBERS = 100_000_000
@@ -102,7 +103,7 @@ class Sweep:
                 tables = parse_toml(experiment.text, experiment.source)
                 unit, length = unit_and_length(plain, tables)
                 refuse_unsettable(plain, tables)
-                values = axis_values(given, plain, table.seed, length)
+                values = axis_values(given, plain, table.seed, length, unit)
                 name = axis_name(plain, given.name)
                 axes.append(Axis(plain, name, unit, values))
                 if axes[-1].numeric:  # its unit, where it has one, is known

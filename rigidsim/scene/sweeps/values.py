@@ -7,6 +7,7 @@ is prolonged keeps those that it had, random ones included, which depend on seed
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,74 +16,17 @@ from typing import Any
 
 import mpmath
 
-from rigidsim.scene.exact import ExactNumber, decimal_text, fraction_of, in_its_unit, with_unit
+from rigidsim.scene.exact import ExactNumber, fraction_of
 from rigidsim.scene.sweep_table import LARGEST_AXIS, AxisTable
 from rigidsim.scene.sweeps import draws
 from rigidsim.scene.sweeps.draws import DrawnValues
+from rigidsim.scene.sweeps.written import Written
 from rigidsim.scene.units import UnitError, to_si
 from rigidsim.scene.validation_messages import shown
 
+_PRODUCT = re.compile(r"[\d.)i]\s*\*\s*[A-Za-z]")
 DIGITS = 40
 """Significant decimal digits of values that aren't rational: of logspace, and on a sphere."""
-
-
-@dataclass(frozen=True)
-class Written:
-    """A number in the unit in which it is written; ``unit`` is empty if there is none."""
-
-    number: ExactNumber
-    unit: str = ""
-
-    @classmethod
-    def of(cls, value: Any) -> Written:
-        """Read a TOML value as a number.
-
-        Raises:
-            ValueError: it is none.
-        """
-        return cls(*in_its_unit(value))
-
-    @property
-    def exact(self) -> ExactNumber:
-        """The number in SI units.
-
-        Raises:
-            ValueError: no such unit.
-        """
-        return with_unit(self.number, self.unit, self.unit) if self.unit else self.number
-
-    @property
-    def text(self) -> str:
-        """The number as written in a config."""
-        plain = decimal_text(self.number.rational)
-        if self.number.pi_power:
-            power = "" if self.number.pi_power == 1 else f"^{self.number.pi_power}"
-            plain = f"{plain}*pi{power}"
-        if self.unit:
-            return f'"{plain} {self.unit}"'
-        return f'"{plain}"' if not _is_number(plain) else plain
-
-
-def nearest_double(number: ExactNumber) -> float:
-    """The double nearest to a number, for labels."""
-    value = number.rational
-    if number.pi_power:
-        value = fraction_of(number.at(_labelling()))
-    try:
-        return value.numerator / value.denominator
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
-
-
-@cache
-def _labelling() -> Any:
-    context = mpmath.MPContext()
-    context.prec = 200
-    return context
-
-
-def _is_number(text: str) -> bool:
-    return not any(sign in text for sign in "/*")
 
 
 Entry = tuple[Written, ...]
@@ -116,20 +60,21 @@ class AxisValues:
         return f"[{', '.join(texts)}]" if self.components else texts[0]
 
 
-def axis_values(table: AxisTable, key: str, seed: int, length: int) -> AxisValues:
+def axis_values(table: AxisTable, key: str, seed: int, length: int, unit: str = "") -> AxisValues:
     """The values that a table of ``[sweep] axes`` asks for.
 
     Args:
         key: the swept key.
         seed: seed of random values.
         length: components of the vector that the key takes; 0 if it takes a number.
+        unit: SI unit of what the key takes; "1" for none, as of expressions.
 
     Raises:
         ValueError: says what was given, and what is allowed.
     """
     given = getattr(table, table.way)
     if table.way == "values":
-        return _listed(given)
+        return _listed(given, products=unit == "1")
     if table.way == "sphere":
         if length < 3:
             raise ValueError("sphere is for keys that take a vector, such as initial.angular_velocity")
@@ -196,9 +141,12 @@ def _counted(count: Any) -> int:
     return count
 
 
-def _listed(given: Sequence[Any]) -> AxisValues:
+def _listed(given: Sequence[Any], *, products: bool) -> AxisValues:
     """A list's values: numbers or vectors if all can be read as such, otherwise anything that a config may
     hold.
+
+    Args:
+        products: whether ``2*t`` may be twice the time, instead of two tons.
     """
     from rigidsim.scene.python_values import inline_text
 
@@ -207,10 +155,10 @@ def _listed(given: Sequence[Any]) -> AxisValues:
     try:
         if all(isinstance(value, list) for value in given) and len({len(value) for value in given}) == 1:
             vectors = [tuple(Written.of(x) for x in value) for value in given]
-            _refuse_unknown_units(x for vector in vectors for x in vector)
+            _refuse_what_is_none((x for value in given for x in value), products=products)
             return AxisValues(len(given), len(vectors[0]), vectors.__getitem__)
         numbers = [(Written.of(value),) for value in given]
-        _refuse_unknown_units(number for (number,) in numbers)
+        _refuse_what_is_none(given, products=products)
         return AxisValues(len(given), 0, numbers.__getitem__)
     except ValueError:
         if not any(isinstance(value, bool | str | list | dict) for value in given):
@@ -219,9 +167,16 @@ def _listed(given: Sequence[Any]) -> AxisValues:
         return AxisValues(len(given), 0, None, words.__getitem__)
 
 
-def _refuse_unknown_units(numbers: Iterable[Written]) -> None:
-    """Raise UnitError for numbers that are none, such as the year that a date begins with."""
-    for unit in {number.unit for number in numbers} - {""}:
+def _refuse_what_is_none(given: Iterable[Any], *, products: bool) -> None:
+    """Raise ValueError for texts that only begin like numbers: a date, or an expression."""
+    units = set()
+    for value in given:
+        if isinstance(value, str):
+            unit = Written.of(value).unit
+            if unit and products and _PRODUCT.search(value):
+                raise ValueError("an expression")
+            units.add(unit)
+    for unit in units - {""}:
         to_si(unit)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweeps.draws import DrawnValues
-from rigidsim.scene.sweeps.values import nearest_double
+from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.solve.batch import double_double as dd
 from rigidsim.solve.batch.double_double import Doubled
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.scene.sweeps.sweep import Axis, Sweep
-from rigidsim.scene.sweeps.values import nearest_double
+from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.store import atomic
 from rigidsim.store.hdf5_sink import sink
 from rigidsim.store.netcdf_file import NetcdfFile, write_box, write_rows, writing

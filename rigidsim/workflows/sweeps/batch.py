@@ -72,7 +72,8 @@ def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
             return item
     if not sweep.table.batch:
         return "asked"
-    if sweep.base.config.limits.wall_time is not None:
+    timed = sweep.base.config.limits.wall_time is not None
+    if timed or any(axis.key == "limits.wall_time" for axis in sweep.axes):
         return "wall_time"
     reason = batchable(sweep.base, [])
     return "" if reason is None else reason.name.lower()
