@@ -116,3 +116,16 @@ def test_texts_and_vectors_are_told_at_their_ticks() -> None:
     many = np.random.default_rng(0).normal(size=(40, 3))
     page = sweep_figure(members_of(push=np.arange(12.0), body=many), "energy_final")
     assert all(float(tick) == int(tick) for tick in page.axes[0].get_yticks())
+
+
+def test_a_section_is_drawn_in_the_components_that_it_does_not_cut() -> None:
+    """Those of the second one are rounding errors of the section itself."""
+    random = np.random.default_rng(0).normal(size=(5, 7, 3)) * [1, 1e-16, 2]
+    random[3, 4:] = np.nan  # events that didn't happen
+    dataset = members_of(push=np.arange(5.0))
+    dataset["flip_spin"] = (("push", "flip_occurrence", "body_axis"), random, {"units": "rad/s"})
+    dataset = dataset.assign_coords(body_axis=list("xyz"))
+    axes = sweep_figure(dataset, "flip_spin").axes[0]
+    assert [axes.get_xlabel()[-1], axes.get_ylabel()[-1]] == ["x", "z"]
+    shown = np.asarray(axes.collections[0].get_offsets())
+    np.testing.assert_array_equal(np.ma.getdata(shown)[:4], random[0, :4, ::2])

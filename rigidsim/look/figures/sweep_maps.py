@@ -45,6 +45,7 @@ _FIRST = "_first"
 _FEW = 6  # values of a second axis up to which each has a line, and there is no map
 _MANY = 400  # values of which a few may lie beyond the colours
 _MOST_POINTS = 400_000
+_FLAT = 1e-9  # variation of a component, relative to the largest, that is rounding
 
 
 def drawable(dataset: xarray.Dataset) -> list[str]:
@@ -291,8 +292,9 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
     rows = table.reshape(-1, table.shape[2])[::stride]
     style: dict[str, Any] = {"s": 2.5, "lw": 0, "rasterized": True}
     if rows.shape[1] > 1:
-        first, second = (label_of(dataset, rest[0], i) for i in (0, 1)) if len(rest) == 1 else ("0", "1")
-        axes.scatter(rows[:, 0], rows[:, 1], c=which, cmap="viridis", **style)
+        one, other = _widest(rows)
+        first, second = (label_of(dataset, rest[0], i) if len(rest) == 1 else str(i) for i in (one, other))
+        axes.scatter(rows[:, one], rows[:, other], c=which, cmap="viridis", **style)
         axes.set_xlabel(f"{named(variable)}, {first}")
         axes.set_ylabel(f"{named(variable)}, {second}")
         titled(axes, f"{title_of(variable, '')}; coloured by member")
@@ -303,6 +305,15 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
     axes.set_ylabel(named(variable))
     titled(axes, title_of(variable, ""))
     return figure
+
+
+def _widest(rows: Array) -> tuple[int, int]:
+    """The first two components that vary: what the section is cut at doesn't, but for rounding."""
+    known = rows[np.isfinite(rows).all(axis=1)]
+    spread = np.ptp(known, axis=0) if len(known) else np.ones(rows.shape[1])
+    order = np.argsort(spread <= _FLAT * np.abs(known).max(initial=0), kind="stable")
+    one, other = sorted(order[:2].tolist())
+    return one, other
 
 
 def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, file_format: str) -> None:
