@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -268,3 +270,20 @@ def test_remedies_are_worded_for_whoever_reads_them() -> None:
     with pytest.raises(ConfigError) as caught:
         apply_overrides({}, ["a\x02b\x1b[0].c=1"])
     assert "a\\x02b\\x1b[0]" in str(caught.value)
+
+
+@pytest.mark.slow  # five times two processes that import everything
+def test_a_script_without_a_guard_is_told_what_it_lacks(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(CONFIG)
+    script = tmp_path / "script.py"
+    script.write_text('import rigidsim\nrigidsim.sweep("c.toml", workers=2)\n')
+    command = [sys.executable, script.name]
+    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert found.returncode == 1
+    assert 'under  if __name__ == "__main__":' in found.stderr
+    assert "freeze_support" not in found.stderr
+    script.write_text(
+        'import rigidsim\nif __name__ == "__main__":\n    rigidsim.sweep("c.toml", workers=2)\n'
+    )
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=300)
+    assert open_sweep(tmp_path / "runs" / "box").finished

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import time
 from collections.abc import Sequence
@@ -69,7 +70,8 @@ def sweep(
         experiment: from ``load`` or ``Experiment.from_dict``, the path of a config, or a dictionary.
         changes: values to replace, as for ``Experiment.replace``.
         force: replace whatever run or sweep is there.
-        workers: number of processes on this machine, or such processes started already.
+        workers: number of processes on this machine, or such processes started already. They read your script
+            again: in a script, sweep under ``if __name__ == "__main__":``.
         scheduler: address of a Dask scheduler whose workers run the members; needs ``rigidsim[cluster]``.
         tiles: first and stop of the share of tiles computed by this one of several processes on the folder.
         observer: receives the sweep's progress.
@@ -118,6 +120,12 @@ def _way(workers: int | Workers, scheduler: str | None) -> Way:
         return Cluster(scheduler)
     if isinstance(workers, Workers):
         return workers
+    if workers > 1 and getattr(multiprocessing.current_process(), "_inheriting", False):
+        # this is a worker, which reads the caller's script again before it begins
+        raise SystemExit(
+            "rigidsim.sweep: workers read the script again that started them, and come upon the sweep "
+            'itself: put what the script does under  if __name__ == "__main__":'
+        )
     return Workers(workers) if workers > 1 else OneProcess()
 
 
