@@ -287,3 +287,18 @@ def test_a_script_without_a_guard_is_told_what_it_lacks(tmp_path: Path) -> None:
     )
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=300)
     assert open_sweep(tmp_path / "runs" / "box").finished
+
+
+@pytest.mark.parametrize(
+    ("axis", "said"),
+    [
+        ('axes."initial.angular_velocity[2]" = {values = [1, "1e400"], name = "w"}', "1e400"),
+        ('axes."model.level" = {values = ["full", "spin_averaged"], name = "level"}', "spin_averaged"),
+    ],
+)
+def test_a_member_whose_equations_cannot_be_built_is_refused_beforehand(
+    tmp_path: Path, axis: str, said: str
+) -> None:
+    with pytest.raises(ConfigError, match=said):
+        run_sweep(parse(f"{CONFIG.partition('[sweep]')[0]}[sweep]\n{axis}\n"), out=tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -17,9 +17,9 @@ from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.members import batches_of
 
 _ALL = 200
-"""Up to this many members are all worked out. Of more, all are looked at by their numbers alone if these
-decide, and some are worked out: the corners and values of each axis, ``_OF_AN_AXIS`` of them, or ``_FEW``
-where the numbers of each member were accepted.
+"""Up to this many members are all worked out, with their equations where numbers alone don't decide. Of more,
+all are looked at by their numbers alone if these decide, and some are worked out: the corners and values of
+each axis, ``_OF_AN_AXIS`` of them, or ``_FEW`` where the numbers of each member were accepted.
 """
 _OF_AN_AXIS = 400
 _FEW = 25
@@ -69,7 +69,8 @@ class SweepCheck:
             refuse_taken_names(self.first)
         except ConfigError as error:
             raise sweep.blamed(0, error) from None
-        self._shares = _of_families(sweep, each) if every and sweep.count > _ALL else []
+        self._every = every
+        self._shares = _of_families(sweep, each) if every else []
 
     def finish(self) -> None:
         """Look at members that are worked out in full, and wait for the shares of others.
@@ -81,19 +82,31 @@ class SweepCheck:
         problems = self._worked_out(_FEW)
         if not problems:
             shares = list(_as_far_as_told(self._shares))
-            if sweep.count > _ALL and sum(accepted for _, accepted in shares) < sweep.count:
+            known = sum(accepted for _, accepted in shares) == sweep.count
+            if not known and sweep.count > _ALL:
                 problems = self._worked_out(_OF_AN_AXIS)
             problems = problems or self._found(shares)
+            if not (problems or known) and self._every and sweep.count <= _ALL:
+                problems = self._worked_out(_FEW, equations=True)
+        if len(problems) >= _MOST_TOLD:
+            problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
         if problems:
             raise ConfigError(problems, sweep.experiment.source)
 
-    def _worked_out(self, most: int) -> list[Problem]:
-        """Problems of members that are worked out in full, see ``_tried``."""
+    def _worked_out(self, most: int, *, equations: bool = False) -> list[Problem]:
+        """Problems of members that are worked out in full, see ``_tried``.
+
+        Args:
+            equations: also build their equations, which takes some ten times as long.
+        """
         problems: list[Problem] = []
         for member in _tried(self._sweep, most):
             try:
                 experiment = self._sweep.worked_out(member)
-                check_start(build_scene(experiment))
+                if equations:
+                    prepare(experiment)
+                else:
+                    check_start(build_scene(experiment))
             except ConfigError as error:
                 problems += self._sweep.blamed(member, error).problems
                 if len(problems) >= _MOST_TOLD:
