@@ -690,3 +690,25 @@ def test_every_kept_quantity_can_be_drawn(folder: Path) -> None:
         assert "rad/s" in axes.get_xlabel() + axes.get_ylabel()
         with pytest.raises(ValueError, match="is nothing that this sweep kept; allowed: "):
             sweep_figure(dataset, "velocity")
+
+
+def test_a_check_leaves_members_that_cannot_be_traced_to_their_runs() -> None:
+    """Where half of the members can't share equations, the other half still runs in batches."""
+    text = (
+        CONFIG.replace('"wx"', '"wx - k*wy"')
+        + """\
+[parameters]
+k = 1
+[sweep]
+keep = ["final"]
+axes."integrator.precision" = {values = ["double", "extended"], name = "precision"}
+axes."parameters.k" = {linspace = [1, 2, 150], name = "k"}
+"""
+    )
+    sweep = sweep_of(text)
+    batches = batches_of(text)
+    assert batches.apart is None
+    refused, accepted = batches.refused(range(sweep.count))
+    assert not refused
+    assert accepted == 150
+    assert set(run_members(sweep, [0, 149, 150, 299], ["final"]).engines) == {"batch of 8", "alone"}

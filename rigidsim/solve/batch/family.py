@@ -171,11 +171,15 @@ class Families:
     Args:
         members: all members of the sweep.
         most_refused: number of refused members after which the rest stays unsorted; no limit by default.
+        most_untraced: number of members that can't be traced after which no other is tried; no limit by
+            default, since a process would run others one by one than one that begins elsewhere.
     """
 
-    def __init__(self, members: Members, most_refused: int | None = None) -> None:
+    def __init__(
+        self, members: Members, most_refused: int | None = None, most_untraced: int | None = None
+    ) -> None:
         self._members = members
-        self._most_refused = most_refused
+        self._most_refused, self._most_untraced = most_refused, most_untraced
         self._swept = members.numbers
         self.known: list[Family] = []
 
@@ -207,6 +211,9 @@ class Families:
             elif isinstance(made, Alone):
                 result.alone[first] = made
                 waiting = waiting[1:]
+                if self._most_untraced is not None and len(result.alone) >= self._most_untraced:
+                    result.alone |= dict.fromkeys(waiting.tolist(), made)
+                    return
             else:
                 self.known.append(made)
                 waiting = self._taken(made, waiting, result)

@@ -44,6 +44,8 @@ _MOST_KINDS, _LEAST_MEMBERS = 64, 8
 """Up to so many kinds of members have batches however few members they have; more need so many each."""
 _MOST_AHEAD = 4  # families compiled before the first tile
 _MOST_HELD = 256  # families
+_MOST_UNTRACED = 8
+"""Members that can't be traced after which a check leaves the others to their runs: each takes as long."""
 
 
 @dataclass
@@ -127,14 +129,14 @@ class BatchTiles:
     def _sample(self) -> tuple[range, Sorted]:
         """Members from all over the sweep, sorted."""
         some = range(0, self._sweep.count, -(-self._sweep.count // _LOOKED_AT))
-        return some, self._sorted(some)
+        return some, self._sorted(some, None, _MOST_UNTRACED)
 
-    def _sorted(self, members: Sequence[int], most_refused: int | None = None) -> Sorted:
+    def _sorted(self, members: Sequence[int], *most: int | None) -> Sorted:
         if len(self._known) > _MOST_HELD:  # whoever represents a family, it has the same numbers
             self._known.clear()
             self._runs.clear()
             self._estimates.clear()
-        families = Families(Members.of(self._sweep, members, self.axes), most_refused)
+        families = Families(Members.of(self._sweep, members, self.axes), *most)
         families.known = self._known
         return families.sort()
 
@@ -188,7 +190,7 @@ class BatchTiles:
         """
         if self.apart is not None:
             return {}, 0
-        found = self._sorted(members, most)
+        found = self._sorted(members, most, _MOST_UNTRACED)
         accepted = sum(len(numbers.members) for _, numbers in found.groups)
         return {int(members[place]): error for place, error in found.refused.items()}, accepted
 
