@@ -62,6 +62,7 @@ def test_all_invariants_hold_and_the_attitude_is_right(path: Path, runs: Path) -
     assert (accuracy["amplification"] > 1) == (path.stem in UNSTABLE)
 
 
+@pytest.mark.slow  # full motions beside averaged ones
 @pytest.mark.parametrize("path", AVERAGED, ids=[path.stem for path in AVERAGED])
 def test_averaged_scenes_say_how_far_they_are_from_the_full_motion(path: Path, runs: Path) -> None:
     run = run_config(path, runs)

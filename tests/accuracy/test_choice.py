@@ -70,7 +70,7 @@ def true_error(run: rigidsim.Run, of: rigidsim.Experiment) -> float:
 SURE = [kind for kind in KINDS if kind != "plunge"]
 
 
-@pytest.mark.parametrize("number", cases(range(len(SURE)), range(0, len(SURE), 9)), ids=SURE)
+@pytest.mark.parametrize("number", cases(range(len(SURE)), range(0, len(SURE), 12)), ids=SURE)
 def test_every_kind_of_scene_is_certified_to_what_is_true(number: int, tmp_path: Path) -> None:
     scene = random_scene(number, seed=1)
     asked = 10 ** (-5 - number % 6)

@@ -48,6 +48,7 @@ def test_a_tolerance_is_part_of_the_error(satellites: MemberResults) -> None:
     assert (loose > 1e3 * satellites.kept["attitude_error"].values).all()
 
 
+@pytest.mark.slow  # a compilation of its own
 def test_places_have_errors_where_bodies_fly(satellites: MemberResults) -> None:
     kept = results_of("flights").kept
     far = np.linalg.norm(kept["position_final"].values, axis=1)

@@ -325,6 +325,7 @@ def test_a_plunge_ends_at_the_same_step_however_it_is_driven() -> None:
     assert (progress.status, progress.steps) == (Status.COLLAPSED, steps)
 
 
+@pytest.mark.slow  # steps as small as they get
 def test_the_move_to_a_whole_time_is_given_up_where_steps_are_smaller() -> None:
     """Where natural steps are 1e-25 of the time, half its last bit may take a billion of them. Rounding
     decides at which depth of the fall the way out is the shorter one; either way nothing is left half done.

@@ -112,7 +112,6 @@ UNROLLED = ("single", "double, dense", "double, sparse", "double, Euler angles",
 USUAL = (
     "double, dense",
     "double, sparse, derived angles",
-    "double, held invariants, angles",
     "double, ended by an event",
     "30 digits, tiny components",
 )
