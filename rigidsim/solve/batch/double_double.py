@@ -29,6 +29,13 @@ class Doubled:
     low: Array
     error: Array
 
+    def at(self, index: np.ndarray) -> Doubled:
+        """Some of the numbers, in the order given; a number for all stays as it is."""
+        if np.ndim(self.high) == 0:
+            return self
+        low, error = (np.broadcast_to(part, self.high.shape)[index] for part in (self.low, self.error))
+        return Doubled(self.high[index], low, error)
+
 
 def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:
     total = a + b

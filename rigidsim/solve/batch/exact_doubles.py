@@ -38,7 +38,7 @@ def in_two_doubles(values: Sequence[ExactNumber]) -> Doubled:
 
 
 def drawn_in_two_doubles(values: DrawnValues, indices: np.ndarray) -> Doubled:
-    """Numbers drawn at random, in two doubles: 25 times faster than one by one."""
+    """Numbers drawn at random, in two doubles: five to nine times faster than one by one."""
     try:
         first, step = (Doubled(*_parts_of_quotient(n, values.below)) for n in (values.first, values.step))
     except OverflowError:
@@ -125,10 +125,8 @@ class Swept:
     @property
     def nearest(self) -> np.ndarray:
         """The doubles nearest to the numbers, (members,)."""
-        found = self.distinct.doubled
-        parts = Doubled(found.high[self.index], found.low[self.index], found.error[self.index])
         with np.errstate(all="ignore"):
-            high, certain = dd.nearest_double(parts)
+            high, certain = dd.nearest_double(self.distinct.doubled.at(self.index))
         for member in np.flatnonzero(~certain).tolist():
             high[member] = nearest_double(self.of(member))
         return high

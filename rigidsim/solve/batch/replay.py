@@ -132,7 +132,7 @@ class Replay:
             if found is None:
                 self._numbers[node] = self._worked_out(node, operation, arguments)
             else:
-                self._numbers[node] = _taken(found[0].number(node), found[1])
+                self._numbers[node] = found[0].number(node).at(found[1])
         return self._numbers[node]
 
     def _worked_out(self, node: int, operation: str, arguments: tuple[Any, ...]) -> Doubled:
@@ -140,7 +140,7 @@ class Replay:
             return in_two_parts(arguments[0])
         if operation == "column":
             column = self._swept[arguments[0]]
-            return _taken(column.distinct.doubled, column.index[self._members])
+            return column.distinct.doubled.at(column.index[self._members])
         if operation == "power_of_two":
             return Doubled(np.ldexp(1.0, self._whole(arguments[0])), 0.0, 0.0)
         if operation == "power":
@@ -279,14 +279,6 @@ class ColumnReplays:
             held = distinct, Replay(self._graph, {column: Swept(distinct, every)}, every)
             self._held[column] = held
         return held[1]
-
-
-def _taken(found: Doubled, index: np.ndarray) -> Doubled:
-    """Numbers of members from those of values."""
-    if np.ndim(found.high) == 0:
-        return found
-    low, error = (np.broadcast_to(part, found.high.shape)[index] for part in (found.low, found.error))
-    return Doubled(found.high[index], low, error)
 
 
 _EXACT: dict[str, Callable[..., Any]] = {

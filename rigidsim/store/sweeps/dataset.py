@@ -116,10 +116,9 @@ def label_numbers(axis: Axis, known: np.ndarray | None = None) -> np.ndarray:
     Args:
         known: the same, (count, components), where they are known already.
     """
-    table = known
-    if table is None:
-        table = np.array([[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)])
-    return table if axis.values.components else table[:, 0]
+    if known is None:
+        known = np.array([[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)])
+    return known if axis.values.components else known[:, 0]
 
 
 def _bare(text: str) -> str:

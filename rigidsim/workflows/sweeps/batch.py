@@ -129,14 +129,16 @@ class BatchTiles:
     def _sample(self) -> tuple[range, Sorted]:
         """Members from all over the sweep, sorted."""
         some = range(0, self._sweep.count, -(-self._sweep.count // _LOOKED_AT))
-        return some, self._sorted(some, None, _MOST_UNTRACED)
+        return some, self._sorted(some, most_untraced=_MOST_UNTRACED)
 
-    def _sorted(self, members: Sequence[int], *most: int | None) -> Sorted:
+    def _sorted(
+        self, members: Sequence[int], most_refused: int | None = None, most_untraced: int | None = None
+    ) -> Sorted:
         if len(self._known) > _MOST_HELD:  # whoever represents a family, it has the same numbers
             self._known.clear()
             self._runs.clear()
             self._estimates.clear()
-        families = Families(Members.of(self._sweep, members, self.axes), *most)
+        families = Families(Members.of(self._sweep, members, self.axes), most_refused, most_untraced)
         families.known = self._known
         return families.sort()
 
