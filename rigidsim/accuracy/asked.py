@@ -18,6 +18,20 @@ def leaves_choice(experiment: Experiment) -> bool:
     return wanted(experiment) is not None and not fixed
 
 
+def asked_of_attitude(experiment: Experiment) -> tuple[str, float] | None:
+    """The key of ``[integrator]`` that asks most of the attitude, and the accuracy, rad; None if none does.
+
+    The full model keeps ``accuracy_axis`` by its attitude: no axis errs by more than that.
+    """
+    integrator = experiment.config.integrator
+    found: list[tuple[str, float]] = []
+    if integrator.accuracy is not None:
+        found.append(("accuracy", float(integrator.accuracy)))
+    if integrator.accuracy_axis is not None and not experiment.config.model.reduced:
+        found.append(("accuracy_axis", float(integrator.accuracy_axis)))
+    return min(found, key=lambda asked: asked[1], default=None)
+
+
 def wanted(experiment: Experiment) -> float | None:
     """Accuracy of the attitude for which settings are chosen, rad; None if none is asked for.
 
@@ -25,9 +39,8 @@ def wanted(experiment: Experiment) -> float | None:
     they are, and a more costly setting is chosen if they are larger.
     """
     integrator = experiment.config.integrator
-    found = [] if integrator.accuracy is None else [float(integrator.accuracy)]
-    if integrator.accuracy_axis is not None and not experiment.config.model.reduced:
-        found.append(float(integrator.accuracy_axis))  # no axis errs by more than the attitude
+    of_attitude = asked_of_attitude(experiment)
+    found = [] if of_attitude is None else [of_attitude[1]]
     if integrator.accuracy_position is not None:
         scene = build_scene(experiment)
         if scene.position is None or scene.velocity is None:

@@ -31,7 +31,7 @@ from rigidsim.accuracy.reference import (
     references,
 )
 from rigidsim.accuracy.setting import Setting, setting_of
-from rigidsim.accuracy.trial import Told, Trials, try_setting
+from rigidsim.accuracy.trial import Told, Trial, Trials, try_setting
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.records import dataclass
@@ -83,18 +83,20 @@ class Shortfall:
     Attributes:
         asked, certified: rad.
         how: description of the reference.
+        key: key of ``[integrator]`` that asked for it.
     """
 
     code: ClassVar[str] = "accuracy_not_certified"
     asked: float
     certified: float
     how: str
+    key: str = "accuracy"
 
     @property
     def message(self) -> str:
         """Message for the user."""
         return (
-            f"accuracy = {self.asked:.3g} rad was asked for, but only {self.certified:.2g} rad could be "
+            f"{self.key} = {self.asked:.3g} rad was asked for, but only {self.certified:.2g} rad could be "
             f"certified ({self.how}); choose a higher precision or a nearer end"
         )
 
@@ -161,16 +163,18 @@ class _Compared:
         if "quaternion" in dataset:
             self._parts = parts_of(dataset, "quaternion", everything)
         else:
-            again = try_setting(trials.experiment, self.setting, self._times, loads=trials.loads)
-            self._parts = again.attitudes
+            self._parts = self._again(trials).attitudes
         self._places: list[np.ndarray] | None = None
         if trials.experiment.config.integrator.accuracy_position is not None:
             if "position" in dataset:
                 self._places = parts_of(dataset, "position", everything)
             else:
-                again = try_setting(trials.experiment, self.setting, self._times, loads=trials.loads)
-                self._places = again.places
+                self._places = self._again(trials).places
         self.largest = self.own = math.inf
+
+    def _again(self, trials: Trials) -> Trial:
+        """The run once more, for what it didn't record."""
+        return try_setting(trials.experiment, self.setting, self._times, loads=trials.loads, repeating=True)
 
     def against(self, reference: Reference) -> Certificate | None:
         """The certificate that a reference gives; None if it is impossible."""
@@ -222,20 +226,31 @@ class _Compared:
         return None if trial is None else trial.attitudes
 
 
-def shortfall(certificate: Certificate, accuracy: float) -> Shortfall | None:
-    """By what a requested accuracy (rad) was missed; None if it was certified."""
+def shortfall(certificate: Certificate, accuracy: float, key: str = "accuracy") -> Shortfall | None:
+    """By what a requested accuracy (rad) was missed; None if it was certified.
+
+    Args:
+        key: key of ``[integrator]`` that asked for it.
+    """
     if certificate.error <= accuracy:
         return None
-    return Shortfall(accuracy, min(certificate.error, math.pi), certificate.how)
+    return Shortfall(accuracy, min(certificate.error, math.pi), certificate.how, key)
 
 
 def verdict(
-    certificate: Certificate, accuracy: float | None, accuracy_position: float | None = None
+    certificate: Certificate,
+    accuracy: float | None,
+    accuracy_position: float | None = None,
+    *,
+    key: str = "accuracy",
 ) -> str | None:
     """Warning for a summary if the requested accuracies (rad, and m of the path) weren't certified; None if
     they were.
+
+    Args:
+        key: key of ``[integrator]`` that asked for the accuracy of the attitude.
     """
-    short = None if accuracy is None else shortfall(certificate, accuracy)
+    short = None if accuracy is None else shortfall(certificate, accuracy, key)
     if short is not None:
         return short.message
     place = certificate.place

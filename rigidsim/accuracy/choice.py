@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigidsim.accuracy.asked import leaves_choice, wanted
+from rigidsim.accuracy.asked import asked_of_attitude, leaves_choice, wanted
 from rigidsim.accuracy.cost import MEASURED, cost
 from rigidsim.accuracy.forecast import Forecasts
 from rigidsim.accuracy.motion import KnownMotion
@@ -98,8 +98,9 @@ def chosen(
     accuracy = wanted(experiment)
     if accuracy is None or not leaves_choice(experiment):
         return experiment, None
+    key, _ = asked_of_attitude(experiment) or ("accuracy", accuracy)
     try:
-        choice = choose(experiment, accuracy, loads=loads, beyond=beyond, told=told)
+        choice = choose(experiment, accuracy, loads=loads, beyond=beyond, told=told, key=key)
     except ConfigError as error:
         raise error.at(experiment.source) from None
     keys = choice.setting.overrides(without=integrator.model_fields_set)
@@ -114,12 +115,14 @@ def choose(
     beyond: Setting | None = None,
     told: Told | None = None,
     margins: ChoiceMargins = MARGINS,
+    key: str = "accuracy",
 ) -> Choice:
     """The cheapest setting whose forecast keeps an accuracy, within what the config leaves open.
 
     Args:
         accuracy: attitude accuracy at the end, rad.
         beyond, told: as in ``chosen``.
+        key: key of ``[integrator]`` that asks for it.
 
     Raises:
         ConfigError: no setting does.
@@ -142,7 +145,7 @@ def choose(
         choice = _first(forecasts, candidates, most, hope)
         if choice is None:
             reached = min(candidates, key=forecasts.error, default=None)
-            raise ConfigError(Problem("[integrator] accuracy", _unreachable(forecasts, reached, accuracy)))
+            raise ConfigError(Problem(f"[integrator] {key}", _unreachable(forecasts, reached, accuracy)))
         if not forecasts.measure(choice.setting):
             return choice  # it was tried, or is too dear to be
 

@@ -18,6 +18,8 @@ class Setting:
     Attributes:
         precision: precision as in a config.
         tolerance: None for "auto".
+        hold_invariants: whether invariants are projected from the start; otherwise not at all in trials, and
+            late in runs, as "auto" does.
     """
 
     precision: str | int = "double"
@@ -65,7 +67,7 @@ class Setting:
             "precision": f"{self.precision}" if isinstance(self.precision, int) else f'"{self.precision}"',
             "tolerance": '"auto"' if self.tolerance is None else f"{self.tolerance!r}",
             "formulation": f'"{self.formulation}"',
-            "hold_invariants": "true" if self.hold_invariants else "false",
+            "hold_invariants": "true" if self.hold_invariants else '"auto"',
             "method": f'"{self.method}"',
         }
         return [f"integrator.{key}={value}" for key, value in keys.items() if key not in without]

@@ -81,12 +81,19 @@ class _Collected(SampleReceiver):
             self.drifts[invariant.name] = max(largest, self.drifts.get(invariant.name, 0.0))
 
 
-def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath.mpf] | None = None) -> Scene:
+def trial_scene(
+    experiment: Experiment,
+    setting: Setting,
+    times: Sequence[mpmath.mpf] | None = None,
+    *,
+    repeating: bool = False,
+) -> Scene:
     """The scene of an experiment under another setting, recording its attitude, and its path where an
     accuracy of that is asked for.
 
     Args:
         times: sample times, s (mpf), ascending; None keeps the experiment's.
+        repeating: whether invariants are held as the experiment holds them, late by default.
 
     Raises:
         ConfigError: the scene can't be integrated with this setting.
@@ -97,7 +104,7 @@ def trial_scene(experiment: Experiment, setting: Setting, times: Sequence[mpmath
             "precision": setting.precision,
             "tolerance": "auto",
             "formulation": setting.formulation,
-            "hold_invariants": setting.hold_invariants,
+            "hold_invariants": config.integrator.hold_invariants if repeating else setting.hold_invariants,
             "method": setting.method,
             "accuracy": None,
             "accuracy_axis": None,
@@ -123,6 +130,7 @@ def try_setting(
     go_on: Check | None = None,
     told: Told | None = None,
     compact: bool = False,
+    repeating: bool = False,
 ) -> Trial:
     """Integrate an experiment's motion under a setting.
 
@@ -134,12 +142,13 @@ def try_setting(
         told: receives the title and the trial's progress (0 to 1), some tens of times per second.
         compact: compile in a tenth of the time to code that takes up to twice as long per step in double
             precision, and as long in the others; rounding differs.
+        repeating: as in ``trial_scene``.
 
     Raises:
         ConfigError: the scene can't be integrated with it (no closed form, nothing to project, ...).
     """
     started = time.process_time()
-    scene = trial_scene(experiment, setting, times)
+    scene = trial_scene(experiment, setting, times, repeating=repeating)
     samples, early = scene.samples, 0
     if samples.times is not None and samples.times[0] > samples.begin:
         # a motion begins at its first sample, which must be its start

@@ -164,13 +164,24 @@ class Diagnostics:
     def _modelling(self) -> Iterator[Caution]:
         found = self.modelling
         asked = self.prepared.scene.config.integrator.accuracy_axis
-        most = UNCERTAIN if asked is None else float(asked)
-        if found is None or found.worst <= most:
+        averaged, ended = self.prepared.system.plan.average is not None, self.progress.status.exit_code == 0
+        if found is None and averaged and ended and asked is not None:
+            yield Caution(
+                WarningCode.NOT_CERTIFIED,
+                f"accuracy_axis = {float(asked):.3g} rad was asked for, but the error of the averaged model "
+                "wasn't measured",
+            )
+        if found is None:
+            return
+        worst, most = found.worst, UNCERTAIN
+        if asked is not None:  # of the axes, by whatever cause
+            most = float(asked)
+            worst += (self.estimate.attitude or 0.0) if self.estimate is not None else 0.0
+        if worst <= most:
             return
         yield Caution(
             WarningCode.MODEL_UNCERTAIN,
-            f'[model] level = "{found.level}" leaves directions uncertain by about '
-            f"{found.worst:.2g} rad at the end"
+            f'[model] level = "{found.level}" leaves directions uncertain by about {worst:.2g} rad at the end'
             + ("" if asked is None else f", where accuracy_axis = {most:.2g} rad was asked for")
             + "; choose a less averaged level, or a nearer end",
         )

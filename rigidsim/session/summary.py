@@ -266,10 +266,16 @@ def _modelling(found: Diagnostics) -> Modelling | None:
         return None
     known, output = found.modelling, found.prepared.scene.config.output
     asked = found.prepared.scene.config.integrator.accuracy_axis
+    requested = None if asked is None else float(asked)
     if known is None:
         why = "the run has not ended, or the full model can't be followed"
         why = why if output.estimate else "[output] estimate = false"
-        return Modelling(level=average.level, short_period=average.short_period, how=f"not measured: {why}")
+        return Modelling(
+            level=average.level,
+            short_period=average.short_period,
+            requested=requested,
+            how=f"not measured: {why}",
+        )
     return Modelling(
         level=average.level,
         short_period=average.short_period,
@@ -280,7 +286,7 @@ def _modelling(found: Diagnostics) -> Modelling | None:
         growth=known.growth,
         oscillation=known.oscillation,
         whole=known.whole,
-        requested=None if asked is None else float(asked),
+        requested=requested,
         how=known.how,
         cpu_seconds=known.cpu_seconds,
         windows=tuple(

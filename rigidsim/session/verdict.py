@@ -16,6 +16,7 @@ class Soundness(Enum):
     AMPLIFIED = "amplified"
     HELD = "held"
     UNCHECKED = "unchecked"
+    INACCURATE = "inaccurate"
     LOST = "lost"
     DRIFTED = "drifted"
 
@@ -37,9 +38,12 @@ class RunVerdict:
 
 _GONE = {WarningCode.ATTITUDE_UNCERTAIN.value, WarningCode.RATES_UNCERTAIN.value}
 
+_LESS_THAN_ASKED = {WarningCode.NOT_CERTIFIED.value, WarningCode.MODEL_UNCERTAIN.value}
+
 
 def verdict_on(summary: Summary) -> RunVerdict:
-    """The worst that can be said of a run: drifts that rounding does not explain, then lost digits.
+    """The worst that can be said of a run: drifts that rounding does not explain, then lost digits, then less
+    accuracy than was asked for.
 
     A motion may amplify errors whatever its drifts. For projected invariants the corrections put back count,
     since they are the drift that would have been.
@@ -60,6 +64,8 @@ def _soundness(summary: Summary, share: float | None) -> Soundness:
         return Soundness.DRIFTED
     if _GONE.intersection(summary.warning_codes):
         return Soundness.LOST
+    if _LESS_THAN_ASKED.intersection(summary.warning_codes):
+        return Soundness.INACCURATE
     if share is None:
         return Soundness.UNCHECKED
     if summary.held:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
-from rigidsim.accuracy.asked import wanted
+from rigidsim.accuracy.asked import asked_of_attitude, wanted
 from rigidsim.accuracy.certificate import certify, verdict
 from rigidsim.accuracy.choice import Choice
 from rigidsim.model.load import Load
@@ -26,7 +26,7 @@ def certified(
     session: Session,
     loads: Sequence[Load] = (),
 ) -> tuple[AnyRun, bool]:
-    """Certify a finished run, if ``accuracy`` asks for it, and put the certificate into its summary.
+    """Certify a finished run, if its config asks for an accuracy, and put the certificate into its summary.
 
     Args:
         session: the run's session, to whose cost the certificate's is added.
@@ -40,7 +40,7 @@ def certified(
     if accuracy is None or not complete or not isinstance(summary, Summary):
         return result, True
     session.observer.phase("certify")
-    requested = None if integrator.accuracy is None else float(integrator.accuracy)
+    key, requested = asked_of_attitude(experiment) or ("accuracy", None)
     place = None if length is None else float(length)
     with result.dataset as dataset:
         found = certify(
@@ -57,7 +57,7 @@ def certified(
         known["requested_position"] = place
     doubt: str | None = "too little was recorded to certify the accuracy asked for"
     if found is not None:
-        doubt = verdict(found, requested, place)
+        doubt = verdict(found, requested, place, key=key)
         known |= found.as_dict()
     if choice is not None:
         known |= {"chosen": choice.setting.title, "chosen_why": choice.why, "forecast": choice.forecast}

@@ -9,7 +9,13 @@ from rigidsim.solve.status import Status
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Advice, AdviceCode
 
-_STYLES = {Soundness.LOST: "bold yellow", Soundness.DRIFTED: "bold red"}
+_STYLES = {
+    Soundness.INACCURATE: "bold yellow",
+    Soundness.INACCURATE: "not accurate enough: see the warning; drifts are within what rounding explains, "
+    "{share} of it at most",
+    Soundness.LOST: "bold yellow",
+    Soundness.DRIFTED: "bold red",
+}
 _SOUND = "sound: every drift is within what rounding explains, {share} of it at most"
 _WORDS = {
     Soundness.SOUND: _SOUND,
