@@ -74,6 +74,7 @@ def plan_model(
     scaling: Scaling | None = None,
     *,
     like: ModelPlan | None = None,
+    along: Average | None = None,
 ) -> ModelPlan:
     """Decide on the least system that a scene needs.
 
@@ -81,6 +82,7 @@ def plan_model(
         extra_loads: loads given from Python, besides those of the config.
         scaling: if already known from another formulation of the same motion, whose loads were checked.
         like: plan of the same scene in plain numbers, whose estimates and checks hold here too.
+        along: the average, already chosen, of a motion that this scene is a part of.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a load that depends on the
@@ -90,7 +92,7 @@ def plan_model(
         scene = replace(scene, loads=(*scene.loads, *extra_loads))
     loads: list[Load] = [*UniformGravity.of(scene), *loads_of(scene)]
     if scene.config.model.reduced:
-        return _averaged(scene, loads)
+        return _averaged(scene, loads, along)
     requirements = choose_requirements(scene, loads)
     requirements, plane = _planar(scene, loads, requirements)
     if scaling is None and like is not None:
@@ -139,13 +141,13 @@ def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
     return tags
 
 
-def _averaged(scene: Scene, loads: Sequence[Load]) -> ModelPlan:
+def _averaged(scene: Scene, loads: Sequence[Load], along: Average | None) -> ModelPlan:
     """Plan a motion averaged over its rotation, and possibly over its sources' orbits."""
     from rigidsim.model.averaged.average import average_of
     from rigidsim.model.averaged.states import WHY, WHY_DRIVEN, refuse_untold
 
     scaling = replace(choose_scaling(scene), rates=(0, 0, 0))
-    average = average_of(scene, loads, scaling)
+    average = average_of(scene, loads, scaling, along)
     record = scene.config.output.record
     refuse_untold(average, record)
     refuse_without_plane(scene, loads)

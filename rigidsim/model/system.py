@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,9 +11,8 @@ import heyoka as hy
 from rigidsim.model.assembly import assemble_states
 from rigidsim.model.euler_charts import across, partner_sequence
 from rigidsim.model.heyoka_expressions import to_heyoka
-from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.model_plan import ModelPlan, plan_model
+from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
@@ -310,24 +308,21 @@ class System:
         return self.parameters > 0
 
 
-def build_system(
-    scene: Scene, number: Rounder, extra_loads: Sequence[Load] = (), scaling: Scaling | None = None
-) -> System:
-    """Build the least system that the scene needs.
+def build_system(plan: ModelPlan, number: Rounder) -> System:
+    """Build the least system that a scene needs.
 
     Args:
+        plan: from ``plan_model``.
         number: rounds an mpf once to the working precision's scalar.
-        extra_loads: loads besides those of the config.
-        scaling: if already known (see ``plan_model``).
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.
         OverflowError: numbers that neither the states nor the dataset can hold.
     """
-    system = System(plan_model(scene, extra_loads, scaling), number)
+    system = System(plan, number)
     attitude = system.mechanics.attitude
     if system.requirements.canonical:
-        refuse_singular_start(scene, attitude)
+        refuse_singular_start(plan.scene, attitude)
     refuse_out_of_range(system.initial, [*system.recorded, *system.invariants], number)
     return system
 

@@ -45,6 +45,7 @@ def cheaper_model(
     if steps < limits.steps or not suited or config.model.level != FULL or config.output.record is None:
         return None
     from rigidsim.accuracy.models.modelling import measure_modelling
+    from rigidsim.accuracy.models.side_by_side import Unmeasured
 
     for level in reversed(REDUCED):
         keys = [f'model.level="{level}"', "model.short_period=true"]
@@ -53,7 +54,7 @@ def cheaper_model(
             found = measure_modelling(other, go_on=go_on)
         except ConfigError:  # no such average exists, or it can't provide what is recorded
             continue
-        if found is None:
+        except Unmeasured:
             return None
         if found.worst <= limits.apart:
             beside = found.windows[0]

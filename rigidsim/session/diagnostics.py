@@ -22,6 +22,7 @@ from rigidsim.store.summary_parts import Caution, WarningCode
 if TYPE_CHECKING:
     from rigidsim.accuracy.estimates.estimate import Estimate
     from rigidsim.accuracy.models.modelling import ModellingError
+    from rigidsim.accuracy.models.side_by_side import Unmeasured
     from rigidsim.session.cheaper_model import CheaperModel
 
 NEAR_SINGULAR = 1e-3
@@ -36,6 +37,7 @@ class Diagnostics:
     Attributes:
         estimate: estimated errors at the end; None if not requested, or the run hasn't ended.
         modelling: error of a reduced model; None for the full model, and if not measured.
+        unmeasured: why it isn't measured of a run that ended; None if it is.
         cheaper: an averaged model that would have sufficed; None if there is none, or none was sought.
     """
 
@@ -44,6 +46,7 @@ class Diagnostics:
     statistics: SampleStatistics
     estimate: Estimate | None = None
     modelling: ModellingError | None = None
+    unmeasured: Unmeasured | None = None
     cheaper: CheaperModel | None = None
 
     @property
@@ -85,8 +88,12 @@ class Diagnostics:
     def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
         """The diagnostics with the error of a reduced model; arguments as for ``estimated``."""
         from rigidsim.accuracy.models.modelling import measure_modelling
+        from rigidsim.accuracy.models.side_by_side import Unmeasured
 
-        return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
+        try:
+            return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
+        except Unmeasured as why:
+            return replace(self, unmeasured=why)
 
     def compared(self, limits: AdviceLimits, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
         """The diagnostics with an averaged model that would have sufficed; arguments as for
@@ -163,6 +170,12 @@ class Diagnostics:
 
     def _modelling(self) -> Iterator[Caution]:
         found = self.modelling
+        if self.unmeasured is not None:
+            yield Caution(
+                WarningCode.MODEL_UNMEASURED,
+                f"no error of the averaged model is known, since {self.unmeasured}; choose a less averaged "
+                "level, or compare the directions with a run of the full model",
+            )
         asked = self.prepared.scene.config.integrator.accuracy_axis
         averaged, ended = self.prepared.system.plan.average is not None, self.progress.status.exit_code == 0
         if found is None and averaged and ended and asked is not None:

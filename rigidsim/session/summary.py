@@ -35,6 +35,7 @@ from rigidsim.store.summary_parts import (
     Modelling,
     ModellingWindow,
     TableErrors,
+    UnmeasuredCode,
 )
 
 if TYPE_CHECKING:
@@ -268,13 +269,17 @@ def _modelling(found: Diagnostics) -> Modelling | None:
     asked = found.prepared.scene.config.integrator.accuracy_axis
     requested = None if asked is None else float(asked)
     if known is None:
-        why = "the run has not ended, or the full model can't be followed"
-        why = why if output.estimate else "[output] estimate = false"
+        code, why = UnmeasuredCode.NOT_ENDED, "the run has not reached its end"
+        if not output.estimate:
+            code, why = UnmeasuredCode.NOT_ASKED, "[output] estimate = false"
+        elif found.unmeasured is not None:
+            code, why = found.unmeasured.code, str(found.unmeasured)
         return Modelling(
             level=average.level,
             short_period=average.short_period,
             requested=requested,
             how=f"not measured: {why}",
+            unmeasured=code.value,
         )
     return Modelling(
         level=average.level,

@@ -38,12 +38,16 @@ class RunVerdict:
 
 _GONE = {WarningCode.ATTITUDE_UNCERTAIN.value, WarningCode.RATES_UNCERTAIN.value}
 
-_LESS_THAN_ASKED = {WarningCode.NOT_CERTIFIED.value, WarningCode.MODEL_UNCERTAIN.value}
+_LESS_THAN_ASKED = {
+    WarningCode.NOT_CERTIFIED.value,
+    WarningCode.MODEL_UNCERTAIN.value,
+    WarningCode.MODEL_UNMEASURED.value,
+}
 
 
 def verdict_on(summary: Summary) -> RunVerdict:
     """The worst that can be said of a run: drifts that rounding does not explain, then lost digits, then less
-    accuracy than was asked for.
+    accuracy than was asked for, or an averaged model's own error too large or unknown.
 
     A motion may amplify errors whatever its drifts. For projected invariants the corrections put back count,
     since they are the drift that would have been.

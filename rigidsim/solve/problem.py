@@ -14,6 +14,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.model.load import Load
+from rigidsim.model.model_plan import plan_model
 from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.config import Experiment
@@ -27,6 +28,7 @@ from rigidsim.solve.projection import projected_system
 from rigidsim.solve.sampling import SampleClock
 
 if TYPE_CHECKING:
+    from rigidsim.model.averaged.average import Average
     from rigidsim.solve.closed_form import ClosedForm
 
 DRIFT_FACTOR = 50.0
@@ -116,12 +118,18 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
 
 
 def prepare_scene(
-    experiment: Experiment, scene: Scene, *, loads: Sequence[Load] = (), tolerance: float | None = None
+    experiment: Experiment,
+    scene: Scene,
+    *,
+    loads: Sequence[Load] = (),
+    tolerance: float | None = None,
+    along: Average | None = None,
 ) -> InitialValueProblem:
     """Like ``prepare``, for a scene that differs from the experiment's own.
 
     Args:
         tolerance: tolerance in place of the config's.
+        along: the average, already chosen, of a motion that this scene is a part of.
 
     Raises:
         ConfigError: with what was given, what is allowed and where.
@@ -138,7 +146,7 @@ def prepare_scene(
         if scene.config.model.level == AUTO:
             what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'
             raise ConfigError(Problem("[model] level", what))
-        system = build_system(scene, precision.number, loads)
+        system = build_system(plan_model(scene, loads, along=along), precision.number)
         averaged = system.plan.average is not None and scene.bodies is None  # orbits need all digits
         if averaged and asked == "auto" and tolerance is None:
             step_control = _auto_of_averages(precision)
@@ -338,4 +346,4 @@ def double_twin(prepared: InitialValueProblem) -> System:
     )
     canonical = prepared.system.requirements.canonical  # whose rates are no states and have no scales
     scaling = None if canonical else prepared.system.scaling
-    return build_system(plain, precision_of("double").number, prepared.python_loads, scaling)
+    return build_system(plan_model(plain, prepared.python_loads, scaling), precision_of("double").number)

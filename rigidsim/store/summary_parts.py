@@ -32,6 +32,19 @@ class WarningCode(Enum):
     TIME_WITHOUT_UNIT = "time_without_unit"
     MODEL_UNCERTAIN = "model_uncertain"
     UNDEFINED = "undefined"
+    MODEL_UNMEASURED = "model_unmeasured"
+
+
+class UnmeasuredCode(Enum):
+    """Why the error of an averaged model isn't known; ``value`` stands in summaries."""
+
+    NOT_ASKED = "not_asked"
+    NOT_ENDED = "not_ended"
+    INTERRUPTED = "interrupted"
+    FULL_REFUSED = "full_refused"
+    FULL_STOPPED = "full_stopped"
+    AVERAGED_REFUSED = "averaged_refused"
+    AVERAGED_STOPPED = "averaged_stopped"
 
 
 class AdviceCode(Enum):
@@ -193,6 +206,7 @@ class Modelling(SummaryPart):
         whole: whether the full model was followed to the end.
         requested: largest error that was asked for, rad.
         how: how it was found, or why it wasn't.
+        unmeasured: an ``UnmeasuredCode``, why it wasn't found; empty where it was.
     """
 
     level: Annotated[Text, Claim()]
@@ -206,6 +220,7 @@ class Modelling(SummaryPart):
     whole: StrictBool = False
     requested: Annotated[FiniteNumber | None, Claim()] = None
     how: Text = ""
+    unmeasured: Text = ""
     cpu_seconds: FiniteNumber | None = None
     windows: tuple[ModellingWindow, ...] = ()
 

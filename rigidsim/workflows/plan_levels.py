@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from rigidsim.accuracy.braking import forecast_pace
 from rigidsim.accuracy.models.level import CHEAPEST_FIRST, LevelChoice
 from rigidsim.accuracy.models.modelling import measure_modelling
+from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.accuracy.motion import Pilot, run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
@@ -54,8 +56,9 @@ def compared_levels(
             row["error_rad"] = 0.0
         elif known is not None:
             row["error_rad"] = known.error
-        elif (measured := measure_modelling(prepared)) is not None:
-            row["error_rad"] = measured.worst
+        else:
+            with suppress(Unmeasured):
+                row["error_rad"] = measure_modelling(prepared).worst
         why = known.why_not if known is not None else "" if level == asked else "another level is cheaper"
         found.append({**row, "why_not": why if choice or level == asked else "not asked for"})
     return found

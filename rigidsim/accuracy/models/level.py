@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigidsim.accuracy.models.modelling import measure_modelling
+from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
@@ -73,11 +74,13 @@ def choose_level(
         except ConfigError as error:
             considered.append(Considered(level, None, "; ".join(p.what for p in error.problems)))
             continue
-        if found is not None and found.worst <= asked:
+        except Unmeasured as why:
+            considered.append(Considered(level, None, str(why)))
+            continue
+        if found.worst <= asked:
             considered.append(Considered(level, found.worst, ""))
             return LevelChoice(other, level, considered)
-        why = "the full model can't be followed beside it" if found is None else "more than asked for"
-        considered.append(Considered(level, None if found is None else found.worst, why))
+        considered.append(Considered(level, found.worst, "more than asked for"))
     considered.append(Considered(FULL, 0.0, ""))
     return LevelChoice(fully(experiment), FULL, considered)
 

@@ -26,7 +26,6 @@ from rigidsim.accuracy.models.side_by_side import (
     rotation_rates,
     side_by_side,
 )
-from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.scene.records import dataclass
@@ -79,15 +78,15 @@ class ModellingError:
 
 def measure_modelling(
     prepared: InitialValueProblem, trail: SampleTrail | None = None, go_on: Callable[[], bool] = lambda: True
-) -> ModellingError | None:
+) -> ModellingError:
     """Measure the modelling error of a run.
 
     Args:
         trail: some of the run's samples; without them, there is only a window at the beginning.
         go_on: polled repeatedly; False ends the measurement.
 
-    Returns:
-        None if ``go_on`` ended it, or if the full model can't be followed.
+    Raises:
+        Unmeasured: ``go_on`` ended it, or one of the models can't be followed.
     """
     average = prepared.system.plan.average
     assert average is not None
@@ -104,13 +103,7 @@ def measure_modelling(
     windows: list[Window] = []
     for at, direction, length in places:
         until = end if whole else at + length
-        try:
-            found = side_by_side(prepared, average, at, until, direction, go_on)
-        except ConfigError:
-            found = None
-        if found is None:
-            return None
-        windows.append(found)
+        windows.append(side_by_side(prepared, average, at, until, direction, go_on))
     spent = time.process_time() - started
     if whole:
         return _of_whole(average, windows[0], spent)

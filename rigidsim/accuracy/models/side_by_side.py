@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.accuracy.trial import compactly
+from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import Average, osculating
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.resonance import SlowStart
@@ -27,6 +28,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.status import Status
+from rigidsim.store.summary_parts import UnmeasuredCode
 
 _FEWEST_SAMPLES, _MOST_SAMPLES = 2000, 16_000
 _SAMPLES_PER_ROTATION = 2
@@ -39,6 +41,14 @@ SHAPE = "energy over the squared momentum"
 """It tells the polhode, and is nearer than either."""
 _OF_ROTATION = "rotational_energy"
 """The full model's name for the energy that an averaged one follows, without the potential of gradients."""
+
+
+class Unmeasured(Exception):
+    """The error of an averaged model can't be measured; says why, for decisions and for people."""
+
+    def __init__(self, code: UnmeasuredCode, why: str) -> None:
+        super().__init__(why)
+        self.code = code
 
 
 @dataclass(frozen=True)
@@ -117,8 +127,12 @@ def side_by_side(
     end: float,
     states: Sequence[Any],
     go_on: Callable[[], bool],
-) -> Window | None:
-    """Run both models side by side; None if one doesn't reach the end."""
+) -> Window:
+    """Run both models side by side.
+
+    Raises:
+        Unmeasured: one of them is refused, or doesn't reach the end.
+    """
     exponent = prepared.system.scaling.momentum
     count = _sample_count(motion_at(average, states, exponent), end - begin)
     scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
@@ -129,15 +143,11 @@ def side_by_side(
     names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
     changing = [] if average.driven is None else [SIZE]
     energies = [] if average.driven is None else [_OF_ROTATION, ENERGY]
-    full = _followed(prepared, scene, FULL, True, names + changing + energies[:1], go_on)
+    steps, true = _followed(prepared, scene, None, False, names + changing + energies[:1], go_on)
     wanted = names + changing + energies[1:]
-    reduced = _followed(prepared, scene, average.level, back, wanted, go_on) if full else None
-    plain = reduced
-    if reduced and back and not average.short_period:
-        plain = _followed(prepared, scene, average.level, False, names, go_on)
-    if full is None or reduced is None or plain is None:
-        return None
-    steps, true = full
+    reduced = plain = _followed(prepared, scene, average, back, wanted, go_on)
+    if back and not average.short_period:
+        plain = _followed(prepared, scene, average, False, names, go_on)
     times = np.linspace(0.0, end - begin, count)
     apart = true["momentum_axis"] - reduced[1]["momentum_axis"]
     basis = _basis(plain[1]["momentum_axis"])
@@ -261,19 +271,36 @@ class _AsDoubles(SampleReceiver):
 def _followed(
     prepared: InitialValueProblem,
     scene: Scene,
-    level: str,
+    average: Average | None,
     short_period: bool,
     names: list[str],
     go_on: Callable[[], bool],
-) -> tuple[int, dict[str, np.ndarray]] | None:
-    """Steps, and the variables asked for at all samples; None if the motion doesn't reach the end."""
+) -> tuple[int, dict[str, np.ndarray]]:
+    """Steps, and the variables asked for at all samples.
+
+    Args:
+        average: the average that the run follows; None for the full model.
+
+    Raises:
+        Unmeasured: the motion is refused, or doesn't reach the end.
+    """
     config = scene.config
-    model = config.model.model_copy(update={"level": level, "short_period": short_period and level != FULL})
+    level = FULL if average is None else average.level
+    model = config.model.model_copy(update={"level": level, "short_period": short_period})
     plain = {"precision": "double", "tolerance": "auto", "hold_invariants": False}
     integrator = config.integrator.model_copy(update=plain)
     output = config.output.model_copy(update={"record": names, "lyapunov": False, "timeline": False})
     changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
-    problem = compactly(prepare_scene(prepared.experiment, replace(scene, config=changed)))
+    words = f'level = "{level}" from {float(scene.start):.6g} s on'
+    loads = prepared.python_loads
+    try:
+        # what the run averages over is known: a window that decided anew might decide otherwise
+        begun = prepare_scene(prepared.experiment, replace(scene, config=changed), loads=loads, along=average)
+    except ConfigError as error:
+        code = UnmeasuredCode.FULL_REFUSED if average is None else UnmeasuredCode.AVERAGED_REFUSED
+        why = "; ".join(problem.what for problem in error.problems)
+        raise Unmeasured(code, f"{words} can't be followed beside the run: {why}") from None
+    problem = compactly(begun)
     parts = assemble(problem)
     receiver = _AsDoubles(parts.evaluator, names)
 
@@ -281,8 +308,11 @@ def _followed(
         return None if go_on() else Status.INTERRUPTED
 
     progress = sampler(problem, parts, receiver, check).run()
+    if progress.status is Status.INTERRUPTED:
+        raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted")
     if progress.status is not Status.FINISHED:
-        return None
+        code = UnmeasuredCode.FULL_STOPPED if average is None else UnmeasuredCode.AVERAGED_STOPPED
+        raise Unmeasured(code, f"{words}, beside the run, ended early: {progress.status.message}")
     return progress.steps, {name: receiver.of(name) for name in names}
 
 

@@ -11,8 +11,6 @@ from rigidsim.store.summary_parts import Advice, AdviceCode
 
 _STYLES = {
     Soundness.INACCURATE: "bold yellow",
-    Soundness.INACCURATE: "not accurate enough: see the warning; drifts are within what rounding explains, "
-    "{share} of it at most",
     Soundness.LOST: "bold yellow",
     Soundness.DRIFTED: "bold red",
 }
@@ -23,6 +21,8 @@ _WORDS = {
     Soundness.HELD: "sound: what was put back is within what rounding explains, {share} of it at most; "
     "drifts themselves are projected away",
     Soundness.UNCHECKED: "unchecked: nothing is conserved here that could be watched",
+    Soundness.INACCURATE: "not accurate enough, or not known to be: see the warning; drifts are within what "
+    "rounding explains, {share} of it at most",
     Soundness.LOST: "drifts are within what rounding explains, {share} of it at most, but digits are gone at "
     "the end: see the warning",
     Soundness.DRIFTED: "not sound: {worst} drifted by {times} times what rounding explains; see the warning",
@@ -43,6 +43,9 @@ def verdict_line(summary: Summary) -> tuple[str, str]:
     words = _WORDS[found.soundness]
     share = found.share or 0.0
     told = words.format(share=_percent(share), worst=found.worst, times=f"{share:.2g}")
+    model = summary.modelling
+    if found.soundness is not Soundness.INACCURATE and model is not None and model.momentum_axis is None:
+        told += "; how far the averaged model is from the full one isn't known"
     return told, _STYLES.get(found.soundness, "green")
 
 

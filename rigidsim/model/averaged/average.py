@@ -164,11 +164,15 @@ class Average:
         return float(self.motion.tilt(context))
 
 
-def average_of(scene: Scene, loads: Sequence[Load], scaling: Scaling) -> Average:
+def average_of(
+    scene: Scene, loads: Sequence[Load], scaling: Scaling, along: Average | None = None
+) -> Average:
     """The averaged motion that a scene's ``[model] level`` asks for.
 
     Args:
         scaling: internal units, all rates in the same.
+        along: the average whose motion has come to this scene's start: it is the same one from there, with
+            its resonance, and its frequencies were checked where it began.
 
     Raises:
         ConfigError: an average that doesn't apply, with the reason and what to do.
@@ -182,14 +186,17 @@ def average_of(scene: Scene, loads: Sequence[Load], scaling: Scaling) -> Average
         motion = free_motion(context, body, momentum)
         spectrum = body_spectrum(motion)
         alone = [load for load in loads if load.gradient_source is None]
-        resonance = None if alone else refuse_frequencies(scene, spectrum, sources)
+        if along is not None:
+            resonance = None if along.resonance is None else along.resonance.among(sources)
+        else:
+            resonance = None if alone else refuse_frequencies(scene, spectrum, sources)
         if resonance is not None:
             return _resonant(scene, resonance, sources)
         vector = apply(matrix, momentum)
         removed = _left_out_at_start(scene, spectrum, sources, unit(context, vector))
         vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
         if alone:
-            return _driven(scene, alone, sources, spectrum, unit(context, vector), scaling)
+            return _driven(scene, alone, sources, spectrum, unit(context, vector), scaling, along)
         motion = free_motion(context, body, momentum, norm(context, vector))
     except Separatrix:
         raise separatrix_refused(table.level) from None
@@ -241,6 +248,7 @@ def _driven(
     spectrum: BodySpectrum,
     direction: Vector,
     scaling: Scaling,
+    along: Average | None,
 ) -> Average:
     """The average under torques of the body alone as well.
 
@@ -250,7 +258,8 @@ def _driven(
     """
     context, table = scene.context, scene.config.model
     epsilon = 2.0 ** (1 - working_bits(scene.config.integrator.precision))
-    driven = passing(scene, driven_by(scene, scaling, alone, epsilon), sources)
+    driven = driven_by(scene, scaling, alone, epsilon)
+    driven = passing(scene, driven, sources) if along is None else driven
     start = [x - context.mpf(float(y)) for x, y in zip(direction, driven.direction, strict=True)]
     motion = driven.motion(driven.axial, driven.transverse)
     steady = driven.course.tilt <= AXIAL

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -130,6 +131,11 @@ class Resonance:
         """Rate of small librations in longitude at small obliquity, n sqrt(3 H (B - A) / C), rad/s."""
         zero, plus, minus = (abs(float(x)) for x in self.coefficients)
         return math.sqrt(4 * float(self.strength) * max(zero, plus, minus) / float(self.motion.moments[2]))
+
+    def among(self, sources: Sequence[Source]) -> Resonance:
+        """The same resonance with the same one of these sources."""
+        (source,) = (x for x in sources if x.number == self.source.number)
+        return replace(self, source=source)
 
     # --- between the full motion and the slow one ---------------------------------------------------------
 
