@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import rigidsim
+from rigidsim.cli.screens.verdicts import verdict_line
 from rigidsim.session.verdict import Soundness, verdict_on
 
 FAULTS = Path(__file__).parents[1] / "data" / "faults"
@@ -41,6 +42,7 @@ def test_an_accuracy_that_is_not_shown_is_told(level: str, settings: list[str], 
     summary = run.summary
     assert code in summary["warning_codes"]
     assert verdict_on(run.outcome).soundness in (Soundness.INACCURATE, Soundness.LOST)
+    assert "sound" not in verdict_line(run.outcome)[0]
     told = summary["accuracy" if level == "full" else "modelling"]
     assert told["requested"] == (1e-9 if "integrator.accuracy_axis=1e-9" in settings else 1e-3)
 
