@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
@@ -16,6 +17,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the studies are no install
 
 import rigidsim.workflows.read  # noqa: F401  (tests that read configs below need every kind of load)
 
+TERMINAL = shutil.get_terminal_size().columns
+# Whatever terminal the tests are started from, and however long the path of their temporary folder: no line
+# of a screen is broken, but where a test is about that and gives a width.
+os.environ.update(COLUMNS="1000", FORCE_COLOR="", TTY_COMPATIBLE="", NO_COLOR="")
+
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
@@ -27,6 +33,11 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     optimised = any(item.get_closest_marker(name) for name in ("optimised", "slow"))  # long runs step long
     with nullcontext() if optimised else unoptimised_code():
         return (yield)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """The progress of the tests themselves fits the terminal that they are started from."""
+    session.config.get_terminal_writer().fullwidth = TERMINAL
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -24,7 +24,7 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Replace a value, such as time.end=10; repeatable.",
+        help="Replace a value, such as time.end=10; nothing after = removes the key; repeatable.",
         autocompletion=completion.settings,
     ),
 ]

@@ -96,36 +96,34 @@ def follow(
         NoDisplay, FileNotFoundError: as for ``viewer.open_viewer``.
         RuntimeError: the viewer ended before it listened.
     """
-    process, port = viewer.start_empty(web=web)
-    # Ctrl-C ends the viewer, too: what was on its way there would be complained of; `process` tells enough
-    os.environ.setdefault("RUST_LOG", "off")
-    import rerun as rr
+    with viewer.empty_viewer(web=web) as (process, port):
+        # Ctrl-C ends the viewer, too: what was on its way there would be complained of, and `process` tells
+        # enough
+        os.environ.setdefault("RUST_LOG", "off")
+        import rerun as rr
 
-    try:
-        viewer.wait_for(process, port, _ANSWER_SECONDS)
-        with rr.RecordingStream("rigidsim") as stream:
-            stream.connect_grpc(f"rerun+http://{viewer.LOOPBACK}:{port}/proxy")
-            recording, going_on = LiveRecording(stream), True
-            while going_on and process.poll() is None:
-                dataset, going_on = read()
-                if dataset is not None:
-                    with dataset:
-                        recording.update(dataset)
-                if going_on:
-                    _sleep(process, poll)
-        return viewer.ended(process)
-    except KeyboardInterrupt:
-        return 130
-    except RuntimeError:
-        # sent while the viewer was being closed
         try:
-            return viewer.ended(process, _CLOSING_SECONDS)
-        except subprocess.TimeoutExpired:
-            pass
-        raise
-    finally:
-        process.terminate()
-        process.wait()
+            viewer.wait_for(process, port, _ANSWER_SECONDS)
+            with rr.RecordingStream("rigidsim") as stream:
+                stream.connect_grpc(f"rerun+http://{viewer.LOOPBACK}:{port}/proxy")
+                recording, going_on = LiveRecording(stream), True
+                while going_on and process.poll() is None:
+                    dataset, going_on = read()
+                    if dataset is not None:
+                        with dataset:
+                            recording.update(dataset)
+                    if going_on:
+                        _sleep(process, poll)
+            return viewer.ended(process)
+        except KeyboardInterrupt:
+            return viewer.INTERRUPTED
+        except RuntimeError:
+            # sent while the viewer was being closed
+            try:
+                return viewer.ended(process, _CLOSING_SECONDS)
+            except subprocess.TimeoutExpired:
+                pass
+            raise
 
 
 def _sleep(process: subprocess.Popen[bytes], seconds: float) -> None:

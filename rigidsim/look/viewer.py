@@ -9,6 +9,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Self
@@ -60,15 +62,29 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
         raise NoDisplay(NO_DISPLAY)
     command = [str(viewer_binary()), str(recording), "--bind", LOOPBACK]
     command += _served(DATA_PORT) if web else ["--port", "auto"]
-    process = subprocess.Popen(command, env=_terse() if web else os.environ | QUIET)
-    if web:
-        print(web_words(DATA_PORT), flush=True)
-    try:
-        return ended(process)
-    except KeyboardInterrupt:
-        process.terminate()
-        process.wait()
-        return INTERRUPTED
+    with _running(command, _terse() if web else QUIET) as process:
+        if web:
+            print(web_words(DATA_PORT), flush=True)
+        try:
+            return ended(process)
+        except KeyboardInterrupt:
+            return INTERRUPTED
+
+
+@contextmanager
+def _running(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[subprocess.Popen[bytes]]:
+    """A viewer that is ended with the context.
+
+    It makes a folder for its catalogue where temporary files go and leaves it there when it is ended, so that
+    it is given a place that goes with it.
+    """
+    with tempfile.TemporaryDirectory(prefix="rigidsim-viewer-") as scratch:
+        process = subprocess.Popen(command, env={**os.environ, **environment, "TMPDIR": scratch})
+        try:
+            yield process
+        finally:
+            process.terminate()
+            process.wait()
 
 
 def ended(process: subprocess.Popen[bytes], timeout: float | None = None) -> int:
@@ -81,8 +97,10 @@ def ended(process: subprocess.Popen[bytes], timeout: float | None = None) -> int
     return INTERRUPTED if code == -signal.SIGINT else code
 
 
-def start_empty(*, web: bool = False) -> tuple[subprocess.Popen[bytes], int]:
-    """Start a viewer that waits for recordings, and the port of 127.0.0.1 on which it takes them.
+@contextmanager
+def empty_viewer(*, web: bool = False) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    """A viewer that waits for recordings, and the port of 127.0.0.1 on which it takes them; it is ended with
+    the context.
 
     Raises:
         FileNotFoundError: no viewer in the installed rerun-sdk.
@@ -93,10 +111,10 @@ def start_empty(*, web: bool = False) -> tuple[subprocess.Popen[bytes], int]:
     port = _free_port()
     command = [str(viewer_binary()), "--bind", LOOPBACK]
     command += _served(port) if web else ["--port", str(port), "--expect-data-soon"]
-    process = subprocess.Popen(command, env=_terse() if web else os.environ | QUIET)
-    if web:
-        print(web_words(port), flush=True)
-    return process, port
+    with _running(command, _terse() if web else QUIET) as process:
+        if web:
+            print(web_words(port), flush=True)
+        yield process, port
 
 
 def _served(port: int) -> list[str]:
@@ -105,7 +123,7 @@ def _served(port: int) -> list[str]:
 
 def _terse() -> dict[str, str]:
     """Environment of a viewer that reports only errors."""
-    return {"RUST_LOG": "warn"} | os.environ | QUIET
+    return {"RUST_LOG": os.environ.get("RUST_LOG", "warn"), **QUIET}
 
 
 def web_words(port: int) -> str:
@@ -204,9 +222,9 @@ class HeadlessViewer:
         command = [str(viewer_binary()), str(self._path.resolve()), "--headless"]
         command += ["--bind", LOOPBACK, "--port", str(self._port)]
         command += ["--window-size", f"{self._size[0]}x{self._size[1]}"]
-        # A home of its own: none of the user's settings.
+        # A home of its own: none of the user's settings, and nothing left among temporary files.
         home = self._home.name
-        environment = os.environ | QUIET
+        environment = os.environ | QUIET | {"TMPDIR": home}
         environment |= {"HOME": home, "XDG_CONFIG_HOME": home, "XDG_DATA_HOME": home}
         self._log = Path(home) / "viewer.log"
         with self._log.open("wb") as output:

@@ -7,10 +7,13 @@ Loads in a config, rigidsim's own and those you write in Python all derive from 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import heyoka as hy
+import numpy as np
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, TablePlane
@@ -21,9 +24,14 @@ from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.validation_messages import shown
 
 Term = tuple[Vector, Symbolic]
 """A constant vector (mpf) times an expression."""
+
+
+STATES_READ = ("attitude", "vertical", "flight")
+"""What a load can ask for in ``reads``."""
 
 
 class Load(SceneLoad):
@@ -189,6 +197,65 @@ class Load(SceneLoad):
     def effect(self) -> str:
         """Its effect, in one sentence for ``rigidsim plan``."""
         return f"{self.title}: given from Python"
+
+
+def own_loads(given: Iterable[Load] | None) -> tuple[Load, ...]:
+    """Loads given from Python.
+
+    Raises:
+        ConfigError: something else than loads was given, or one reads what no motion has.
+    """
+    if given is None:
+        return ()
+    if isinstance(given, Load | str | Mapping) or not isinstance(given, Iterable):
+        what = f"given {shown(given)}; a list of loads is allowed, such as loads=[Magnet()]"
+        raise ConfigError(Problem("loads", what))
+    found = tuple(given)
+    problems = []
+    for place, load in enumerate(found):
+        if isinstance(load, type):
+            what = f"given the class {load.__name__}; give an object of it: {load.__name__}(...)"
+        elif not isinstance(load, Load):
+            what = (
+                f"given {shown(load)}; an object of a class derived from rigidsim.model.loads.Load is "
+                "allowed (what [[loads]] has belongs in the config)"
+            )
+        elif not set(load.reads) <= set(STATES_READ):
+            what = f"reads {shown(sorted(load.reads))}; allowed: {', '.join(STATES_READ)}"
+        else:
+            continue
+        problems.append(Problem(f"loads[{place}]", what))
+    if problems:
+        raise ConfigError(problems)
+    return found
+
+
+def torque_terms(load: Load, m: Kinematics) -> list[Term]:
+    """A load's torque, as ``Load.torque`` gives it.
+
+    Raises:
+        ConfigError: the load gave something else than terms.
+    """
+    return _checked(load, "torque", load.torque(m))
+
+
+def force_terms(load: Load, m: Kinematics) -> list[Term]:
+    """A load's force, as ``Load.force`` gives it; raises as ``torque_terms``."""
+    return _checked(load, "force", load.force(m))
+
+
+def _checked(load: Load, what: str, given: object) -> list[Term]:
+    if isinstance(given, list | tuple) and all(_is_term(term) for term in given):
+        return list(given)
+    said = (
+        f"its {what} is {shown(given)}; a list of terms is allowed, each a vector of three constants and an "
+        "expression: [([1, 0, 0], m.matrix[0][2])]"
+    )
+    raise ConfigError(Problem(f"load {load.title}", said))
+
+
+def _is_term(given: object) -> bool:
+    return isinstance(given, list | tuple) and len(given) == 2 and np.shape(given[0]) == (3,)
 
 
 def loads_of(scene: Scene) -> list[Load]:

@@ -19,7 +19,7 @@ from rigidsim.model.equations import vertical_from_attitude
 from rigidsim.model.formulations import BUILDERS
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import in_common_unit
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.rotations import Symbolic
@@ -63,8 +63,8 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     if not loads:
         return None
     m = probe(scene, requirements, loads)
-    torque = [term for load in loads for term in load.torque(m)]
-    force = [term for load in loads for term in load.force(m)] if m.velocity is not None else []
+    torque = [term for load in loads for term in torque_terms(load, m)]
+    force = [term for load in loads for term in force_terms(load, m)] if m.velocity is not None else []
     names, start = start_of(m, loads)
     narrow = [u for load in loads for u in load.narrow(m)]
     in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})

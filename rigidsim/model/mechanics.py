@@ -9,7 +9,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector
@@ -64,7 +64,7 @@ class Mechanics(Kinematics):
 
     @cached_property
     def _torques(self) -> list[list[Term]]:
-        return [load.torque(self) for load in self.loads]
+        return [torque_terms(load, self) for load in self.loads]
 
     @cached_property
     def torque(self) -> list[Term]:
@@ -79,7 +79,7 @@ class Mechanics(Kinematics):
     @cached_property
     def force(self) -> list[Term]:
         """Terms of the centre of mass's total acceleration, space axes."""
-        return [term for load in self.loads for term in load.force(self)]
+        return [term for load in self.loads for term in force_terms(load, self)]
 
     @cached_property
     def potential_energy(self) -> Symbolic | None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.formulations import AttitudeStates
-from rigidsim.model.load import Load
+from rigidsim.model.load import Load, force_terms, torque_terms
 from rigidsim.model.load_estimate import probe, start_of
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.outputs import Invariant, Recorded
@@ -85,7 +85,7 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
         if "attitude" not in load.reads or requirements.formulation == "rates":
             continue
         m = probe(scene, requirements, [load])
-        terms = [*load.torque(m), *(load.force(m) if m.velocity is not None else [])]
+        terms = [*torque_terms(load, m), *(force_terms(load, m) if m.velocity is not None else [])]
         if not terms:
             continue
         names, start = start_of(m, [load])

@@ -87,12 +87,15 @@ class Experiment:
 
         Args:
             changes: dotted keys with optional [index], ``"initial.angular_velocity[0]"``, to values as in
-                ``from_dict``.
+                ``from_dict``. None removes a key: ``replace(time={"samples": None, "times": [0, 1, 10]})``.
             tables: tables with the keys to change, or ``name`` and ``description``.
 
         Raises:
             ConfigError: with every problem found.
         """
+        if changes is not None and not isinstance(changes, Mapping):
+            what = f'given {messages.shown(changes)}; keys and values are allowed: {{"time.end": 10}}'
+            raise ConfigError(Problem("replacing", what), self.source)
         other = parse(self.text, source=self.source, overrides={**(changes or {}), **tables})
         return exchanged(other, given=self.given, settings=(*self.settings, *other.settings))
 

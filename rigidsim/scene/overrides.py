@@ -21,7 +21,8 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str =
 
     Args:
         overrides: each a dotted key with optional [index], an equals sign and a TOML value (anything else,
-            such as a bare word or a number with its unit, is a string).
+            such as a bare word or a number with its unit, is a string); nothing after the equals sign removes
+            the key.
         what: what the overrides are called in messages.
 
     Raises:
@@ -33,6 +34,9 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str =
     for assignment in overrides:
         where = f"{what} {assignment[:60]}"
         key, value_text = _parts(assignment, where)
+        if not value_text:
+            _remove(table, key, where)
+            continue
         try:
             value = tomllib.loads(f"value = {value_text}", parse_float=decimal)["value"]
         except (ValueError, RecursionError):
@@ -57,6 +61,9 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
         document = tomlkit.parse(text)
         for assignment in overrides:
             key, value_text = _parts(assignment, what)
+            if not value_text:
+                _remove(document, key, what)
+                continue
             try:
                 value: Any = tomlkit.parse(f"value = {value_text}\n").item("value")
                 value.trivia.comment = value.trivia.comment_ws = ""
@@ -121,18 +128,7 @@ def key_steps(key: str, where: str) -> list[str | int]:
 
 
 def _assign(table: dict[str, Any], key: str, value: Any, where: str) -> None:
-    steps = key_steps(key, where)
-    target: Any = table
-    for step, following in pairwise(steps):
-        if isinstance(target, dict) and isinstance(step, str):
-            if step not in target:
-                target[step] = [] if isinstance(following, int) else {}
-            target = target[step]
-        elif isinstance(target, list) and isinstance(step, int) and 0 <= step < len(target):
-            target = target[step]
-        else:
-            raise ConfigError(Problem(where, _nothing(target, step)))
-    last = steps[-1]
+    target, last = _found(table, key, where, new=True)
     try:
         if isinstance(target, list) == isinstance(last, str):
             raise TypeError
@@ -141,10 +137,38 @@ def _assign(table: dict[str, Any], key: str, value: Any, where: str) -> None:
         raise ConfigError(Problem(where, _nothing(target, last))) from None
 
 
-def _nothing(target: Any, step: str | int) -> str:
+def _remove(table: dict[str, Any], key: str, where: str) -> None:
+    target, last = _found(table, key, where, new=False)
+    try:
+        del target[last]
+    except (TypeError, LookupError):
+        raise ConfigError(Problem(where, _nothing(target, last, "remove"))) from None
+
+
+def _found(table: dict[str, Any], key: str, where: str, *, new: bool) -> tuple[Any, str | int]:
+    """The table or array that a key's last part is in, and that part.
+
+    Args:
+        new: whether tables that aren't there are made.
+    """
+    steps = key_steps(key, where)
+    target: Any = table
+    for step, following in pairwise(steps):
+        if isinstance(target, dict) and isinstance(step, str) and (new or step in target):
+            if step not in target:
+                target[step] = [] if isinstance(following, int) else {}
+            target = target[step]
+        elif isinstance(target, list) and isinstance(step, int) and 0 <= step < len(target):
+            target = target[step]
+        else:
+            raise ConfigError(Problem(where, _nothing(target, step)))
+    return target, steps[-1]
+
+
+def _nothing(target: Any, step: str | int, purpose: str = "set") -> str:
     """What to say of a place that doesn't exist."""
     there = ""
     if isinstance(target, list) and isinstance(step, int):
         entries = f"entries 0 to {len(target) - 1}" if target else "no entries"
         there = f"; the array there has {entries}"
-    return f'there is nothing at "{step}" to set{there}'
+    return f'there is nothing at "{step}" to {purpose}{there}'

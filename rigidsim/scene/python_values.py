@@ -44,10 +44,10 @@ def assignments_of(changes: Mapping[str, Any]) -> list[str]:
 
     Args:
         changes: dotted keys with optional [index] to values as in ``toml_text``; a dictionary as a value
-            changes those keys in its table that it has.
+            changes those keys in its table that it has. None removes a key.
 
     Raises:
-        ConfigError: something that a config can't hold, or None.
+        ConfigError: something that a config can't hold.
     """
     found = []
     for key, value in changes.items():
@@ -57,7 +57,7 @@ def assignments_of(changes: Mapping[str, Any]) -> list[str]:
                 {f"{key}.{mark}{_key(inner)}{mark}": given for inner, given in value.items()}
             )
         else:
-            found.append(f"{_key(key)}={_inline(value, str(key))}")
+            found.append(f"{_key(key)}={'' if value is None else _inline(value, str(key))}")
     return found
 
 
@@ -99,7 +99,7 @@ def _inline(value: Any, where: str, depth: int = 0) -> str:
     if isinstance(plain, list):
         entries = (_inline(entry, f"{where}[{n}]", depth + 1) for n, entry in enumerate(plain))
         return "[" + ", ".join(entries) + "]"
-    raise ConfigError(Problem(where, f"given {shown(value)} of type {type(value).__name__}; {_ALLOWED}"))
+    raise ConfigError(Problem(where, f"given {shown(value)}; {_ALLOWED}"))
 
 
 def _plain(value: Any) -> Any:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene import schema
 from rigidsim.scene.exact import rounded
 from rigidsim.scene.records import dataclass
@@ -71,7 +71,9 @@ def sample_times(table: schema.Time, context: Any) -> tuple[Any, Any, SampleTime
     """
     ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
     if len(ways) > 1:
-        raise _fail(ways[1], f"given beside {ways[0]}; only one of samples, every, times is allowed")
+        less = either(f"--set time.{ways[0]}= removes it", f'replace({{"time.{ways[0]}": None}}) removes it')
+        allowed = "only one of samples, every, times is allowed: leave the other out"
+        raise _fail(ways[1], f"given beside {ways[0]}; {allowed} ({less})")
 
     def shortly(time: Fraction, digits: int = 12) -> str:
         return str(context.nstr(rounded(time, context), digits))

@@ -134,6 +134,11 @@ class SweepTable(ConfigTable):
         description="integrate members that share their equations side by side; false: each by itself, "
         "which takes many times as long",
     )
+    impossible: Literal["refuse", "mark"] = Field(
+        default="refuse",
+        description="members that can't be run: refuse the sweep before any of them runs, or mark those "
+        'as "refused", with the reason, and run the others',
+    )
     axes: dict[StrictStr, AxisTable] = Field(
         min_length=1, description="the axes, by the dotted keys whose values are swept, with indices from 0"
     )

@@ -62,7 +62,11 @@ def shown(value: Any) -> str:
         if value.bit_length() > LONGEST_INTEGER:
             return f"a whole number of {value.bit_length()} bits"
         value = Decimal(value).normalize()
-    text = str(value).lower().replace("infinity", "inf")
+    text = str(value)
+    if isinstance(value, float | Decimal):
+        text = text.lower().replace("infinity", "inf")
+    elif text.startswith("<"):
+        text = f"an object of type {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
 
 

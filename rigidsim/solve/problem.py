@@ -13,7 +13,7 @@ import mpmath
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, either
-from rigidsim.model.load import Load
+from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.system import System, build_system
@@ -134,6 +134,7 @@ def prepare_scene(
     Raises:
         ConfigError: with what was given, what is allowed and where.
     """
+    loads = own_loads(loads)
     try:
         precision = precision_of(scene.config.integrator.precision)
         asked = scene.config.integrator.tolerance

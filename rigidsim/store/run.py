@@ -131,6 +131,17 @@ class SavedRun(Run):
         """
         return self.opened()
 
+    def refuse_damaged(self) -> None:
+        """Check a complete dataset against its seal and the summary, which reads the whole file.
+
+        Raises:
+            RunFolderError: it is damaged, edited, or another run's.
+        """
+        if self.folder.dataset.exists():
+            # a run completed again after a crash still has the summary of the first time, or none
+            claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest
+            _refuse_damaged(self.folder.dataset, claimed)
+
     def opened(self, *, indexed: bool = True) -> xarray.Dataset:
         """The dataset as in ``dataset``; without ``indexed``, sample times aren't loaded and can't be
         selected by.
@@ -139,9 +150,8 @@ class SavedRun(Run):
             RunFolderError: nothing was saved, or a file is damaged.
         """
         if self.folder.dataset.exists():
-            # a run completed again after a crash still has the summary of the first time, or none
-            claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest
-            return open_dataset(_whole(self.folder.dataset, claimed), indexed=indexed)
+            self.refuse_damaged()
+            return open_dataset(self.folder.dataset, indexed=indexed)
         chain = segments.read_chain(self.folder.segments)
         if chain.damage is not None:
             raise RunFolderError(f"{chain.damage}; {RESUME} sets it aside and resumes before it")
@@ -152,8 +162,8 @@ class SavedRun(Run):
         return join_segments(chain.paths, status=self.status, indexed=indexed)
 
 
-def _whole(path: Path, expected: str | None) -> Path:
-    """A dataset's path after its seal was checked; datasets of the first schema version have no seal.
+def _refuse_damaged(path: Path, expected: str | None) -> None:
+    """Check a dataset's seal; datasets of the first schema version have none.
 
     Args:
         expected: SHA-256 of the file, if the summary beside it gives one.
@@ -179,7 +189,6 @@ def _whole(path: Path, expected: str | None) -> Path:
         raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
     if expected not in (None, digest):
         raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
-    return path
 
 
 def open_run(path: str | Path) -> SavedRun:

@@ -8,8 +8,10 @@ from typing import Any
 
 import rigidsim.model.loads
 import rigidsim.model.partial_invariants  # noqa: F401  (both enter what they define into rigidsim.scene.registry)
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, load, parse
 from rigidsim.scene.schema import config_model
+from rigidsim.scene.validation_messages import shown
 
 __all__ = ["Experiment", "Given", "as_experiment", "config_model", "load", "parse"]
 
@@ -25,6 +27,9 @@ def as_experiment(given: Given, changes: Mapping[str, Any] | None = None) -> Exp
     """
     if isinstance(given, Mapping):
         given = Experiment.from_dict(given)
+    if not isinstance(given, Experiment | str | Path):
+        what = f"given {shown(given)}; an experiment, the path of its config, or its tables are allowed"
+        raise ConfigError(Problem("experiment", what))
     if not isinstance(given, Experiment):
         return load(given, overrides=changes or {})
     return given.replace(changes) if changes else given

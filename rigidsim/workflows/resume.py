@@ -120,9 +120,10 @@ def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads
     """A run whose dataset is complete; finishes what a Ctrl-C left out after that.
 
     Raises:
-        RunFolderError: the folder can't be written.
+        RunFolderError: the folder can't be written, or the dataset is damaged.
     """
     done = open_run(folder.path)
+    done.refuse_damaged()
     summary = done.outcome
     if isinstance(summary, Summary) and summary.status == Status.INTERRUPTED.value:
         folder.refuse_read_only()

@@ -220,6 +220,23 @@ def test_info_of_a_finished_run(config: Config, rigidsim_command: Command) -> No
     assert json.loads(machine.stdout) == read("runs/free")
 
 
+def test_an_edited_dataset_is_told_by_whatever_looks_at_the_run(
+    config: Config, rigidsim_command: Command
+) -> None:
+    rigidsim_command("run", config())
+    dataset = Path("runs/free/dataset.h5")
+    content = bytearray(dataset.read_bytes())
+    content[len(content) // 2] ^= 1
+    dataset.write_bytes(content)
+    for given in (("info",), ("info", "--json"), ("resume",)):
+        told = rigidsim_command(*given[:1], "runs/free", *given[1:])
+        assert told.exit_code == 2
+        assert "dataset.h5: is damaged or was edited" in told.stderr
+    compared = rigidsim_command("verify", "runs/free", "--json")
+    assert compared.exit_code == 1
+    assert "dataset.h5: is damaged or was edited" in json.loads(compared.stdout)["problems"][0]
+
+
 @pytest.mark.parametrize("path", ["runs/nothing", "nothing.h5", "."])
 @pytest.mark.parametrize("command", ["info", "plot", "view"])
 def test_there_is_no_run(command: str, path: str, config: Config, rigidsim_command: Command) -> None:

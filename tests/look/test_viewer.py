@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,14 +21,21 @@ Build = Callable[..., xarray.Dataset]
 
 
 @pytest.mark.slow  # the viewer starts
-def test_picture_of_a_run_shows_the_body_and_its_plots(symmetric_top: Build, tmp_path: Path) -> None:
+def test_picture_of_a_run_shows_the_body_and_its_plots(
+    symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from matplotlib.image import imread
 
     write_timeline(symmetric_top(), tmp_path / "t.rrd")
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr(tempfile, "tempdir", None)
     try:
         viewer.screenshot(tmp_path / "t.rrd", tmp_path / "t.png", size=(1200, 700), at=0.6)
     except viewer.NoGraphics as reason:
         pytest.skip(str(reason))
+    assert not list(temporary.iterdir())
     picture = imread(tmp_path / "t.png")[..., :3]
     height, width = picture.shape[:2]
     scene = picture[int(0.1 * height) : int(0.6 * height), : int(0.5 * width)]
@@ -58,6 +66,9 @@ def test_viewer_listens_on_this_machine_only_and_sends_no_statistics(
 
         def wait(self, timeout: float | None = None) -> int:
             return 7
+
+        def terminate(self) -> None:
+            pass
 
     monkeypatch.setattr(subprocess, "Popen", Process)
     monkeypatch.setenv("DISPLAY", ":0")

@@ -74,7 +74,10 @@ def test_operations_keep_their_meaning() -> None:
         assert value(lines[0].partition(" = ")[2], known) == pytest.approx(wanted, rel=1e-15)
 
 
-def test_numbers_on_the_screen_have_six_digits(capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_on_the_screen_have_six_digits(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "110")
     assert shortened("wx' = 0.66666666666666663*wy - 1.29857290206803e-08*u7^2 + x_1") == (
         "wx' = 0.666667*wy - 1.29857e-08*u7^2 + x_1"
     )

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 import rigidsim
 from rigidsim.errors import FORCE, RigidsimError
+from rigidsim.model.loads import Load
 from rigidsim.scene.config import Experiment
 
 TOP: dict[str, Any] = {
@@ -62,10 +63,61 @@ def test_tables_and_experiment_are_the_same_thing() -> None:
     experiment = Experiment.from_dict(given_tables)
     assert Experiment.from_dict(experiment.to_dict()).config == experiment.config
     assert experiment.to_dict()["body"]["principal_moments"][2] == Decimal("2.5")
-    with pytest.raises(rigidsim.ConfigError, match=r"body.mass: given <object .* numbers"):
+    with pytest.raises(rigidsim.ConfigError, match=r"body.mass: given an object of type object; numbers"):
         Experiment.from_dict({**TOP, "body": {"principal_moments": [1, 2, 2], "mass": object()}})
     with pytest.raises(rigidsim.ConfigError, match="finite numbers are allowed"):
         Experiment.from_dict({**TOP, "time": {"end": float("inf")}})
+
+
+def test_one_way_of_giving_times_takes_the_place_of_another() -> None:
+    experiment = Experiment.from_dict(TOP)
+    both = experiment.replace(time={"times": [0, 1, 10]})
+    with pytest.raises(rigidsim.ConfigError, match=r'replace\(\{"time.samples": None\}\) removes it'):
+        rigidsim.run(both, out=None)
+    other = experiment.replace(time={"samples": None, "times": [0, "0.1 s", 1], "end": None})
+    assert rigidsim.run(other, out=None).dataset.time.values.tolist() == [0, 0.1, 1]
+    assert other.settings == ("time.samples=", 'time.times=[0, "0.1 s", 1]', "time.end=")
+    assert rigidsim.parse(experiment.text, overrides=list(other.settings)).config == other.config
+    with pytest.raises(rigidsim.ConfigError, match=r'there is nothing at "every" to remove'):
+        experiment.replace({"time.every": None})
+    with pytest.raises(rigidsim.ConfigError, match="replacing: given 5; keys and values are allowed"):
+        experiment.replace(5)  # type: ignore[arg-type]
+
+
+class _Wrong(Load):
+    """A load whose torque is what it is given."""
+
+    title = "wrong"
+
+    def __init__(self, torque: Any, reads: str = "attitude") -> None:
+        self.given = torque
+        self.reads = frozenset({reads})
+
+    def torque(self, m: Any) -> Any:
+        return self.given
+
+
+@pytest.mark.parametrize(
+    ("loads", "told"),
+    [
+        (5, "loads: given 5; a list of loads is allowed"),
+        (_Wrong([]), "loads: given an object of type _Wrong; a list of loads is allowed"),
+        ([_Wrong], r"loads\[0\]: given the class _Wrong; give an object of it"),
+        ([_Wrong([]), {"kind": "torque"}], r"loads\[1\]: given a table; an object of a class derived from"),
+        ([_Wrong([], "atitude")], r'loads\[0\]: reads \["atitude"\]; allowed: attitude, vertical, flight'),
+        ([_Wrong(5)], "load wrong: its torque is 5; a list of terms is allowed"),
+        ([_Wrong([([1, 2], 1.0)])], "load wrong: its torque is .* a vector of three constants"),
+    ],
+)
+def test_what_is_no_load_is_told_with_what_is_allowed(loads: Any, told: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=told):
+        rigidsim.run(Experiment.from_dict(TOP), loads=loads, out=None)
+
+
+def test_a_sweep_in_memory_is_told_to_take_a_folder() -> None:
+    sweep = {"axes": {"time.end": {"values": [1, 2]}}}
+    with pytest.raises(rigidsim.ConfigError, match="out: given None; a folder is allowed"):
+        rigidsim.sweep(Experiment.from_dict(TOP), changes={"sweep": sweep}, out=None)  # type: ignore[arg-type]
 
 
 def test_replaced_values_keep_the_rest() -> None:

@@ -29,6 +29,7 @@ from rigidsim.errors import ConfigError, Problem, RunFolderError
 from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweeps.sweep import Axis, Sweep
+from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.folder import SweepFolder
@@ -711,4 +712,5 @@ axes."parameters.k" = {linspace = [1, 2, 150], name = "k"}
     refused, accepted = batches.refused(range(sweep.count))
     assert not refused
     assert accepted == 150
-    assert set(run_members(sweep, [0, 149, 150, 299], ["final"]).engines) == {"batch of 8", "alone"}
+    engines = set(run_members(sweep, [0, 149, 150, 299], ["final"]).engines)
+    assert engines == {f"batch of {recommended_width()}", "alone"}

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from rigidsim.cli.app import app
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.scene.overrides import apply_overrides
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -19,7 +21,7 @@ from rigidsim.solve.problem import prepare
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweeps.sweep import SweepObserver
+from rigidsim.workflows.sweeps.sweep import SweepObserver, resume_sweep
 from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 
 CONFIG = """\
@@ -106,6 +108,44 @@ def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished:
     assert same(found, fresh)
 
 
+def test_a_damaged_tile_of_a_finished_sweep_is_told_though_its_dataset_is_whole(out: Path) -> None:
+    tile = out / "box" / "tiles" / "g000-0000001.h5"
+    content = bytearray(tile.read_bytes())
+    content[len(content) // 2] ^= 1
+    tile.write_bytes(content)
+    for command in ("info", "resume"):
+        told = CliRunner().invoke(app, [command, str(out / "box")])
+        assert told.exit_code == 2
+        assert "g000-0000001.h5: is damaged or was edited" in told.stderr
+        assert "dataset.h5, which holds its members, is whole" in told.stderr
+    tile.unlink()
+    assert CliRunner().invoke(app, ["resume", str(out / "box")]).exit_code == 0
+
+
+def test_impossible_members_are_marked_where_that_is_asked_and_the_others_run(tmp_path: Path) -> None:
+    """The first member and the last exceed I1 + I2 >= I3; what is left is as if it had been swept alone."""
+
+    def text(moments: str, more: str = "") -> str:
+        axes = f'tile = 2\n{more}axes."body.principal_moments[2]" = {{values = {moments}, name = "moment"}}\n'
+        return CONFIG.partition("tile")[0] + axes
+
+    marked, run = swept(tmp_path / "marked", text("[3.5, 2, 2.5, 3, 3.1]", 'impossible = "mark"\n'))
+    possible, _ = swept(tmp_path / "possible", text("[2, 2.5, 3]"))
+    assert run == 5
+    assert marked.summary["outcomes"] == {"finished": 3, "refused": 2}
+    found = marked.dataset
+    np.testing.assert_array_equal(
+        found.angular_velocity_final[1:4].values, possible.dataset.angular_velocity_final.values
+    )
+    assert np.isnan(found.angular_velocity_final[[0, 4]].values).all()
+    assert found.failed_member.values.tolist() == [0, 4]
+    assert all("the largest is more than the sum of the other two" in x for x in found.failed_reason.values)
+    with pytest.raises(ConfigError, match=r'(?s)member 1 .*impossible = "mark" marks such members'):
+        swept(tmp_path / "refused", text("[2, 3.5, 3.1]"))
+    with pytest.raises(ConfigError, match="the largest is more than"):
+        swept(tmp_path / "none", text("[3.5, 3.1]", 'impossible = "mark"\n'))
+
+
 def test_what_is_gone_from_earlier_tiles_is_computed_again(out: Path) -> None:
     """The latest generation has none of it, and was complete."""
     more = CONFIG.replace("[sweep]\n", '[sweep]\nkeep = ["final", "means"]\n')
@@ -124,9 +164,17 @@ def test_a_damaged_dataset_is_told_with_its_remedy_which_works(out: Path, finish
     content = bytearray(dataset.read_bytes())
     content[len(content) // 2] ^= 1
     dataset.write_bytes(content)
-    found, _ = swept(out)
-    with pytest.raises(RunFolderError, match=r"remove it, and rigidsim\.resume"):
-        _ = found.dataset
+    remedy = r"remove it, and rigidsim\.resume"
+    with pytest.raises(RunFolderError, match=remedy):
+        swept(out)
+    with pytest.raises(RunFolderError, match=remedy):
+        resume_sweep(out / "box")
+    with pytest.raises(RunFolderError, match=remedy):
+        _ = open_sweep(out / "box").dataset
+    for option in ((), ("--json",)):
+        told = CliRunner().invoke(app, ["info", str(out / "box"), *option])
+        assert told.exit_code == 2
+        assert "is damaged or was edited" in told.stderr
     dataset.unlink()
     again, run = swept(out)
     assert run == 0

@@ -8,7 +8,7 @@ from rigidsim.cli.options import JsonOption, RunPath
 
 
 def info(run_path: RunPath, as_json: JsonOption = False) -> None:
-    """Summary of a run, finished or partial.
+    """Summary of a run, finished or partial; exit code 2 if its dataset is damaged or was edited.
 
     Example: rigidsim info runs/intermediate_axis
     """
@@ -26,10 +26,12 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
             print(json.dumps(found.summary))
         else:
             print_sweep(found)
+        found.refuse_damaged()
         return
     opened = open_run(run_path)
     if as_json:
         print(json.dumps(opened.summary))
+        opened.refuse_damaged()
         return
     tables.print_summary(opened.outcome, str(opened.folder.path))
     if not opened.saved:

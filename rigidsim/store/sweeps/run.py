@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.records import dataclass
-from rigidsim.store.seal import check_whole
+from rigidsim.store.seal import check_seal, check_whole
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation
 
@@ -60,6 +60,29 @@ class SavedSweep:
 
         if not self.folder.dataset.exists():
             raise RunFolderError(f"{self.place}: has no dataset.h5 yet; {RESUME} completes it")
+        self._refuse_damaged_dataset()
+        return xarray.open_dataset(self.folder.dataset, engine=NetcdfBackend, chunks=None)
+
+    def refuse_damaged(self) -> None:
+        """Check the files of a complete sweep against their seals, which reads all of them.
+
+        Raises:
+            RunFolderError: the dataset or a tile is damaged or was edited.
+        """
+        if self.folder.dataset.exists():
+            self._refuse_damaged_dataset()
+        for path in sorted(self.folder.tiles.glob("g*.h5")):
+            try:
+                check_seal(path)
+            except RunFolderError as error:
+                raise RunFolderError(
+                    f"{error}; remove it: dataset.h5, which holds its members, is whole, and a longer sweep "
+                    "computes them again"
+                    if self.finished
+                    else f"{error}; remove it, and {RESUME} computes it again"
+                ) from None
+
+    def _refuse_damaged_dataset(self) -> None:
         try:
             _, digest = check_whole(self.folder.dataset)
         except RunFolderError as error:
@@ -70,7 +93,6 @@ class SavedSweep:
             raise RunFolderError(
                 f"{self.folder.dataset}: isn't the dataset that summary.json beside it was written for"
             )
-        return xarray.open_dataset(self.folder.dataset, engine=NetcdfBackend, chunks=None)
 
     def __repr__(self) -> str:
         return f"<Sweep {self.summary.get('name', '')!r} ({self.place}): {self.status}>"

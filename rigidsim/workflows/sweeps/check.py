@@ -14,7 +14,7 @@ from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.sweeps.dataset import RESERVED, SUFFIXES
 from rigidsim.workflows.sweeps.batch import why_alone
-from rigidsim.workflows.sweeps.members import batches_of
+from rigidsim.workflows.sweeps.members import batches_of, first_possible, markable
 
 _ALL = 200
 """Up to this many members are all worked out, with their equations where numbers alone don't decide. Of more,
@@ -54,7 +54,7 @@ class SweepCheck:
         every, each: see ``check_sweep``.
 
     Attributes:
-        first: the first member, prepared.
+        first: the first member that can be run, prepared; the first of all unless others may be marked.
 
     Raises:
         ConfigError: the first member can't be run, or nothing can that all members share.
@@ -64,11 +64,9 @@ class SweepCheck:
         _refuse_names(sweep)
         _refuse_what_none_has(sweep)
         self._sweep = sweep
-        try:
-            self.first = prepare(sweep.worked_out(0))
-            refuse_taken_names(self.first)
-        except ConfigError as error:
-            raise sweep.blamed(0, error) from None
+        self.first = prepare(sweep.worked_out(first_possible(sweep)))
+        refuse_taken_names(self.first)
+        every = every and sweep.table.impossible == "refuse"
         self._every = every
         self._shares = _of_families(sweep, each) if every else []
 
@@ -79,6 +77,8 @@ class SweepCheck:
             ConfigError: names members and keys.
         """
         sweep = self._sweep
+        if sweep.table.impossible == "mark":
+            return
         problems = self._worked_out(_FEW)
         if not problems:
             shares = list(_as_far_as_told(self._shares))
@@ -91,7 +91,7 @@ class SweepCheck:
         if len(problems) >= _MOST_TOLD:
             problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
         if problems:
-            raise ConfigError(problems, sweep.experiment.source)
+            raise ConfigError(markable(problems), sweep.experiment.source)
 
     def _worked_out(self, most: int, *, equations: bool = False) -> list[Problem]:
         """Problems of members that are worked out in full, see ``_tried``.

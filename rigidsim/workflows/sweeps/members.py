@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, RigidsimError
+from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweep_table import INDICATORS
@@ -28,6 +28,7 @@ from rigidsim.workflows.read import parse
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.batch import Batched, BatchTiles, in_order, why_alone
 
+_MOST_TRIED = 1000  # members among which there has to be one that can be run
 _LINES = 5  # of each signal's spectrum
 
 
@@ -35,6 +36,32 @@ _LINES = 5  # of each signal's spectrum
 def sweep_of(config: str) -> Sweep:
     """The sweep of a config's text, worked out once per process."""
     return recording(Sweep.of(parse(config, source="the sweep's config")))
+
+
+def first_possible(sweep: Sweep) -> int:
+    """The first member that can be run; without ``impossible = "mark"`` it has to be the first of all.
+
+    Raises:
+        ConfigError: the first can't be run, or none of ``_MOST_TRIED`` if such members are marked.
+    """
+    marking = sweep.table.impossible == "mark"
+    refused: ConfigError | None = None
+    for member in range(min(sweep.count, _MOST_TRIED) if marking else 1):
+        try:
+            prepare(sweep.worked_out(member))
+        except ConfigError as error:
+            refused = refused or sweep.blamed(member, error)
+        else:
+            return member
+    assert refused is not None
+    raise refused if marking else MemberError(markable(refused.problems), refused.source)
+
+
+def markable(problems: Sequence[Problem]) -> list[Problem]:
+    """Problems of members, the last with how the others can be run all the same."""
+    *others, last = problems
+    hint = '[sweep] impossible = "mark" marks such members, with the reason, and runs the others'
+    return [*others, Problem(last.where, f"{last.what}; {hint}")]
 
 
 def recording(sweep: Sweep) -> Sweep:
@@ -46,10 +73,9 @@ def recording(sweep: Sweep) -> Sweep:
     output = sweep.base.config.output
     if not set(sweep.table.keep) & set(INDICATORS) or GROWTH in (output.record or ()):
         return sweep
-    try:
-        recorded = output.record or [v.name for v in prepare(sweep.worked_out(0)).system.recorded]
-    except ConfigError as error:
-        raise sweep.blamed(0, error) from None
+    recorded = output.record
+    if not recorded:
+        recorded = [v.name for v in prepare(sweep.worked_out(first_possible(sweep))).system.recorded]
     names = ", ".join(f'"{name}"' for name in [*recorded, GROWTH])
     return replace(sweep, base=sweep.base.having([f"output.record=[{names}]"]), added=GROWTH)
 

@@ -13,7 +13,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.workflows.plan import plan
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import QUICK, check_sweep
-from rigidsim.workflows.sweeps.members import alone, batches_of, recording
+from rigidsim.workflows.sweeps.members import alone, batches_of, first_possible, recording
 
 _SECONDS_OF_A_TILE, _LEAST_SECONDS = 5.0, 2.0
 _SHARE_OF_A_TILE = 32
@@ -51,8 +51,10 @@ def tile_length(sweep: Sweep) -> int:
         return sweep.table.tile
     if sweep.count <= _FEW:
         return max(1, -(-sweep.count // _TILES_OF_FEW))
-    made = plan(alone(sweep, 0), pilot_seconds=0.05)
-    return _length(sweep, _member_seconds(sweep, made), bytes_of_member(sweep, prepare(sweep.worked_out(0))))
+    first = first_possible(sweep)
+    made = plan(alone(sweep, first), pilot_seconds=0.05)
+    size = bytes_of_member(sweep, prepare(sweep.worked_out(first)))
+    return _length(sweep, _member_seconds(sweep, made), size)
 
 
 def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
@@ -108,7 +110,7 @@ def plan_sweep(sweep: Sweep) -> dict[str, Any]:
     """
     sweep = recording(sweep)
     first = check_sweep(sweep, every=sweep.count <= QUICK)
-    made = plan(alone(sweep, 0))
+    made = plan(alone(sweep, first_possible(sweep)))
     seconds, size = _member_seconds(sweep, made), bytes_of_member(sweep, first)
     length = sweep.table.tile
     if length is None:

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rigidsim.errors import FORCE, OUT, ConfigError, RunFolderError
+from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
 from rigidsim.scene.overrides import apply_overrides
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import parse_toml
+from rigidsim.scene.validation_messages import shown
 from rigidsim.store.sweeps.dataset import write_dataset
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.gathered import TileReader, gather
@@ -69,6 +70,7 @@ def sweep(
     Args:
         experiment: from ``load`` or ``Experiment.from_dict``, the path of a config, or a dictionary.
         changes: values to replace, as for ``Experiment.replace``.
+        out: folder of the sweep's own folder; unlike a run it can't be kept in memory.
         force: replace whatever run or sweep is there.
         workers: number of processes on this machine, or such processes started already. They read your script
             again: in a script, sweep under ``if __name__ == "__main__":``.
@@ -81,6 +83,12 @@ def sweep(
         RunFolderError: the folder is in use, holds something else, or can't be written.
     """
     given = as_experiment(experiment, changes)
+    if not isinstance(out, str | os.PathLike):
+        what = (
+            f'given {shown(out)}; a folder is allowed, such as "runs" or a temporary one: members are saved '
+            "as they are finished, so that a sweep can be gone on with"
+        )
+        raise ConfigError(Problem("out", what), given.source)
     return run_sweep(
         recording(Sweep.of(given)),
         SweepFolder(Path(out) / given.config.name),
@@ -147,8 +155,10 @@ def run_sweep(
     began, cpu = time.perf_counter(), time.process_time()
     if _complete(wanted, folder) and not force:
         with folder.locked(shared=share is not None):
+            done = open_sweep(folder.path)
+            done.refuse_damaged()
             observer.nothing_left()
-            return open_sweep(folder.path)
+            return done
     with way.ready_for(wanted):
         known = _known(wanted, folder)
         check = SweepCheck(wanted, every=not known, each=way.each)
