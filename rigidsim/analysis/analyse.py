@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, decompose
 from rigidsim.analysis.labels import Known, label, reversed_label, settled
+from rigidsim.analysis.refinement import at_nyquist
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
@@ -203,6 +204,7 @@ def _line(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], n: int) ->
         if not name.doubtful:
             error = max(error, abs(mismatch))  # a blend of lines that are too close to be told apart
     size = abs(complex(amplitude))
+    held = at_nyquist(raw.found.sum, real)[n]
     amplitude_error = raw.found.amplitude_errors[n]
     return SpectralLine(
         frequency=frequency,
@@ -211,7 +213,7 @@ def _line(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], n: int) ->
         amplitude=raw.factor * abs(amplitude),
         amplitude_error=raw.factor * amplitude_error,
         phase=_wrapped(context, phase),
-        phase_error=amplitude_error / size if size else math.inf,
+        phase_error=amplitude_error / size if size and not held else math.inf,
         label=name,
         mismatch=mismatch,
     )
@@ -240,6 +242,11 @@ def _notes(
         names = ", ".join(k.name for k in slow)
         notes.append(
             f"the samples span less than 1.5 turns of {names}: the secular rate may contain part of it"
+        )
+    if any(at_nyquist(raw.found.sum, raw.signal.real)):
+        notes.append(
+            "a line within a third of a bin of Nyquist's frequency: samples show its amplitude times the "
+            "cosine of its phase, and no more; sample more often to tell these apart"
         )
     unfolded = [line for line in lines if line.unfolded]
     if unfolded:

@@ -18,7 +18,18 @@ from dataclasses import replace
 import numpy as np
 
 from rigidsim.analysis.exponentials import Reals, Sum
-from rigidsim.analysis.refinement import SignalSamples, error_growth, mirrored, refined, remainder
+from rigidsim.analysis.refinement import (
+    CLOSEST,
+    SignalSamples,
+    apart,
+    at_nyquist,
+    error_growth,
+    folded,
+    mirrored,
+    refined,
+    remainder,
+    settled,
+)  # fmt: skip
 from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
 from rigidsim.scene.records import dataclass
 
@@ -26,7 +37,8 @@ _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
 _SEARCH_ORDERS = (3, 1)  # of the window while lines are looked for; the second where some are close
 _NEAREST = 1.0  # bins between lines that can be told apart
 _MOST_CANDIDATES = 40  # peaks that may be no lines, before there are none
-_CLOSEST = 0.6  # bins to which they may move
+# a line CLOSEST / 2 bins from Nyquist's frequency can be 1 / sin(0.3 pi) = 1.24 times the largest sample
+_MOST_OF_SAMPLES = 1.5
 _STEPS = 3  # of Newton's method after each new line
 _HIGHEST_ORDER = 10
 
@@ -80,8 +92,8 @@ def decompose(
     assert search is not None
     total = search.total
     final = order or _final_order(total, samples.real)
-    total = refined(double, total, final)
-    while (weaker := _merged(total, samples.real)) is not None:
+    total = settled(double, total, final)
+    while (weaker := _merged(total, samples.real, search.limit)) is not None:
         search.close.append(float(total.frequencies[weaker]))
         kept = [n for n in range(len(total.frequencies)) if n != weaker]
         total = replace(
@@ -89,7 +101,7 @@ def decompose(
             frequencies=tuple(total.frequencies[n] for n in kept),
             amplitudes=tuple(total.amplitudes[n] for n in kept),
         )
-        total = refined(double, total, final)
+        total = settled(double, total, final)
     if samples.bits > 53:
         total = refined(samples, total, final)
     return _judged(samples, total, final, search)
@@ -101,8 +113,9 @@ def _final_order(total: Sum, real: bool) -> int:
     if total.polynomial:
         places = np.append(places, 0.0)
     places = np.sort(places)
-    gaps = np.diff(places)
-    least = float(gaps.min()) if len(gaps) else math.inf
+    gaps = np.diff(places, append=places[:1] + total.count)  # around the circle
+    gaps = gaps[gaps > 0]  # a line at Nyquist's frequency is its own mirror image
+    least = float(gaps.min()) if len(gaps) > 1 else math.inf
     return int(np.clip(math.floor(least / 2 - 1) if math.isfinite(least) else 3, 1, _HIGHEST_ORDER))
 
 
@@ -112,9 +125,12 @@ def _places(total: Sum, real: bool) -> Reals:
     return np.concatenate([own, -own]) if real else own
 
 
-def _merged(total: Sum, real: bool) -> int | None:
-    """Index of the weaker of two lines that have merged, or of one that merged with the secular part; None if
-    there is none.
+def _merged(total: Sum, real: bool, limit: float) -> int | None:
+    """Index of the weaker of two lines that have merged, of one that merged with the secular part, or of one
+    that several others cancel nearly everywhere; None if there is none.
+
+    Args:
+        limit: amplitude of an exponential that can't be in the samples.
     """
     lines = len(total.frequencies)
     places = _places(total, real)
@@ -123,7 +139,8 @@ def _merged(total: Sum, real: bool) -> int | None:
         others = np.delete(places, [n, n + lines] if real else [n])
         if total.polynomial:
             others = np.append(others, 0.0)
-        if len(others) and np.abs(others - places[n]).min() < _CLOSEST:
+        close = len(others) and np.abs(apart(others - places[n], total.count)).min() < CLOSEST
+        if close or not sizes[n] <= limit:
             return int(n)
     return None
 
@@ -137,6 +154,7 @@ class _Search:
         self.total = Sum(context, samples.count, (context.mpc(0),) * (degree + 1), (), ())
         self.close: list[float] = []
         self.exhausted = False
+        self.limit = math.inf
 
     def look_for(self, lines: int, floor: float) -> None:
         if self.total.polynomial:
@@ -144,6 +162,8 @@ class _Search:
         hidden: list[float] = []
         while True:
             left = remainder(self.samples, self.total)
+            if not self.total.frequencies:
+                self.limit = _MOST_OF_SAMPLES * float(np.max(np.abs(left))) / (2 if self.samples.real else 1)
             found = spectrum(left, self.order, real=self.samples.real)
             at = self._strongest(found, hidden, floor)
             if at is None:
@@ -158,9 +178,8 @@ class _Search:
                 return
             before = self.total
             self._add(frequency, found.amplitude(at))
-            if (
-                _merged(self.total, self.samples.real) is not None
-            ):  # two have moved together to fit what neither is
+            # two have moved together to fit what neither is
+            if _merged(self.total, self.samples.real, self.limit) is not None:
                 self.total = before
                 self.close.append(frequency)
                 hidden.append(frequency)
@@ -189,20 +208,21 @@ class _Search:
         if self.total.polynomial:
             places = np.append(places, 0.0)
         here = frequency * self.samples.count
-        around = self.samples.count
-        gaps = [abs((here - p + around / 2) % around - around / 2) for p in places]
+        gaps = np.abs(apart(here - places, self.samples.count)).tolist()
         if self.samples.real and not self.total.polynomial:
             gaps.append(abs(here - mirrored))
         return min(gaps, default=math.inf) < _NEAREST
 
     def _add(self, frequency: float, amplitude: complex) -> None:
         context = self.samples.context
+        if self.samples.real:  # between a line at Nyquist's frequency and its mirror image nothing decides
+            frequency = min(frequency, 0.5 - 0.5 / self.samples.count)
         self.total = replace(
             self.total,
             frequencies=(*self.total.frequencies, context.mpf(frequency)),
             amplitudes=(*self.total.amplitudes, context.mpc(amplitude)),
         )
-        self.total = refined(self.samples, self.total, self.order, steps=_STEPS)
+        self.total = folded(refined(self.samples, self.total, self.order, steps=_STEPS))
 
 
 def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> Decomposition:
@@ -222,12 +242,14 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
     # neighbours that are hard to tell apart make errors grow
     growth = error_growth(mirrored(total, samples.real), order)
     powers, lines = len(total.polynomial), len(total.frequencies) * (2 if samples.real else 1)
+    held = at_nyquist(total, samples.real)
     frequency_errors, amplitude_errors = [], []
     for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
         level = beside(float(frequency)) * growth[powers + n]
         turned = beside(float(frequency)) * growth[powers + lines + n]
         strength = abs(complex(amplitude))
         own = turned / strength * spread / second / math.pi / total.count if strength else math.inf
+        own = max(own, CLOSEST / 2 / total.count) if held[n] else own
         frequency_errors.append(math.hypot(own, finest * abs(float(frequency))))
         amplitude_errors.append(math.hypot(level, finest * strength))
     level = beside(0.0)

@@ -16,6 +16,7 @@ from rigidsim.analysis.windows import hann, moments, positions
 from rigidsim.scene.records import dataclass
 
 _MOST_STEPS = 25
+CLOSEST = 0.6  # bins between lines below which Newton's method can't tell them apart
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,28 @@ def mirrored(total: Sum, real: bool) -> Sum:
     )
 
 
+def apart(distance: Reals, count: int) -> Reals:
+    """Distances of frequencies, in bins, on the circle of ``count`` bins."""
+    return np.asarray(distance - count * np.round(distance / count))
+
+
+def folded(total: Sum) -> Sum:
+    """The sum with frequencies within half a turn per sample.
+
+    A whole turn per sample changes nothing at whole numbers, but samples are counted from the middle: of an
+    even count by halves, where each turn changes the sign.
+    """
+    turns = [int(total.context.nint(f)) if abs(f) > 0.5 else 0 for f in total.frequencies]
+    if not any(turns):
+        return total
+    odd = [n * (total.count - 1) % 2 for n in turns]
+    return replace(
+        total,
+        frequencies=tuple(f - n for f, n in zip(total.frequencies, turns, strict=True)),
+        amplitudes=tuple(-a if o else a for a, o in zip(total.amplitudes, odd, strict=True)),
+    )
+
+
 def remainder(samples: SignalSamples, total: Sum) -> Complexes:
     """The remainder of a signal, in double precision."""
     whole = mirrored(total, samples.real)
@@ -62,6 +85,36 @@ def remainder(samples: SignalSamples, total: Sum) -> Complexes:
     if samples.late is not None and samples.bits <= 53 and (whole.frequencies or whole.polynomial):
         left = left - samples.late * whole.slope().values()
     return np.asarray(left.real + 0j if samples.real else left, dtype=np.complex128)
+
+
+def settled(samples: SignalSamples, total: Sum, order: int) -> Sum:
+    """The refined sum; lines that come too close to Nyquist's frequency are held there (``at_nyquist``)."""
+    held = -1
+    while (now := sum(at_nyquist(total, samples.real))) > held:
+        held = now
+        total = _held(folded(refined(samples, total, order)), samples.real)
+    return total
+
+
+def at_nyquist(total: Sum, real: bool) -> list[bool]:
+    """Which lines stand for what is too near Nyquist's frequency to be told from its own mirror image.
+
+    There a real signal only shows the line's amplitude times the cosine of its phase.
+    """
+    return [real and f == 0.5 for f in total.frequencies]
+
+
+def _held(total: Sum, real: bool) -> Sum:
+    """The sum with lines near Nyquist's frequency moved to it, with the amplitude that the samples show."""
+    context, count = total.context, total.count
+    frequencies, amplitudes = list(total.frequencies), list(total.amplitudes)
+    for n, (frequency, amplitude) in enumerate(zip(frequencies, amplitudes, strict=True)):
+        if real and 2 * abs(0.5 - abs(frequency)) * count < CLOSEST:
+            amplitude = context.conj(amplitude) if frequency < 0 else amplitude
+            frequencies[n] = context.mpf(0.5)
+            # the exponential is real at samples counted by whole numbers, imaginary at those by halves
+            amplitudes[n] = context.mpc(amplitude.real, 0) if count % 2 else context.mpc(0, amplitude.imag)
+    return replace(total, frequencies=tuple(frequencies), amplitudes=tuple(amplitudes))
 
 
 def refined(samples: SignalSamples, total: Sum, order: int, steps: int = _MOST_STEPS) -> Sum:
@@ -91,11 +144,12 @@ def _step(samples: SignalSamples, total: Sum, left: Complexes, order: int) -> tu
     polynomial = found[:powers]
     change, turning = found[powers : powers + lines], found[powers + lines :]
     own = lines // 2 if samples.real else lines
+    held = at_nyquist(total, samples.real)
     frequencies, amplitudes = [], []
     for k in range(own):
         amplitude = complex(whole.amplitudes[k])
         # a exp(i pi D x), D in bins: the change with D is i pi x a exp(...)
-        shift = (turning[k] / amplitude).imag / math.pi if amplitude else 0.0
+        shift = (turning[k] / amplitude).imag / math.pi if amplitude and not held[k] else 0.0
         shift = float(np.clip(shift, -0.5, 0.5))
         frequencies.append(total.frequencies[k] + context.mpf(shift) / count)
         amplitudes.append(total.amplitudes[k] + context.mpc(complex(change[k])))
@@ -138,13 +192,13 @@ def _gram(total: Sum, order: int) -> Complexes:
     places = np.concatenate([np.zeros(powers), places, places])
     raised = np.concatenate([np.arange(powers), np.zeros(lines, int), np.ones(lines, int)])
     distance = places[None, :] - places[:, None]
-    distance = (distance + count / 2) % count - count / 2
+    turns = np.round(distance / count)  # frequencies are on a circle: see ``apart`` and ``folded``
     power = raised[None, :] + raised[:, None]
     matrix = np.zeros(distance.shape, dtype=np.complex128)
     for m in np.unique(power):
         chosen = power == m
-        matrix[chosen] = moments(order, int(m), distance[chosen])
-    return matrix
+        matrix[chosen] = moments(order, int(m), (distance - turns * count)[chosen])
+    return np.where(turns * (count - 1) % 2, -matrix, matrix)
 
 
 def error_growth(total: Sum, order: int) -> Reals:

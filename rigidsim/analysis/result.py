@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
@@ -181,14 +182,16 @@ def digits(value: Any, bits: int) -> str:
 
 
 def _signal_dict(signal: SignalAnalysis, known: Sequence[Known]) -> dict[str, Any]:
-    secular: dict[str, Any] = {"value": _number(signal.value), "value_error": signal.value_error}
-    if signal.rate is not None:
-        secular |= {"rate_per_s": _number(signal.rate), "rate_error_per_s": signal.rate_error}
+    secular: dict[str, Any] | None = None
+    if signal.value is not None:  # complex signals have lines alone
+        secular = {"value": _number(signal.value), "value_error": signal.value_error}
+        if signal.rate is not None:
+            secular |= {"rate_per_s": _number(signal.rate), "rate_error_per_s": signal.rate_error}
     return {
         "name": signal.name,
         "units": signal.units,
         "real": signal.real,
-        "secular": secular if signal.value is not None else None,
+        "secular": secular,
         "window_order": signal.order,
         "left_rms": signal.left,
         "noise_level": signal.level,
@@ -205,18 +208,31 @@ def _signal_dict(signal: SignalAnalysis, known: Sequence[Known]) -> dict[str, An
                 "amplitude": float(line.amplitude),
                 "amplitude_error": line.amplitude_error,
                 "phase_rad": float(line.phase),
-                "phase_error_rad": line.phase_error,
+                "phase_error_rad": line.phase_error if math.isfinite(line.phase_error) else None,
                 "label": line.label.text,
                 "multipliers": {
                     k.name: m for k, m in zip(known, line.label.multipliers or (), strict=False) if m
                 },
                 "unfolded": line.unfolded,
                 "ambiguous_with": list(line.label.doubtful),
-                "mismatch_rad_per_s": line.mismatch,
+                "mismatch_rad_per_s": None if math.isnan(line.mismatch) else line.mismatch,
+                "null_because": _null_because(line),
             }
             for line in signal.lines
         ],
     }
+
+
+def _null_because(line: SpectralLine) -> dict[str, str]:
+    """Why numbers of a line are null, by their keys."""
+    reasons = {}
+    if not math.isfinite(line.phase_error):
+        reasons["phase_error_rad"] = "samples don't show the phase of a line at Nyquist's frequency"
+    if math.isnan(line.mismatch):
+        reasons["mismatch_rad_per_s"] = "no combination of known frequencies fits the line: it has no label"
+    if not line.frequency:
+        reasons["period_seconds"] = "the frequency is zero"
+    return reasons
 
 
 def _number(value: Any) -> Any:

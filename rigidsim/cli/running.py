@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rigidsim.cli.machine import print_json
 from rigidsim.errors import RigidsimError
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def print_run(result: Run, as_json: bool) -> int:
     from rigidsim.cli.screens import summary as tables
 
     if as_json:
-        print(json.dumps(result.summary))
+        print_json(result.summary)
     else:
         tables.print_summary(result.outcome, result.place)
     code = result.outcome.exit_code
@@ -99,7 +99,7 @@ def _scanned(experiments: list[Experiment], scan: list[str], out: Path, *, force
         with observer() as watching:
             result = sweep(scanned(experiment, scan), out=out, force=force, observer=watching)
         if as_json:
-            print(json.dumps(result.summary))
+            print_json(result.summary)
         else:
             print_sweep(result)
         worst = worst or int(result.summary["exit_code"])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import JsonOption, RunPath
 
 
@@ -46,6 +46,6 @@ def analyse(
     analysis = find(opened, variable or (), lines=lines)
     saved = save(analysis, out or opened.folder.analysis)
     if as_json:
-        print(json.dumps(analysis.as_dict()))
+        print_json(analysis.as_dict())
         return
     print_analysis(analysis, saved)

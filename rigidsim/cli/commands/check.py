@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import JsonOption, SetOption
 
 
@@ -30,7 +30,7 @@ def check(
         found = validate(path, overrides=overrides or [])
         valid = valid and found.valid
         if as_json:
-            print(json.dumps(found.as_dict()), flush=True)
+            print_json(found.as_dict())
         else:
             tables.print_checked(found)
     raise typer.Exit(0 if valid else 2)

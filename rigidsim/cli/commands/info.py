@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import JsonOption, RunPath
 
 
@@ -23,14 +22,14 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
 
         found = open_sweep(run_path)
         if as_json:
-            print(json.dumps(found.summary))
+            print_json(found.summary)
         else:
             print_sweep(found)
         found.refuse_damaged()
         return
     opened = open_run(run_path)
     if as_json:
-        print(json.dumps(opened.summary))
+        print_json(opened.summary)
         opened.refuse_damaged()
         return
     tables.print_summary(opened.outcome, str(opened.folder.path))

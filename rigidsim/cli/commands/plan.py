@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import ConfigPath, JsonOption, OutOption, SetOption
 
 
@@ -30,13 +30,13 @@ def plan(
 
         whole = plan_sweep(Sweep.of(experiment))
         if as_json:
-            print(json.dumps(whole))
+            print_json(whole)
             return
         print_sweep_plan(whole)
         made = whole["member"]
     else:
         made = make_plan(experiment, out=out)
     if as_json:
-        print(json.dumps(made))
+        print_json(made)
     else:
         tables.print_plan(made)

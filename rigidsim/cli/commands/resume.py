@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import JsonOption, RunPath
 from rigidsim.cli.running import print_run
 from rigidsim.errors import RigidsimError
@@ -62,7 +62,7 @@ def _resume_sweep(path: Path, workers: int, as_json: bool) -> NoReturn:
         with observer() as watching:
             result = resume_sweep(path, workers=processes, observer=watching)
     if as_json:
-        print(json.dumps(result.summary))
+        print_json(result.summary)
     else:
         print_sweep(result)
     raise typer.Exit(int(result.summary["exit_code"]))

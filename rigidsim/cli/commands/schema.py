@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from rigidsim.cli.machine import print_json
 
 
 def schema() -> None:
@@ -14,4 +14,4 @@ def schema() -> None:
     import rigidsim.workflows.read  # noqa: F401  (every kind of load is in the schema)
     from rigidsim.scene.editor_schema import editor_schema
 
-    print(json.dumps(editor_schema(), indent=2))
+    print_json(editor_schema(), indent=2)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import ConfigPath, JsonOption, OutOption, SetOption
 from rigidsim.errors import RigidsimError
 
@@ -59,7 +59,7 @@ def sweep(
                 scheduler=scheduler, tiles=share, observer=watching,
             )  # fmt: skip
     if as_json:
-        print(json.dumps(result.summary))
+        print_json(result.summary)
     else:
         print_sweep(result)
     raise typer.Exit(0 if result.finished or share is not None else int(result.summary["exit_code"]))

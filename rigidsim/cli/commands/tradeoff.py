@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import ConfigPath, JsonOption, SetOption
 
 
@@ -48,6 +48,6 @@ def tradeoff(
         experiment, out=out, budget=budget, repeats=repeats, full=full, force=force, told=told
     ).as_dict()
     if as_json:
-        print(json.dumps(result))
+        print_json(result)
     else:
         print_tradeoff(result)

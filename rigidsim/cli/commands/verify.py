@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
 
+from rigidsim.cli.machine import print_json
 from rigidsim.cli.options import JsonOption, RunPath
 
 MembersOption = Annotated[
@@ -33,7 +33,7 @@ def verify(run_path: RunPath, members: MembersOption = 100, as_json: JsonOption 
         with progress.observer() as observer:
             verdict, what = compare(run_path, observer=observer), "sample"
     if as_json:
-        print(json.dumps(verdict.as_dict()))
+        print_json(verdict.as_dict())
     else:
         tables.print_verdict(verdict.as_dict(), what)
     raise typer.Exit(0 if verdict.identical else 1)
