@@ -24,7 +24,7 @@ from rigidsim.solve.status import Status
 from rigidsim.store.collected import JoinedBlocks
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import WarningCode
+from rigidsim.store.summary_parts import Modelling, WarningCode
 from rigidsim.store.variables import Variable
 
 
@@ -43,6 +43,8 @@ OUTCOMES = (
 )
 """All outcomes of members; a dataset stores the index in this list, which may only grow."""
 WARNINGS = tuple(code.value for code in WarningCode)
+_ESTIMATING = ("estimate", "modelling")
+"""Phases of a run that find its errors."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class MemberResults:
         reasons: by place among the members, why those failed.
         engines: engines that ran members, with the number of members each.
         why_alone: code of the reason why members were run one by one; empty if none was.
-        estimating: CPU seconds spent on error estimates in batches.
+        estimating: CPU seconds spent on error estimates.
     """
 
     kept: Kept
@@ -76,7 +78,8 @@ class MemberResults:
             for engine, number in part.engines.items():
                 engines[engine] = engines.get(engine, 0) + number
         why = next((part.why_alone for part in parts if part.why_alone), "")
-        return cls(joined([part.kept for part in parts], counts), reasons, engines, why)
+        spent = sum(part.estimating for part in parts)
+        return cls(joined([part.kept for part in parts], counts), reasons, engines, why, spent)
 
 
 def status_variable(codes: np.ndarray) -> KeptVariable:
@@ -112,15 +115,21 @@ def plain_variables(
     bound: np.ndarray,
     attitude_error: np.ndarray | None,
     position_error: np.ndarray | None = None,
+    modelling: Modelling | None = None,
 ) -> Kept:
     """Variables that every member has besides its status, (members,) each; None for errors that aren't
     estimated, and for the position of a body without one.
+
+    Args:
+        modelling: error of the averaged model of a single member; None for the full model.
     """
     unknown = np.full(len(steps), np.nan)
     placed: Kept = {}
     if position_error is not None:
         labels = {"long_name": "estimated error of the position at the last sample", "units": "m"}
         placed["position_error"] = KeptVariable((), position_error, labels)
+    if modelling is not None:
+        placed |= _of_model(modelling)
     return {
         "steps": KeptVariable((), steps.astype(np.int64), {"long_name": "steps taken", "units": "1"}),
         "time_reached": KeptVariable((), reached, {"long_name": "time of the last sample", "units": "s"}),
@@ -135,6 +144,24 @@ def plain_variables(
         ),
         **placed,
     }  # fmt: skip
+
+
+def _of_model(found: Modelling) -> Kept:
+    """Errors of a member's averaged model, nan where none is measured."""
+    errors = {
+        "modelling_error": (found.worst, "directions", "rad"),
+        "modelling_error_norm": (found.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
+        "modelling_error_energy": (found.energy, "energy of rotation, relative", "1"),
+    }
+    return {
+        name: KeptVariable(
+            (),
+            np.array([np.nan if error is None else error]),
+            {"long_name": f"largest error of the averaged model's {what} until the end", "units": units},
+        )
+        for name, (error, what, units) in errors.items()
+        if error is not None or name == "modelling_error"
+    }
 
 
 def run_alone(
@@ -182,11 +209,13 @@ def run_alone(
         bound=np.array([max(bounds, default=np.nan)]),
         attitude_error=None if error_at_end is None else np.array([error_at_end]),
         position_error=None if placed is None else np.array([placed]),
+        modelling=summary.modelling,
     )
     if more is not None and result.blocks:
         kept |= more(result)
     reasons = {} if summary.status in ENDED_WELL else {0: summary.message}
-    return MemberResults(kept, reasons, {"alone": 1})
+    spent = sum(summary.cost.cpu_by_phase.get(phase, 0.0) for phase in _ESTIMATING)
+    return MemberResults(kept, reasons, {"alone": 1}, estimating=spent)
 
 
 def _ended(status: str, warnings: Iterable[str]) -> Kept:

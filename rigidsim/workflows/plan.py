@@ -64,15 +64,19 @@ def plan(
         ConfigError: the config can't be run.
     """
     experiment = as_experiment(experiment, changes)
+    began = time.process_time()
     level = choose_level(experiment, loads=loads)
+    choosing = time.process_time() - began
     levels = compared_levels(experiment, level, loads)
     experiment, choice = chosen(level.experiment if level else experiment, loads=loads)
+    began = time.process_time()
     prepared = prepare(experiment, loads=loads)
+    preparing = time.process_time() - began
     refuse_taken_names(prepared)
     closed, why_not = closed_form_if_any(prepared.scene, driven=bool(loads))
-    started = time.perf_counter()
+    started, began = time.perf_counter(), time.process_time()
     parts = assemble(prepared)
-    compile_seconds = time.perf_counter() - started
+    compile_seconds, building = time.perf_counter() - started, preparing + time.process_time() - began
     corrected = parts.corrected
     pilot = timed_pilot(prepared, corrected, pilot_seconds)
     step = math.ldexp(pilot.step, prepared.system.scaling.time)
@@ -83,6 +87,7 @@ def plan(
     room = storage(prepared, Path(out) / prepared.scene.name)
     seconds_per_sample = _seconds_per_sample(prepared, parts.corrected, parts.evaluator, room.row)
     integrate = steps * pilot.seconds_per_step
+    modelling = _modelling_seconds(prepared, levels)
     record = samples * seconds_per_sample
     system, unused = prepared.system, unused_variables(prepared, int(steps))
     rate = float(system.rate_bound)
@@ -137,7 +142,10 @@ def plan(
             "pace": pace,
             "integration_seconds": integrate,
             "recording_seconds": record,
-            "total_seconds": compile_seconds + integrate + record,
+            "building_seconds": building,
+            "choosing_seconds": choosing,
+            "modelling_seconds": modelling,
+            "total_seconds": compile_seconds + integrate + record + modelling,
             "memory_bytes": _BASE_MEMORY + 3 * min(room.segments, SegmentLimits().bytes),
             "segment_bytes": room.segments,
             "dataset_bytes": room.dataset,
@@ -156,6 +164,14 @@ def plan(
         "start": start_of(prepared.scene).as_dict(),
         "time": span_of(prepared.scene).as_dict(),
     }
+
+
+def _modelling_seconds(prepared: InitialValueProblem, levels: Sequence[Mapping[str, Any]]) -> float:
+    """CPU time, s, of the full model beside an averaged run, as it was measured over the beginning."""
+    average = prepared.system.plan.average
+    if average is None or not prepared.scene.config.output.estimate:
+        return 0.0
+    return next((row["modelling_seconds"] or 0.0 for row in levels if row["level"] == average.level), 0.0)
 
 
 def _seconds_per_sample(

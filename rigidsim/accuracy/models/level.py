@@ -25,11 +25,13 @@ class Considered:
     Attributes:
         error: forecast of its modelling error from the beginning of the span, rad; None if there is none.
         why_not: why it isn't taken; empty for the one that is.
+        seconds: CPU time, s, of measuring that error after a run; None if it can't be measured.
     """
 
     level: str
     error: float | None
     why_not: str
+    seconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -78,9 +80,9 @@ def choose_level(
             considered.append(Considered(level, None, str(why)))
             continue
         if found.worst <= asked:
-            considered.append(Considered(level, found.worst, ""))
+            considered.append(Considered(level, found.worst, "", found.cpu_seconds_of_run))
             return LevelChoice(other, level, considered)
-        considered.append(Considered(level, found.worst, "more than asked for"))
+        considered.append(Considered(level, found.worst, "more than asked for", found.cpu_seconds_of_run))
     considered.append(Considered(FULL, 0.0, ""))
     return LevelChoice(fully(experiment), FULL, considered)
 

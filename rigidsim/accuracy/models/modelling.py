@@ -39,6 +39,7 @@ _MOST_ROTATIONS = 20_000  # for the fewest orbits
 _LEAST_ROTATIONS = 50
 _LIBRATIONS = 2
 _WHOLE = 4  # windows that a run is followed to its end in place of
+_WINDOWS = 3  # of a run that is longer
 _SPARE = 2.0
 """Factor on the extrapolated growth, which is measured in three windows and varies between them."""
 _SPARE_OF_WHOLE = 1.25  # for the times between the samples
@@ -69,6 +70,11 @@ class ModellingError:
     cpu_seconds: float
     windows: Sequence[Window] = field(default_factory=list)
     changes: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def cpu_seconds_of_run(self) -> float:
+        """CPU time, s, that the measurement takes after a run, from one over its beginning alone."""
+        return self.cpu_seconds if self.whole else self.cpu_seconds * _WINDOWS / len(self.windows)
 
     @property
     def worst(self) -> float:

@@ -105,6 +105,19 @@ def duration(seconds: float | None) -> str:
     return f"{minutes // 60}:{minutes % 60:02d}:{rest:02d}"
 
 
+_INTEGRATED = "momentum's direction (attitude in full models), of its integration alone"
+_ERRORS = {
+    "modelling": "axes of averaged models from the full model's",
+    "modelling_norm": "size of the angular momentum in averaged models, relative",
+    "modelling_energy": "energy of rotation in averaged models, relative",
+}
+
+
+def _of_errors(cost: dict[str, Any]) -> str:
+    seconds = cost.get("estimate_cpu_seconds", 0.0)
+    return f", {seconds:.3g} s of them for errors" if seconds else ""
+
+
 def print_sweep(result: SavedSweep) -> None:
     """Print how a sweep's members ended."""
     told, screen = result.summary, console()
@@ -133,12 +146,15 @@ def print_sweep(result: SavedSweep) -> None:
     engines = ", ".join(f"{number:,} {engine}" for engine, number in told["engines"].items())
     screen.print(
         f"cost     {cost['steps']:,} steps, {cost['cpu_seconds']:.3g} s of CPU in {cost['tiles']:,} tiles "
-        f"({engines})",
+        f"({engines})" + _of_errors(cost),
         highlight=False,
     )
-    for name, error in told.get("estimated_errors", {}).items():
+    errors = told.get("estimated_errors", {})
+    for name, error in errors.items():
+        words = _INTEGRATED if name == "attitude" and "modelling" in errors else _ERRORS.get(name, name)
+        units = "" if error["units"] == "1" else f" {error['units']}"
         screen.print(
-            f"error    {name}: {error['median']:.2g} {error['units']} in the median, at most "
+            f"error    {words}: {error['median']:.2g}{units} in the median, at most "
             f"{error['largest']:.2g}, estimated of {error['members']:,} members",
             highlight=False,
         )

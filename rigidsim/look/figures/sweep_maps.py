@@ -36,7 +36,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 INDICATORS = ("megno", "fli", "lyapunov")
-_ALWAYS = ("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error", "position_error")
+_ALWAYS = (
+    *("status", "warnings", "steps", "time_reached", "drift_bound", "attitude_error", "position_error"),
+    *("modelling_error", "modelling_error_norm", "modelling_error_energy"),
+)
 _BESIDE = ("failed_member", "failed_reason")
 _LAST = ("_drift_largest", "_drift_final", "_time", "_times", "_count")
 _SECTION = "_occurrence"  # dimension of the points of a section

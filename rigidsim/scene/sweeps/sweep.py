@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 from rigidsim.errors import ConfigError, MemberError, Problem, either
 from rigidsim.scene.config import Experiment, parse, validated
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.model_table import AUTO, FULL
 from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
 from rigidsim.scene.sweep_table import INDICATORS, SweepTable
@@ -189,7 +190,8 @@ class Sweep:
             raise self.blamed(member, error) from None
 
     def worked_out(self, member: int) -> Experiment:
-        """Like ``experiment_of`` in a tenth of the time, without the member's own text: for checks.
+        """Like ``experiment_of`` in a tenth of the time, without the member's own text: for checks. A level
+        of model that its run chooses by the accuracy asked for is the full one here.
 
         Raises:
             ConfigError: as for ``experiment_of``.
@@ -197,9 +199,12 @@ class Sweep:
         try:
             table = parse_toml(self.base.text, self.base.source)
             apply_overrides(table, self.overrides(member))
-            return exchanged(self.base, config=validated(table, self.base.source))
+            config = validated(table, self.base.source)
         except ConfigError as error:
             raise self.blamed(member, error) from None
+        if config.model.level == AUTO and config.integrator.accuracy_axis is not None:
+            config = config.model_copy(update={"model": config.model.model_copy(update={"level": FULL})})
+        return exchanged(self.base, config=config)
 
     def blamed(self, member: int, error: ConfigError) -> MemberError:
         """The error with the member named besides the key, unless it names the member already."""

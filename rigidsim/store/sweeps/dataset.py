@@ -33,6 +33,9 @@ RESERVED = {
     *(
         "attitude_error",
         "position_error",
+        "modelling_error",
+        "modelling_error_norm",
+        "modelling_error_energy",
         "failed",
         "failed_member",
         "failed_reason",

@@ -140,7 +140,7 @@ def run_members(
         done.results.append(run_alone(member, keep, most, events, more, hidden))
         done.members.append(np.array([place]))
     whole = in_order(done.results, done.members)
-    return replace(whole, why_alone=done.why, estimating=done.estimating)
+    return replace(whole, why_alone=done.why, estimating=done.estimating + whole.estimating)
 
 
 @lru_cache(maxsize=4)

@@ -61,7 +61,8 @@ def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
     predicted = made["predicted"]
     seconds = float(predicted["integration_seconds"] + predicted["recording_seconds"])
     if not _side_by_side(sweep):
-        return seconds + _BUILD_SECONDS
+        beside = predicted["choosing_seconds"] + predicted["modelling_seconds"]
+        return float(seconds + max(predicted["building_seconds"], _BUILD_SECONDS) + beside)
     each = _ESTIMATED if sweep.base.config.output.estimate else 1.0
     # half of what lanes could gain
     return each * seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS

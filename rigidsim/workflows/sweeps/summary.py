@@ -16,8 +16,14 @@ _NOT_ESTIMATED = (
     "errors of the attitude aren't estimated of {:,} members, which an earlier version ran in batches (their "
     "attitude_error is nan): rigidsim run CONFIG --member N estimates one, --force runs all of them again"
 )
-_ERRORS = {"attitude": "rad", "position": "m"}
-"""Estimated errors of members, and their units."""
+_ERRORS = {
+    "attitude": ("attitude_error", "rad"),
+    "position": ("position_error", "m"),
+    "modelling": ("modelling_error", "rad"),
+    "modelling_norm": ("modelling_error_norm", "1"),
+    "modelling_energy": ("modelling_error_energy", "1"),
+}
+"""Announced errors of members: their variables and units."""
 
 
 @dataclass
@@ -117,15 +123,17 @@ def _count(sources: Sources, reader: TileReader) -> _Counted:
         warned += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
         steps += int(tile.arrays["steps"][rows].sum())
         for name, found in estimated.items():
-            if f"{name}_error" in tile.arrays:
-                values = tile.arrays[f"{name}_error"][rows]
+            if (variable := _ERRORS[name][0]) in tile.arrays:
+                values = tile.arrays[variable][rows]
                 found.append(values[~np.isnan(values)])
         for name, values in tile.arrays.items():
             if name.endswith("_drift_largest"):
                 largest = np.nanmax(values[rows], initial=0.0)
                 drift = name.removesuffix("_largest")
                 worst[drift] = max(worst.get(drift, 0.0), float(largest))
-    errors = {name: _told(np.concatenate(found), _ERRORS[name]) for name, found in estimated.items() if found}
+    errors = {
+        name: _told(np.concatenate(found), _ERRORS[name][1]) for name, found in estimated.items() if found
+    }
     told = {name: error for name, error in errors.items() if error["members"]}
     return _Counted(outcomes, warned, steps, unestimated, worst, told)
 

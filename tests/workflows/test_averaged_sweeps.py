@@ -1,0 +1,116 @@
+"""Sweeps over averaged models: each member has the error of its model, as a run of its own announces it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import rigidsim
+from rigidsim.cli.app import app
+from rigidsim.workflows.sweeps.members import single_member
+
+SPINNING = """
+name = "precessing"
+[body]
+principal_moments = [0.98, 0.98, 1]
+[initial]
+angular_velocity = [0, 0, 60]
+euler_angles = [0.3, "35 deg", 0]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 1
+orbit = {semi_major_axis = 1, eccentricity = 0.2, inclination = "10 deg"}
+[model]
+level = "spin_averaged"
+[time]
+end = 10
+samples = 3
+[output]
+record = ["momentum_axis"]
+timeline = false
+[sweep]
+tile = 1
+axes."initial.euler_angles[1]" = {values = ["20 deg", "50 deg"], name = "lean"}
+"""
+DAMPED = SPINNING.replace(
+    "[model]", '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1e-4, 1e-4, 2e-4]\n[model]'
+).replace("[0.98, 0.98, 1]", "[0.7, 0.8, 1]")
+KEEPING_PACE = (
+    SPINNING.replace("[0, 0, 60]", "[0, 0, 1]")
+    .replace("[0.98, 0.98, 1]", "[0.998, 0.999, 1]")
+    .replace("eccentricity = 0.2", "eccentricity = 0.02")
+    .replace("spin_averaged", "orbit_averaged")
+    .replace('["20 deg", "50 deg"]', '["5 deg", "8 deg"]')
+)
+OVER_ORBITS = SPINNING.replace("spin_averaged", "orbit_averaged").replace("end = 10", "end = 100")
+OPEN = SPINNING.replace('"spin_averaged"', '"auto"\n[integrator]\naccuracy_axis = 1e-3')
+MIXED = SPINNING.replace('axes."initial.euler_angles[1]"', 'axes."model.level"').replace(
+    '["20 deg", "50 deg"], name = "lean"', '["spin_averaged", "full"]'
+)
+
+
+def as_single_runs(text: str, out: Path) -> None:
+    """Every announced error of a sweep is that of the member run by itself."""
+    found = rigidsim.sweep(rigidsim.parse(text), out=out)
+    assert found.summary["warnings"] == []
+    errors = found.dataset["modelling_error"].values
+    for member, error in enumerate(errors):
+        alone = rigidsim.run(single_member(rigidsim.parse(text), member), out=None)
+        assert error == alone.dataset.attrs["modelling_error"] > 0
+        model = alone.outcome.modelling  # type: ignore[union-attr]
+        assert model is not None
+        for name, beside in (("norm", "angular_momentum_norm"), ("energy", "energy")):
+            known = getattr(model, beside)
+            assert (f"modelling_error_{name}" in found.dataset) == (known is not None)
+            if known is not None:
+                assert found.dataset[f"modelling_error_{name}"].values[member] == known
+    told = found.summary["estimated_errors"]
+    assert told["modelling"]["largest"] == errors.max()
+    assert 0 < found.summary["cost"]["estimate_cpu_seconds"] < found.summary["cost"]["cpu_seconds"]
+
+
+def test_a_sweep_keeps_and_tells_the_error_of_each_model(tmp_path: Path) -> None:
+    as_single_runs(SPINNING, tmp_path)
+    told = CliRunner().invoke(app, ["info", str(tmp_path / "precessing")], env={"COLUMNS": "400"}).output
+    assert "axes of averaged models" in told
+    assert "of its integration alone" in told
+    assert "for errors" in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [DAMPED, KEEPING_PACE, OVER_ORBITS, OPEN])
+def test_so_does_every_kind_of_average(text: str, tmp_path: Path) -> None:
+    as_single_runs(text, tmp_path)
+
+
+@pytest.mark.slow
+def test_such_a_sweep_is_resumed_verified_drawn_and_planned(tmp_path: Path) -> None:
+    whole = rigidsim.sweep(rigidsim.parse(SPINNING), out=tmp_path)
+    before = whole.dataset.load()
+    next(whole.folder.tiles.glob("*")).unlink()
+    whole.folder.dataset.unlink()
+    place = str(whole.folder.path)
+    commands = [
+        ["resume", place],
+        ["verify", place],
+        ["plot", place, "--what", "modelling_error"],
+        ["export", place, "--format", "csv"],
+    ]
+    for command in commands:
+        done = CliRunner().invoke(app, command)
+        assert done.exit_code == 0, done.output
+    again = rigidsim.sweep(rigidsim.parse(SPINNING), out=tmp_path).dataset
+    assert again.drop_attrs().identical(before.drop_attrs())
+    made = rigidsim.plan(single_member(rigidsim.parse(SPINNING), 0))
+    assert made["predicted"]["modelling_seconds"] > 0
+
+
+@pytest.mark.slow
+def test_beside_full_models_only_averaged_members_have_one(tmp_path: Path) -> None:
+    found = rigidsim.sweep(rigidsim.parse(MIXED), out=tmp_path).dataset
+    errors = found["modelling_error"].values
+    assert errors[0] > 0
+    assert np.isnan(errors[1])
