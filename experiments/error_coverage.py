@@ -30,6 +30,7 @@ import numpy as np
 
 from experiments import common
 from experiments.certificates.ledger import code_version
+from experiments.coverage.averages import judge_average
 from experiments.coverage.families import FAMILIES, coverage_scene
 from experiments.coverage.judging import Judged, judge
 
@@ -51,7 +52,7 @@ def campaign(numbers: Iterable[int], seed: int, out: Path, seconds: float = math
             break
         scene = coverage_scene(number, seed)
         try:
-            found = judge(scene)
+            found = (judge_average if FAMILIES[scene.family].averaged else judge)(scene)
         except Exception as error:  # a scene that breaks the study is an outcome, and fails it
             found = Judged(number, scene.family, f"{type(error).__name__}: {error}"[:200], "broken")
         known[number] = found

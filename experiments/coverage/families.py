@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.random_scenes import KINDS, Draw
 
 SAMPLES = 9
@@ -24,10 +25,12 @@ class Family:
     Attributes:
         draw: writes body, start and loads.
         radians: powers of ten between which the horizon is drawn.
+        averaged: whether it is an averaged model, which has its own states and settings.
     """
 
     draw: Callable[[Draw], None]
     radians: tuple[float, float] = (1.0, 3.3)
+    averaged: bool = False
 
 
 @dataclass(frozen=True)
@@ -223,6 +226,7 @@ FAMILIES: dict[str, Family] = {
     "kink": Family(_kink, (1.0, 1.5)),
     "switching": Family(_switching, (1.0, 2.3)),
     "odd load": Family(_signed, (1.0, 2.3)),
+    HYPERBOLIC: Family(hyperbolic_average, (0.18, 0.9), averaged=True),
 }
 """By the name under which the table shows them."""
 
@@ -250,6 +254,8 @@ def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
         integrator.append(f"tolerance = {draw.decades(-13, -7):.3g}")
     elif kind < 0.43:
         integrator.append("hold_invariants = true")
+    if family.averaged:
+        integrator = []
     parameters = ["[parameters]", *draw.parameters] if draw.parameters else []
     lines = [
         f'name = "coverage{number}"',

@@ -1,10 +1,10 @@
 """Error of an averaged model, measured over windows in which every rotation is resolved beside it.
 
 At the beginning, the middle and the end of the span the full motion starts from the averaged one's state,
-with what averaging removed added back, and both are followed. Their difference is a growth, which is
-extrapolated over the span, plus an oscillation, whatever the span. A run that is hardly longer
-than the windows is followed to its end instead. The errors of the integration itself are another matter
-(``rigidsim.accuracy.estimates.estimate``).
+with what averaging removed added back, and both are followed. Their difference is a growth, which the
+averaged motion carries over the span (``rigidsim.accuracy.models.carrying``), plus an oscillation, whatever
+the span. A run that is hardly longer than the windows is followed to its end instead. The errors of the
+integration itself are another matter (``rigidsim.accuracy.estimates.estimate``).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.accuracy.models.carrying import Carrying, carrying
 from rigidsim.accuracy.models.side_by_side import (
     ENERGY,
     SHAPE,
@@ -41,7 +42,7 @@ _LIBRATIONS = 2
 _WHOLE = 4  # windows that a run is followed to its end in place of
 _WINDOWS = 3  # of a run that is longer
 _SPARE = 2.0
-"""Factor on the extrapolated growth, which is measured in three windows and varies between them."""
+"""Factor on the growth until the end, which is measured in three windows and varies between them."""
 _SPARE_OF_WHOLE = 1.25  # for the times between the samples
 _TURN = 2 * math.pi
 
@@ -52,7 +53,7 @@ class ModellingError:
 
     Attributes:
         momentum, figure: errors of the recorded directions until the end of the run, rad; at most pi.
-        growth: growth of the momentum's direction error, rad/s.
+        growth: mean growth of the momentum's direction error until the end, rad/s.
         oscillation: part that doesn't grow, rad: what isn't added back to the momentum's direction.
         whole: whether the full model was followed to the end.
         how: description of the measurement.
@@ -110,11 +111,12 @@ def measure_modelling(
     for at, direction, length in places:
         until = end if whole else at + length
         windows.append(side_by_side(prepared, average, at, until, direction, go_on))
-    spent = time.process_time() - started
     if whole:
-        return _of_whole(average, windows[0], spent)
+        return _of_whole(average, windows[0], time.process_time() - started)
     motions = [motion_at(average, states, exponent) for _, states, _ in places]
-    return _extrapolated(prepared, average, windows, motions, end - begin, spent)
+    steady = average.resonance is not None or not average.sources
+    carried = None if steady else carrying(prepared, average, go_on)
+    return _extrapolated(prepared, average, windows, motions, end - begin, started, carried)
 
 
 def _length(average: Average, motion: FreeMotion) -> float:
@@ -191,21 +193,31 @@ def _extrapolated(
     windows: list[Window],
     motions: Sequence[FreeMotion],
     span: float,
-    spent: float,
+    started: float,
+    carried: Carrying | None,
 ) -> ModellingError:
+    """Error at the end from that in windows.
+
+    Args:
+        started: CPU time at which the measurement began, s.
+        carried: how the averaged motion carries errors; None for precession at a steady rate.
+    """
     rates = np.array([w.growth for w in windows])
     doubt = max(w.doubt for w in windows)
     mean = np.abs(rates.mean(axis=0)) + (rates.max(axis=0) - rates.min(axis=0)) / 2
     along, across = (float(x) + doubt for x in mean)
-    # an error across the precession changes the rate along it
-    shear = float(average.shear(prepared.scene.context, prepared.scene.start))
     changes, faster = _changed(average, windows, span), 0.0
     if average.driven is not None and average.sources:
         # lasting errors of size and energy change the rate of precession; what oscillates doesn't
         kept = [_lasting(windows, name, span / 2) + average.driven.passed for name in (SIZE, SHAPE)]
         detuned = max(average.driven.detuned(motion, kept[0], kept[1]) for motion in motions)
         faster = average.strength * detuned
-    grown = math.hypot(along + faster + shear * across * span / 2, across) * span
+    if carried is None:
+        # an error across the precession changes the rate along it
+        shear = float(average.shear(prepared.scene.context, prepared.scene.start))
+        grown = math.hypot(along + faster + shear * across * span / 2, across) * span
+    else:
+        grown = carried.grown(along + faster, across)
     oscillation = max(w.recorded for w in windows)
     if average.driven is not None:  # which may be larger between the windows
         oscillation = max(oscillation, average.driven.course.swing) + average.driven.scatter
@@ -218,7 +230,7 @@ def _extrapolated(
     share = sum(w.end - w.start for w in windows) / span
     steps = sum(w.steps for w in windows)
     how = f"every rotation was resolved beside the run in {len(windows)} windows ({100 * share:.2g} % of it, "
-    how += f"{steps:,} steps), and the growth found there extrapolated to its end"
+    how += f"{steps:,} steps), and the growth found there carried to its end"
     return ModellingError(
         average.level,
         min(momentum, math.pi),
@@ -227,7 +239,7 @@ def _extrapolated(
         oscillation,
         False,
         how,
-        spent,
+        time.process_time() - started,
         windows,
         changes,
     )

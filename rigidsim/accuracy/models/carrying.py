@@ -1,0 +1,167 @@
+"""How an averaged motion carries small errors of its direction on: steadily, in proportion to time, or
+exponentially, as near a hyperbolic Cassini state.
+
+Neighbours of the averaged motion, two tangent directions of its direction, are followed over short stretches
+one after the other: each gives the tangent map of its stretch, and their products that between any two times.
+The average over the orbits serves where there is one, whose steps are few whatever the run's level; it
+carries errors alike, up to terms that averaging leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rigidsim.accuracy.models.side_by_side import Unmeasured
+from rigidsim.accuracy.trial import compactly
+from rigidsim.errors import ConfigError
+from rigidsim.model.averaged.average import DIRECTION, Average
+from rigidsim.scene.model_table import ORBIT_AVERAGED
+from rigidsim.scene.records import dataclass
+from rigidsim.solve.neighbours.lanes import NEIGHBOURS, BatchLanes, Lanes, StepperLanes
+from rigidsim.solve.problem import InitialValueProblem, prepare_scene
+from rigidsim.store.summary_parts import UnmeasuredCode
+
+_PART_OF_TURN = math.pi / 6
+"""Largest angle of precession within a stretch, over which the path's direction is nearly the same."""
+_FEWEST, _MOST = 64, 1024  # stretches
+_APART = 2.0**-20
+"""Distance of neighbours, rad: its square is below, and the lanes' tolerance far below, what matters."""
+_STEPS = 1 << 20  # of one call
+_STEPS_OF_SPIN = 10_000  # from which code pays that takes longer to compile
+_STANDS = 1e-13  # rad: a path that is shorter has no direction
+
+
+@dataclass(frozen=True)
+class Carrying:
+    """Tangent maps of an averaged motion's direction.
+
+    Attributes:
+        seconds: length of each stretch, s.
+        maps: (stretches, 2, 2) from its beginning to its end, in components along the path and across it.
+    """
+
+    seconds: float
+    maps: np.ndarray
+
+    def grown(self, along: float, across: float) -> float:
+        """Largest error (rad) until the end, of a motion that errs by given rates all the time.
+
+        What is made at different times adds up whatever its sign, which need not stay the same.
+
+        Args:
+            along, across: errors made along the path and across it, rad/s.
+        """
+        made = np.diag([along, across]) * self.seconds / 2
+        errors, largest = np.zeros((0, 2, 2)), 0.0  # (times, components, along and across)
+        for step in self.maps:
+            # half of a stretch's errors at its beginning, half at its end
+            errors = np.concatenate([step @ errors, (step @ made + made)[None]])
+            parts = np.abs(errors).sum(axis=(0, 2))
+            largest = max(largest, math.hypot(*parts))
+            if largest > math.pi:
+                break
+        return largest
+
+
+def carrying(
+    prepared: InitialValueProblem, average: Average, go_on: Callable[[], bool] = lambda: True
+) -> Carrying:
+    """Tangent maps of a run's averaged motion, from its start to its end.
+
+    Args:
+        go_on: polled repeatedly; False ends the work.
+
+    Raises:
+        Unmeasured: ``go_on`` ended it, or the motion can't be followed.
+    """
+    problem = _problem(prepared, average)
+    system = problem.system
+    start, end = float(problem.clock.start), float(problem.clock.at(problem.clock.count - 1))
+    seconds = math.ldexp(end - start, system.scaling.time)
+    turned = seconds * average.strength * abs(float(average.motion.excess / average.motion.momentum))
+    count = int(min(max(turned / _PART_OF_TURN, _FEWEST), _MOST))
+    ahead = min(1.0, _PART_OF_TURN * count / max(turned, 1e-300))  # of a stretch
+    lanes, edges = _lanes(problem), np.linspace(start, end, count + 1)
+    places = [system.states.index(name) for name in DIRECTION]
+    state = np.array([float(x) for x in system.initial])
+    bases, moved = [_basis(state[places], np.zeros(3))], []
+    for begin, until in pairwise(edges):
+        middle = float(begin + ahead * (until - begin))
+        states = np.repeat(state[:, None], NEIGHBOURS + 1, axis=1)
+        pushed = bases[-1]
+        states[places, 1:3] += _APART * pushed.T
+        if not go_on():
+            raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted")
+        states = _to(lanes, states, float(begin), middle)
+        bases[-1] = _basis(state[places], states[places, 0] - state[places], pushed[0])
+        states = _to(lanes, states, middle, float(until))
+        state = states[:, 0]
+        apart = (states[places, 1:3] - state[places, None]) / _APART
+        moved.append(apart @ pushed @ bases[-1].T)
+        bases.append(_basis(state[places], np.zeros(3), bases[-1][0]))
+    maps = [after @ step for after, step in zip(bases[1:], moved, strict=True)]
+    return Carrying(seconds / count, np.array(maps))
+
+
+def _problem(prepared: InitialValueProblem, average: Average) -> InitialValueProblem:
+    """The averaged motion that is followed: averaged over the orbits as well, if it can be."""
+    scene, config = prepared.scene, prepared.scene.config
+    integrator = config.integrator.model_copy(update={"precision": "double", "tolerance": "auto"})
+    output = config.output.model_copy(update={"record": ["momentum_axis"], "lyapunov": False})
+    for level in dict.fromkeys((ORBIT_AVERAGED, average.level)):
+        model = config.model.model_copy(update={"level": level, "short_period": False})
+        changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
+        found, loads = replace(scene, config=changed), prepared.python_loads
+        own = average if level == average.level else None
+        try:
+            return compactly(prepare_scene(prepared.experiment, found, loads=loads, along=own))
+        except ConfigError:
+            if level == average.level:
+                raise
+    raise AssertionError
+
+
+def _lanes(problem: InitialValueProblem) -> Lanes:
+    system, clock = problem.system, problem.clock
+    if system.stepwise:
+        start, end = float(clock.start), float(clock.at(clock.count - 1))
+        return StepperLanes(system, start, end, 1)
+    average = system.plan.average
+    assert average is not None
+    return BatchLanes(system, 0 if average.over_orbits else _STEPS_OF_SPIN)
+
+
+def _to(lanes: Lanes, states: np.ndarray, begin: float, end: float) -> np.ndarray:
+    """States of all lanes at a later time.
+
+    Raises:
+        Unmeasured: one of them doesn't get there.
+    """
+    every = np.ones(states.shape[1])
+    while begin < end:
+        found = lanes.advance(states, begin * every, end * every, _STEPS)
+        if found is None or not np.isfinite(found[0]).all():
+            why = "motions beside the averaged one can't be followed to its end"
+            raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, why)
+        states, _, begin = found
+    return states
+
+
+def _basis(direction: np.ndarray, towards: np.ndarray, otherwise: np.ndarray | None = None) -> np.ndarray:
+    """Unit vectors (2, 3) across a direction, the first of them along a path, the second across it.
+
+    Args:
+        towards: where the path leads.
+        otherwise: takes its place where the path stands still.
+    """
+    along = towards - (towards @ direction) * direction
+    if np.linalg.norm(along) < _STANDS:
+        along = np.eye(3)[int(np.argmin(np.abs(direction)))] if otherwise is None else otherwise
+        along = along - (along @ direction) * direction
+    along = along / np.linalg.norm(along)
+    return np.array([along, np.cross(direction, along)])
