@@ -57,12 +57,12 @@ class Carrying:
             along, across: errors made along the path and across it, rad/s.
         """
         made = np.diag([along, across]) * self.seconds / 2
-        errors, largest = np.zeros((0, 2, 2)), 0.0  # (times, components, along and across)
-        for step in self.maps:
+        errors, largest = np.empty((2, 2 * len(self.maps))), 0.0  # a column for each time and component
+        for n, step in enumerate(self.maps):
+            errors[:, : 2 * n] = step @ errors[:, : 2 * n]
             # half of a stretch's errors at its beginning, half at its end
-            errors = np.concatenate([step @ errors, (step @ made + made)[None]])
-            parts = np.abs(errors).sum(axis=(0, 2))
-            largest = max(largest, math.hypot(*parts))
+            errors[:, 2 * n : 2 * n + 2] = step @ made + made
+            largest = max(largest, math.hypot(*np.abs(errors[:, : 2 * n + 2]).sum(axis=1)))
             if largest > math.pi:
                 break
         return largest
