@@ -11,9 +11,11 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.model.scaling import exponent
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.records import dataclass
+from rigidsim.scene.tracing.numbers import largest_of
 
 
 @dataclass(frozen=True)
@@ -89,20 +91,33 @@ class Mechanics(Kinematics):
         return hy.sum(found) if found else None
 
     @cached_property
-    def power(self) -> Symbolic | None:
-        """Power of the loads without a potential, internal units of energy over time; None without such
-        loads.
+    def work_unit(self) -> int:
+        """Binary exponent of the unit that work is carried in, J: large enough that it stays of order 1.
+
+        Step control is relative to the largest state, whatever depends on it. Work done on the flight is of
+        the size of the flight's kinetic energy, which the unit of rotational energy would make the largest by far.
         """
-        context, terms = self.scene.context, []
+        context, scaling = self.scene.context, self.scaling
+        working = [load for load in self.loads if not load.conservative]
+        if self.velocity is None or not any(load.force(self) for load in working):
+            return scaling.energy
+        flight = context.ldexp(self.scene.body.mass, 2 * scaling.speed)
+        return exponent(context, largest_of([flight, context.ldexp(context.one, scaling.energy)]))
+
+    @cached_property
+    def power(self) -> Symbolic | None:
+        """Power of the loads without a potential, units of work over time; None without such loads."""
+        context, scaling, terms = self.scene.context, self.scaling, []
         for load in self.loads:
             if load.conservative:
                 continue
             for vector, expression in load.torque(self):
-                pairs = zip(vector, self.rates, strict=True)
+                turning = [context.ldexp(x, scaling.energy - self.work_unit) for x in vector]
+                pairs = zip(turning, self.rates, strict=True)
                 terms.append(expression * hy.sum([self.number(x) * w for x, w in pairs if x != 0]))
             if self.velocity is not None and self.scene.body.mass is not None:
                 # force per mass times mass times speed
-                scale = context.ldexp(self.scene.body.mass, 2 * self.scaling.speed - self.scaling.energy)
+                scale = context.ldexp(self.scene.body.mass, 2 * scaling.speed - self.work_unit)
                 for vector, expression in load.force(self):
                     pairs = zip(vector, self.velocity, strict=True)
                     along = hy.sum([self.number(scale * x) * v for x, v in pairs if x != 0])

@@ -118,6 +118,11 @@ def _euler(m: Mechanics) -> list[Symbolic]:
     return rotations.euler_from_matrix(sequence, m.matrix)
 
 
+def _energy_balance(m: Mechanics) -> list[Symbolic]:
+    unit = m.scene.context.ldexp(m.scene.context.one, m.work_unit - m.scaling.energy)
+    return [m.energy - m.number(unit) * hy.make_vars(WORK)]
+
+
 def linear_momentum(m: Mechanics) -> list[Symbolic]:
     """Linear momentum M v, in units of speed times 2^``mass_exponent``."""
     assert m.velocity is not None
@@ -208,10 +213,10 @@ _BUILT_IN: tuple[Observable, ...] = (
     ),
     Observable(
         "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],
-        same_unit(ENERGY, 1), "", ("work",),
+        same_unit(lambda m: m.work_unit, 1), "", ("work",),
     ),
     Observable(
-        "energy_balance", (), "J", "energy less the work done", lambda m: [m.energy - hy.make_vars(WORK)],
+        "energy_balance", (), "J", "energy less the work done", _energy_balance,
         same_unit(ENERGY, 1), "", ("work",), lambda m: "energy changes by the work of the loads",
         energy_scale,
     ),
