@@ -231,9 +231,7 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
 
 def _work_block(m: Mechanics) -> StateBlock:
     why = "work of the loads without a potential, to check the energy"
-    return StateBlock(
-        [WORK], [m.carried(m.power)], [m.scene.context.zero], exponents=[m.work_unit], why=why
-    )
+    return StateBlock([WORK], [m.carried(m.power)], [m.scene.context.zero], exponents=[m.work_unit], why=why)
 
 
 def _pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:

@@ -94,8 +94,8 @@ class Mechanics(Kinematics):
     def work_unit(self) -> int:
         """Binary exponent of the unit that work is carried in, J: large enough that it stays of order 1.
 
-        Step control is relative to the largest state, whatever depends on it. Work done on the flight is of
-        the size of the flight's kinetic energy, which the unit of rotational energy would make the largest by far.
+        Step control is relative to the largest state, whether anything depends on it or not. Work done on the
+        flight is of the size of its kinetic energy, and would be by far the largest in units of rotation's.
         """
         context, scaling = self.scene.context, self.scaling
         working = [load for load in self.loads if not load.conservative]

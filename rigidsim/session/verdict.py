@@ -15,6 +15,7 @@ class Soundness(Enum):
     SOUND = "sound"
     AMPLIFIED = "amplified"
     HELD = "held"
+    LIMITED = "limited"
     UNCHECKED = "unchecked"
     INACCURATE = "inaccurate"
     LOST = "lost"
@@ -36,41 +37,53 @@ class RunVerdict:
     worst: str
 
 
-_GONE = {WarningCode.ATTITUDE_UNCERTAIN.value, WarningCode.RATES_UNCERTAIN.value}
-
-_LESS_THAN_ASKED = {
-    WarningCode.NOT_CERTIFIED.value,
-    WarningCode.MODEL_UNCERTAIN.value,
-    WarningCode.MODEL_UNMEASURED.value,
+LEAST: dict[WarningCode, Soundness] = {
+    WarningCode.DRIFT: Soundness.DRIFTED,
+    WarningCode.ATTITUDE_UNCERTAIN: Soundness.LOST,
+    WarningCode.RATES_UNCERTAIN: Soundness.LOST,
+    WarningCode.NOT_CERTIFIED: Soundness.INACCURATE,
+    WarningCode.MODEL_UNCERTAIN: Soundness.INACCURATE,
+    WarningCode.MODEL_UNMEASURED: Soundness.INACCURATE,
+    WarningCode.SINGULARITY: Soundness.LIMITED,
+    WarningCode.NOT_JOINED: Soundness.LIMITED,
+    WarningCode.UNDEFINED: Soundness.LIMITED,
+    # of what the config asks for, and of the files: they leave the numbers what they are
+    WarningCode.NO_EFFECT: Soundness.SOUND,
+    WarningCode.SET_ASIDE: Soundness.SOUND,
+    WarningCode.BEGUN_ANEW: Soundness.SOUND,
+    WarningCode.ANGLE_WITHOUT_UNIT: Soundness.SOUND,
+    WarningCode.EPHEMERIS_OF_EARTH: Soundness.SOUND,
+    WarningCode.NEVER_HAPPENS: Soundness.SOUND,
+    WarningCode.TIME_WITHOUT_UNIT: Soundness.SOUND,
 }
+"""The best that can be said of a run beside each warning; of a later version's warnings ``LIMITED``."""
+_DEGREES = list(Soundness)
 
 
 def verdict_on(summary: Summary) -> RunVerdict:
-    """The worst that can be said of a run: drifts that rounding does not explain, then lost digits, then less
-    accuracy than was asked for, or an averaged model's own error too large or unknown.
+    """The worst that its warnings and its drifts say of a run, so that no warning is contradicted.
 
     A motion may amplify errors whatever its drifts. For projected invariants the corrections put back count,
-    since they are the drift that would have been.
+    since they are the drift that would have been. What is constant by definition, as a quaternion's norm, is
+    named only where it drifted too much, or where nothing else is watched.
     """
-    checked = {name: row for name, row in summary.invariants.items() if not row.numerical}
     shares = {
         name: max(row.largest_drift, abs(row.put_back or 0.0)) / row.bound
-        for name, row in (checked or summary.invariants).items()
+        for name, row in summary.invariants.items()
         if row.largest_drift is not None and row.bound > 0
     }
-    worst = max(shares, key=lambda name: shares[name], default="")
-    share = shares.get(worst)
-    return RunVerdict(_soundness(summary, share), share, worst)
+    physical = {name: share for name, share in shares.items() if not summary.invariants[name].numerical}
+    drifted = any(not share <= 1 for share in shares.values())
+    named = shares if drifted else physical or shares
+    worst = max(named, key=lambda name: named[name], default="")
+    known = {code.value: degree for code, degree in LEAST.items()}
+    degrees = [known.get(code, Soundness.LIMITED) for code in summary.warning_codes]
+    degrees.append(Soundness.DRIFTED if drifted else _without_warnings(summary, bool(shares)))
+    return RunVerdict(max(degrees, key=_DEGREES.index), named.get(worst), worst)
 
 
-def _soundness(summary: Summary, share: float | None) -> Soundness:
-    if share is not None and not share <= 1:
-        return Soundness.DRIFTED
-    if _GONE.intersection(summary.warning_codes):
-        return Soundness.LOST
-    if _LESS_THAN_ASKED.intersection(summary.warning_codes):
-        return Soundness.INACCURATE
-    if share is None:
+def _without_warnings(summary: Summary, checked: bool) -> Soundness:
+    if not checked:
         return Soundness.UNCHECKED
     if summary.held:
         return Soundness.HELD

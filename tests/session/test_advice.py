@@ -8,8 +8,9 @@ import pytest
 from support import config
 
 import rigidsim
-from rigidsim.session.verdict import Soundness, verdict_on
-from rigidsim.store.summary_parts import AdviceCode
+from rigidsim.cli.screens.verdicts import verdict_line
+from rigidsim.session.verdict import LEAST, Soundness, verdict_on
+from rigidsim.store.summary_parts import AdviceCode, WarningCode
 
 LONG = config(  # some 24,000 steps
     time="end = 12000\nsamples = 101", integrator="hold_invariants = false", estimate=True
@@ -95,3 +96,21 @@ def test_verdicts_go_by_the_worst_that_can_be_said(plain: rigidsim.Run) -> None:
     assert verdict_on(summary.having(invariants={})).soundness is Soundness.UNCHECKED
     amplified = summary.accuracy.having(amplification=5.0)
     assert verdict_on(summary.having(accuracy=amplified)).soundness is Soundness.AMPLIFIED
+
+
+def test_no_verdict_contradicts_a_warning(plain: rigidsim.Run) -> None:
+    """Over all warnings, and all ways in which an invariant, a norm by definition too, can drift."""
+    assert set(LEAST) == set(WarningCode)
+    degrees = list(Soundness)
+    for code, least in LEAST.items():
+        warned = plain.outcome.having(warnings=("?",), warning_codes=(code.value,))
+        assert degrees.index(verdict_on(warned).soundness) >= degrees.index(least)
+        told, _ = verdict_line(warned)
+        assert told.startswith("sound: ") == (least is Soundness.SOUND)
+    unknown = plain.outcome.having(warnings=("?",), warning_codes=("of a later version",))
+    assert not verdict_line(unknown)[0].startswith("sound: ")
+    for name, row in plain.summary["invariants"].items():
+        drifted = plain.outcome.invariants[name].having(largest_drift=3 * row["bound"])
+        found = verdict_on(plain.outcome.having(invariants={**plain.outcome.invariants, name: drifted}))
+        assert (found.soundness, found.worst) == (Soundness.DRIFTED, name)
+        assert found.share == pytest.approx(3)

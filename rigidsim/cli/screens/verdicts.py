@@ -10,6 +10,7 @@ from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Advice, AdviceCode
 
 _STYLES = {
+    Soundness.LIMITED: "bold yellow",
     Soundness.INACCURATE: "bold yellow",
     Soundness.LOST: "bold yellow",
     Soundness.DRIFTED: "bold red",
@@ -20,6 +21,8 @@ _WORDS = {
     Soundness.AMPLIFIED: _SOUND + "; the motion itself amplifies errors",
     Soundness.HELD: "sound: what was put back is within what rounding explains, {share} of it at most; "
     "drifts themselves are projected away",
+    Soundness.LIMITED: "sound except for what the warning tells: every drift is within what rounding "
+    "explains, {share} of it at most",
     Soundness.UNCHECKED: "unchecked: nothing is conserved here that could be watched",
     Soundness.INACCURATE: "not accurate enough, or not known to be: see the warning; drifts are within what "
     "rounding explains, {share} of it at most",
@@ -40,8 +43,9 @@ _ADVICE = {
 def verdict_line(summary: Summary) -> tuple[str, str]:
     """The verdict, and its style on a terminal."""
     found = verdict_on(summary)
-    words = _WORDS[found.soundness]
-    share = found.share or 0.0
+    words, share = _WORDS[found.soundness], found.share or 0.0
+    if found.soundness is Soundness.DRIFTED and not share > 1:  # what drifted has no finite size
+        words = "not sound: see the warning"
     told = words.format(share=_percent(share), worst=found.worst, times=f"{share:.2g}")
     model = summary.modelling
     if found.soundness is not Soundness.INACCURATE and model is not None and model.momentum_axis is None:
