@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.scaling import loads_amplitude, potential_amplitude, source_rate
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm
@@ -53,7 +54,18 @@ def energy_scale(m: Mechanics) -> tuple[Any, str]:
     if m.scaling.drive is not None:
         swiftest += m.scaling.drive.speed
     flight = scene.body.mass * swiftest**2 / 2
-    return (scale + flight if flight else scale), name + " plus the flight's largest kinetic energy"
+    whole = scale + flight if flight else scale
+    # a position far from the origin is rounded as coarsely as it is far, and the potential with it
+    pulls = [
+        scene.body.mass * load.gravitational_parameter / load.nearest_approach(scene) ** 2
+        * norm(context, load.position)
+        for load in m.loads
+        if isinstance(load, CentralGravity)
+    ]  # fmt: skip
+    rounded = sum(pulls, context.zero)
+    if rounded > whole:
+        return rounded, "attraction times the attracting point's distance from the origin"
+    return whole, name + " plus the flight's largest kinetic energy"
 
 
 def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
@@ -76,4 +88,7 @@ def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:
     offset = [x - a for x, a in zip(scene.position, attracting_point(m), strict=True)]
     orbital = scene.body.mass * norm(context, cross(offset, scene.velocity))
     spin, _ = momentum_scale(m)
+    rounded = scene.body.mass * norm(context, attracting_point(m)) * norm(context, scene.velocity)
+    if rounded > orbital + spin:
+        return rounded, "linear momentum times the attracting point's distance from the origin"
     return orbital + spin, "initial orbital plus spin angular momentum"

@@ -103,6 +103,17 @@ class Kinematics:
         assert self.attitude is not None
         return self.attitude.matrix
 
+    def seen_from(self, point: Vector) -> tuple[list[Symbolic], Symbolic]:
+        """Unit direction in space axes from a fixed point (mpf, m, space axes) to the body in flight, and the
+        inverse distance (1/length).
+        """
+        context, offset = self.scene.context, []
+        for x, a in zip(self.carried(self.position), point, strict=True):
+            shift = context.ldexp(a, -self.scaling.length)
+            offset.append(x - self.number(shift) if shift != 0 else x)
+        inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in offset]))
+        return [x * inverse for x in offset], inverse
+
     def seen(self, space: list[Symbolic]) -> list[Symbolic]:
         """A vector of space axes that doesn't depend on how the body turns, in body axes."""
         found = apply(transpose(self.matrix), space)

@@ -16,7 +16,7 @@ from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.paired_products import pairs_products
 from rigidsim.model.planar import PlaneOfMotion, asked_plane, gradient_plane
-from rigidsim.model.refusals import refuse_odd_loads
+from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -91,6 +91,8 @@ def plan_model(
     if extra_loads:
         scene = replace(scene, loads=(*scene.loads, *extra_loads))
     loads: list[Load] = [*UniformGravity.of(scene), *loads_of(scene)]
+    if like is None:
+        refuse_second_orbits(scene, loads)
     if scene.config.model.reduced:
         return _averaged(scene, loads, along)
     requirements = choose_requirements(scene, loads)

@@ -27,6 +27,8 @@ _LARGEST_EXPONENT = 1000
 """Largest binary exponent of a recorded variable in SI: float64 ends at 2^1024, and sizes are known only
 roughly.
 """
+_SAME_BODY = 1e-3
+"""Relative difference of gravitational parameters below which two sources are taken to be one."""
 _STATES = 16
 _NOISE = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -105,6 +107,41 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
         if different.any():
             term, place = np.argwhere(different)[0]
             raise ConfigError(_oddness(load, states[rows, place], here[term, place], there[term, place]))
+
+
+def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
+    """Refuse the gravity gradient of a source whose place the scene integrates already: it would follow an
+    orbit of its own, and act twice.
+
+    Raises:
+        ConfigError: a gradient has the gravitational parameter of a carried source; says what to give.
+    """
+    where, bodies = "[[loads]] gravity_gradient", scene.bodies
+    pulling = [load for load in loads if "flight" in load.reads]
+    attractors = [x for load in pulling if (x := getattr(load, "gravitational_parameter", None)) is not None]
+    carried = [] if bodies is None else [s for n, s in enumerate(bodies.strengths) if n != bodies.host]
+
+    def known(strength: Any, others: list[Any]) -> bool:
+        return any(abs(strength - other) <= _SAME_BODY * other for other in others)
+
+    for load in loads:
+        if not load.gradient_alone:
+            continue
+        if load.masses_beside:
+            named = [getattr(x, "number", None) for x in pulling if x.masses_beside and not x.gradient_alone]
+            if getattr(load, "number", None) in named:
+                what = "given beside central_gravity of the same body, which has its torque; remove it"
+                raise ConfigError(Problem(where, what))
+        elif load.gradient_source is not None:
+            strength = load.gradient_source.gravitational_parameter
+            if known(strength, attractors):
+                what = "given for the point that attracts the body in flight; central_gravity has its torque "
+                what += "where the body is, and this one would follow an orbit of its own: remove it"
+                raise ConfigError(Problem(where, what))
+            if known(strength, carried):
+                what = "given with the gravitational parameter of one of [[bodies]] and an orbit of its own; "
+                what += 'give orbit = {body = "..."}, which is where that body is'
+                raise ConfigError(Problem(where, what))
 
 
 def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> Problem:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from equations import CLOSE, Random, array, derivative, general_body, matrix, observed, prepared
+from flights import MU, Flight, Flights, by_scipy, direction, in_orbit, turned_by
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from support import angle_between, config, law, run_text, tried
 
 import rigidsim
 from rigidsim.errors import ConfigError
+from rigidsim.solve.problem import prepare
 
 BODY = "principal_moments = [1, 1.5, 2]"
 START = "angular_velocity = [0.4, -0.7, 0.9]\nquaternion = [0.3, -0.5, 0.2, 0.75]"
@@ -171,3 +176,83 @@ def test_what_contradicts_itself_is_refused(load: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         build_scene(rigidsim.parse(text(load)))
     assert message in str(caught.value)
+
+
+IN_FLIGHT = Flight(
+    np.array([1.0, 2.0, 3.0]), 100.0, np.array([0.01, 0.02, 0.015]), np.array([1.0, 0.1, 0.2, 0.3]),
+    np.array([6900e3, 1e6, 0.0]), np.array([0.0, 5000.0, 5700.0]), 500.0, strength=MU,
+    moment=np.array([0.5, -1.0, 2.0]), dipole=np.array([2e22, -1e22, -7.4e22]),
+)  # fmt: skip
+AROUND = 'orbit = {semi_major_axis = "7000 km"}\ngravitational_parameter = 3.986004418e14'
+
+
+def test_in_flight_the_field_is_that_at_the_body() -> None:
+    """The other integrator's own errors: 1e-13 of each of some hundred steps, which the motion amplifies."""
+    run, truth = run_text(IN_FLIGHT.text), by_scipy(IN_FLIGHT)[6:10]
+    assert turned_by(run.dataset["quaternion"].values[-1], truth) <= 1e-11
+    assert run.summary["warnings"] == []
+    assert turned_by(by_scipy(replace(IN_FLIGHT, moment=np.zeros(3)))[6:10], truth) > 0.01
+    # its torque acts without a force: neither energy nor the whole momentum is kept
+    assert list(run.summary["invariants"]) == ["energy_balance", "quaternion_norm"]
+
+
+def test_in_flight_the_dipole_is_where_the_attracting_point_is() -> None:
+    shift = np.array([3e9, -1e9, 2e9])
+    shifted = replace(IN_FLIGHT, centre=shift, position=IN_FLIGHT.position + shift)
+    here, there = run_text(IN_FLIGHT.text), run_text(shifted.text)
+    # the position is rounded to 1e-16 of 3.7e9 m, 1e-13 of the distance: three times that in the field
+    apart = turned_by(here.dataset["quaternion"].values[-1], there.dataset["quaternion"].values[-1])
+    assert apart <= 1e-9
+
+
+@pytest.mark.slow(20)
+def test_in_flight_the_torque_is_right_at_random_states() -> None:
+    random = np.random.default_rng(8)
+    for _ in range(60):
+        flight = in_orbit(random)
+        flight.dipole, flight.moment = (
+            1e23 * direction(random),
+            10 ** random.uniform(-3, 3) * direction(random),
+        )
+        flight.centre = 1e7 * direction(random)
+        state = Flights([flight], np.float64).rates(flight.start.astype(float)[:, None])[:, 0]
+        system = prepare(rigidsim.parse(flight.text)).system
+        x = flight.start.astype(float)
+        found = derivative(system, np.concatenate([x[10:], x[6:10], x[:6], [0.0]]))
+        turning = np.abs(state[10:]).max()
+        assert np.abs(found[:3] - state[10:]).max() <= 10 * CLOSE * turning
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (f"source_moment = [0, 0, 1e22]\n{AROUND}", "remove orbit and gravitational_parameter"),
+        ("", "field: given neither field nor source_moment; exactly one of them is needed"),
+        ("source_moment = [0, 0, 1e22]\nfield = [0, 0, 1]", "given both field and source_moment"),
+        ("field = [0, 0, 1]\nposition = [0, 0, 0]", "position: given; allowed with source_moment"),
+        ("source_moment = [0, 0, 1e22]\nposition = [6900e3, 1e6, 0]", "the body starts at the dipole"),
+    ],
+)
+def test_a_magnet_in_flight_follows_no_orbit_of_its_own(load: str, message: str) -> None:
+    magnet = f'[[loads]]\nkind = "magnetic_dipole"\nmoment = [0, 0, 1]\n{load}\n'
+    plain = replace(IN_FLIGHT, moment=np.zeros(3)).text.replace("[time]", f"{magnet}[time]")
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        prepare(rigidsim.parse(plain))
+
+
+def test_without_one_attracting_point_the_dipole_needs_a_place() -> None:
+    alone = replace(IN_FLIGHT, strength=0.0).text
+    with pytest.raises(ConfigError, match="position: missing"):
+        prepare(rigidsim.parse(alone))
+    prepare(rigidsim.parse(alone.replace("source_moment", "position = [0, 0, 0]\nsource_moment")))
+
+
+def test_a_gradient_of_what_attracts_the_body_in_flight_is_refused() -> None:
+    """It would follow an orbit of its own, and act twice; that of a third body is allowed."""
+    plain = replace(IN_FLIGHT, moment=np.zeros(3)).text
+    for place in ("orbit = {semi_major_axis = 7e6}", "position = [7e6, 0, 0]"):
+        gradient = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 3.986e14\n{place}\n'
+        with pytest.raises(ConfigError, match="an orbit of its own: remove it"):
+            prepare(rigidsim.parse(plain.replace("[time]", f"{gradient}[time]")))
+        third = gradient.replace("3.986e14", "4.9028e12")
+        prepare(rigidsim.parse(plain.replace("[time]", f"{third}[time]")))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
@@ -103,14 +102,7 @@ class CentralGravity(Load):
 
     def geometry(self, m: Kinematics) -> tuple[list[Symbolic], list[Symbolic], Symbolic]:
         """Unit direction from the attracting point in space axes and in body axes, and 1/r (1/length)."""
-        context = m.scene.context
-        assert m.position is not None
-        offset = []
-        for x, a in zip(m.position, self.position, strict=True):
-            shift = context.ldexp(a, -m.scaling.length)
-            offset.append(x - m.number(shift) if shift != 0 else x)
-        inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in offset]))
-        space = [x * inverse for x in offset]
+        space, inverse = m.seen_from(self.position)
         return space, apply(transpose(m.matrix), space), inverse
 
     def source_direction(self, m: Kinematics) -> list[Symbolic]:

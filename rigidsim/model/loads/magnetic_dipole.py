@@ -1,5 +1,5 @@
-"""Magnetic dipole: a moment of the body in a uniform field, or in the field of a centred dipole along an
-orbit.
+"""Magnetic dipole: a moment of the body in a uniform field, or in the field of a dipole about which the body
+moves, on a prescribed orbit or as it flies.
 """
 
 from __future__ import annotations
@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import heyoka as hy
 from pydantic import Field
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Load, Term, loads_of
+from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, dot, negligible, norm
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import GravitationalParameter, Triple, quantity
+from rigidsim.scene.fields import GravitationalParameter, Metre, Triple, quantity
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
@@ -34,7 +36,7 @@ else:
 
 class MagneticDipoleFields(LoadFields):
     """Torque m x B on a dipole of the body, in a uniform ``field`` (space axes), or in the field of a centred
-    dipole ``source_moment`` (space axes) around which the body moves on ``orbit``.
+    dipole ``source_moment`` (space axes) around which the body moves on ``orbit``, or in flight as it flies.
     """
 
     kind: Literal["magnetic_dipole"]
@@ -46,10 +48,17 @@ class MagneticDipoleFields(LoadFields):
     )
     orbit: Orbit | None = Field(
         default=None,
-        description="orbit of the source as seen from the body, instead of field; needs source_moment",
+        description="orbit of the source as seen from the body, instead of field; needs source_moment; not "
+        "for a body with a position of its own, where which the field is taken",
     )
     source_moment: Triple[MagneticMoment] | None = Field(
         default=None, description="magnetic moment of the source, space axes", examples=[[0, 0, -7.7e22]]
+    )
+    position: Triple[Metre] | None = Field(
+        default=None,
+        description="place of the source, space axes, for a body with a position of its own; by default the "
+        "point of its central_gravity",
+        examples=[[0, 0, 0]],
     )
     gravitational_parameter: GravitationalParameter | None = Field(
         default=None, description="G M of the source, from which the orbit's period follows"
@@ -65,32 +74,33 @@ class MagneticDipole(Load):
 
     Attributes:
         moment: m, body axes, A m^2 (mpf).
-        source: the field itself (T), or M (A m^2) if there is an orbit; space axes.
+        source: the field itself (T), or M (A m^2) of a dipole; space axes.
         orbit: orbit of the source seen from the body (which only reverses c); shared with other loads.
+        place: position of the dipole about which the body flies, space axes, m; empty where it is the point
+            that attracts the body. None if it doesn't fly about one.
     """
 
     moment: Vector
     source: Vector
     orbit: KeplerOrbit | None = None
+    place: Vector | None = None
     Fields = MagneticDipoleFields
     title = "magnetic_dipole"
     described = "a magnetic dipole"
-    reads = frozenset({"attitude"})
 
     @classmethod
     def resolve(cls, fields: MagneticDipoleFields, around: Surroundings) -> MagneticDipole:
         """See ``SceneLoad``."""
-        if (fields.field is None) == (fields.orbit is None):
-            given = "neither field nor" if fields.field is None else "both field and"
-            raise around.fault("field", f"given {given} orbit; exactly one of them is needed")
-        if (fields.source_moment is None) != (fields.orbit is None):
-            what = "missing; it is needed with orbit" if fields.orbit else "given without orbit; remove it"
-            raise around.fault("source_moment", what)
+        flies = around.free_flight and fields.source_moment is not None
+        _refuse_contradictions(fields, around)
         strength = fields.gravitational_parameter
         if strength is not None and (fields.orbit is None or strength.sign <= 0):
             allowed = "with orbit only" if fields.orbit is None else "as a positive number only"
             raise around.fault("gravitational_parameter", f"given {float(strength):g}; allowed {allowed}")
         moment = _numbers(fields.moment, around)
+        if flies:
+            place = [] if fields.position is None else _numbers(fields.position, around)
+            return cls(moment, _numbers(fields.source_moment or [], around), place=place)
         if fields.orbit is None:
             return cls(moment, _numbers(fields.field or [], around))
         motion = None if strength is None else strength.at(around.context)
@@ -107,10 +117,26 @@ class MagneticDipole(Load):
         """Whether both moment and field are nonzero."""
         return any(x != 0 for x in self.moment) and any(x != 0 for x in self.source)
 
+    def check(self, number: int, position: Vector | None) -> None:
+        """Require that the body doesn't start at the dipole."""
+        if self.place and self.place == position:
+            what = "the body starts at the dipole; start it elsewhere"
+            raise ConfigError(Problem(f"[[loads]] number {number + 1} position", what))
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        """The attitude, and in flight the position."""
+        return frozenset({"attitude"} if self.place is None else {"attitude", "flight"})
+
+    @property
+    def uniform(self) -> bool:
+        """Whether the field is the same everywhere."""
+        return self.orbit is None and self.place is None
+
     @property
     def conservative(self) -> bool:  # type: ignore[override]
-        """Whether the field is uniform."""
-        return self.orbit is None
+        """Whether the field is uniform: along a flight its torque does work without a force."""
+        return self.uniform
 
     @property
     def has_source(self) -> bool:  # type: ignore[override]
@@ -122,22 +148,52 @@ class MagneticDipole(Load):
         return None if self.orbit is None else m.seen(m.orbit(self.orbit).direction)
 
     def _size(self, scene: Scene) -> Any:
-        """Size of the field, T; with an orbit, its size at the semi-major axis over the source's equator."""
+        """Size of the field, T; of a dipole's, over its equator at the semi-major axis or at the start."""
         size = norm(scene.context, self.source)
-        if self.orbit is None:
+        if self.uniform:
             return size
-        return scene.context.mpf(_FIELD_CONSTANT) * size / self.orbit.semi_major_axis**3
+        far = self._far(scene) if self.orbit is None else self.orbit.semi_major_axis
+        return scene.context.mpf(_FIELD_CONSTANT) * size / far**3
+
+    def _centre(self, scene: Scene) -> Vector:
+        """Position of the dipole about which the body flies, m.
+
+        Raises:
+            ConfigError: it isn't given, and there isn't exactly one attracting point.
+        """
+        if self.place:
+            return self.place
+        points = [load.attracting_point for load in loads_of(scene) if load.attracting_point is not None]
+        if not points or any(point != points[0] for point in points):
+            found = "several points" if points else "no point at rest"
+            what = f"missing; it is needed where {found} attracts the body by central_gravity"
+            raise ConfigError(Problem("[[loads]] magnetic_dipole position", what))
+        return points[0]
+
+    def _far(self, scene: Scene) -> Any:
+        """Distance from the dipole at the start, m."""
+        pairs = zip(scene.position or [], self._centre(scene), strict=True)
+        return norm(scene.context, [x - a for x, a in pairs])
+
+    def _nearest(self, scene: Scene) -> Any:
+        """Least distance from the dipole, m: that of the Kepler orbit about it, or the start's."""
+        loads, centre = loads_of(scene), self._centre(scene)
+        pulling = [x for x in loads if isinstance(x, CentralGravity) and x.position == centre]
+        return pulling[0].nearest_approach(scene) if len(pulling) == 1 else self._far(scene)
 
     def _field(self, m: Kinematics) -> list[Symbolic]:
         """Field B divided by ``_size``, body axes."""
         length = norm(m.scene.context, self.source)
         unit = [as_factor(m.number(x / length)) for x in self.source]
-        if self.orbit is None:
+        if self.uniform:
             return m.seen(unit)
-        place = m.orbit(self.orbit)
-        c = place.direction
+        if self.orbit is None:
+            c, inverse = m.seen_from(self._centre(m.scene))
+            falling = (m.number(m.scene.context.ldexp(self._far(m.scene), -m.scaling.length)) * inverse) ** 3
+        else:
+            place = m.orbit(self.orbit)
+            c, falling = place.direction, place.inverse_distance**3
         along = 3.0 * hy.sum([e * x for e, x in zip(unit, c, strict=True)])
-        falling = place.inverse_distance**3
         space = [falling * (along * x - e) for e, x in zip(unit, c, strict=True)]
         return m.seen(space)
 
@@ -155,7 +211,7 @@ class MagneticDipole(Load):
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
         """Whether moment and field are both perpendicular to the axis, in a uniform field."""
         context = scene.context
-        if self.orbit is not None:
+        if not self.uniform:
             return False
         tiny = negligible(context)
         across = abs(dot(self.moment, axis)) <= tiny * norm(context, self.moment)
@@ -168,25 +224,61 @@ class MagneticDipole(Load):
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         """Moment m and field B, if the field is uniform."""
-        return (self.moment, self.source) if self.orbit is None else None
+        return (self.moment, self.source) if self.uniform else None
 
     def amplitude(self, scene: Scene) -> Any:
-        """Largest 2 m B: over the source's poles at pericentre, if there is an orbit."""
+        """Largest 2 m B: of a dipole's field over its poles at pericentre."""
         size = 2 * norm(scene.context, self.moment) * self._size(scene)
-        if self.orbit is None:
+        if self.uniform:
             return size
+        if self.orbit is None:
+            return 2 * size * (self._far(scene) / self._nearest(scene)) ** 3
         return 2 * size * (self.orbit.semi_major_axis / self.orbit.pericentre) ** 3
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """Angular rate at pericentre, rad/s."""
+        """Angular rate at pericentre, rad/s; in flight that at the start."""
+        if self.place is not None:
+            return norm(scene.context, scene.velocity or []) / self._far(scene)
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
     @property
     def effect(self) -> str:
         """See ``Load``."""
-        where = "a uniform field" if self.orbit is None else "the field of a centred dipole along the orbit"
+        where = "a uniform field" if self.uniform else "the field of a centred dipole along the orbit"
+        if self.place is not None:
+            where = "the field of a centred dipole at the body's own position"
         return f"magnetic_dipole: torque m x B in {where}"
 
 
 def _numbers(values: list[ExactNumber], around: Surroundings) -> Vector:
     return [x.at(around.context) for x in values]
+
+
+def _refuse_contradictions(fields: MagneticDipoleFields, around: Surroundings) -> None:
+    """Require one field: uniform, of a dipole along an orbit, or in flight of a dipole where the body is.
+
+    Raises:
+        ConfigError: says what to give.
+    """
+    host = around.bodies is not None and around.bodies.host is not None
+    if fields.orbit is not None and (around.free_flight or host):
+        why = "is one of [[bodies]]; a uniform field is allowed"
+        if around.free_flight:
+            why = "has a position of its own, where the field is taken: remove orbit and "
+            why += "gravitational_parameter, and keep source_moment"
+        raise around.fault("orbit", f"given for a body that {why}")
+    if around.free_flight:
+        if (fields.field is None) == (fields.source_moment is None):
+            given = "neither field nor" if fields.field is None else "both field and"
+            what = f"given {given} source_moment; exactly one of them is needed for a body with a position"
+            raise around.fault("field", what)
+    else:
+        if (fields.field is None) == (fields.orbit is None):
+            given = "neither field nor" if fields.field is None else "both field and"
+            raise around.fault("field", f"given {given} orbit; exactly one of them is needed")
+        if (fields.source_moment is None) != (fields.orbit is None):
+            what = "missing; it is needed with orbit" if fields.orbit else "given without orbit; remove it"
+            raise around.fault("source_moment", what)
+    if fields.position is not None and not (around.free_flight and fields.source_moment is not None):
+        what = "given; allowed with source_moment, for a body with [initial] position and velocity"
+        raise around.fault("position", what)
