@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
+from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw
 
 SAMPLES = 9
@@ -26,11 +27,13 @@ class Family:
         draw: writes body, start and loads.
         radians: powers of ten between which the horizon is drawn.
         averaged: whether it is an averaged model, which has its own states and settings.
+        finish: writes what depends on the end of the run, s.
     """
 
     draw: Callable[[Draw], None]
     radians: tuple[float, float] = (1.0, 3.3)
     averaged: bool = False
+    finish: Callable[[Draw, float], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -227,6 +230,8 @@ FAMILIES: dict[str, Family] = {
     "switching": Family(_switching, (1.0, 2.3)),
     "odd load": Family(_signed, (1.0, 2.3)),
     HYPERBOLIC: Family(hyperbolic_average, (0.18, 0.9), averaged=True),
+    "late switch": Family(switch, (2.0, 4.0), finish=put_late),
+    "late spike": Family(spike, (2.0, 4.0), finish=put_late),
 }
 """By the name under which the table shows them."""
 
@@ -241,6 +246,8 @@ def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
     end = radians * draw.time * draw.time_scale
     if name == "late pulse":
         draw.parameters.append(f"late = {end * draw.between(0.5, 0.95)!r}")
+    if family.finish is not None:
+        family.finish(draw, end)
     formulation = str(draw.random.choice(_FORMULATIONS))
     if name == "long, regular" and formulation == "canonical":
         formulation = "quaternion"

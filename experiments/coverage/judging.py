@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 
 import rigidsim
+from experiments.coverage import moments
 from experiments.coverage.families import SAMPLES, CoverageScene
 from rigidsim.errors import ConfigError
 from rigidsim.session.diagnostics import Diagnostics
@@ -169,12 +170,17 @@ def gone_through(
 def _truth(
     scene: CoverageScene, asked: list[str], prepared: InitialValueProblem
 ) -> dict[str, Vectors] | None:
-    """The samples by a better solution: exact where a kink leaves no other, else with more digits."""
-    if scene.family == "kink":
+    """The samples by a better solution: exact where a kink leaves no other, or where integrations might share
+    what is wrong; else with more digits.
+    """
+    if scene.family in ("kink", "late switch", "late spike"):
         last = prepared.scene.samples.last
         times = [last * n / (SAMPLES - 1) for n in range(SAMPLES)]
-        with mpmath.workdps(50):  # else times are rounded to doubles
-            return {"quaternion": [kinked_attitude(prepared, mpmath.mpf(time)) for time in times]}
+        with mpmath.workdps(moments.DIGITS):  # else times are rounded to doubles
+            if scene.family == "kink":
+                return {"quaternion": [kinked_attitude(prepared, mpmath.mpf(time)) for time in times]}
+            angles = [moments.turned(prepared, scene.text, mpmath.mpf(time)) for time in times]
+            return {"quaternion": [turned_attitude(prepared, 2, angle) for angle in angles]}
     precision = _TRUTH[prepared.precision.name]
     if precision == "extended" and "tolerance" in scene.text:
         precision = "double" if prepared.effective_tolerance > 1e-10 else "extended"
@@ -219,16 +225,21 @@ def kinked_attitude(prepared: InitialValueProblem, end: mpmath.mpf) -> list[mpma
             sign = -1 if gap > 0 else 1
             turned = low * end + gap * (mpmath.exp(sign * k * end) - 1) / (sign * k)
             axis = 0
-        half = [mpmath.cos(turned / 2), mpmath.mpf(0), mpmath.mpf(0), mpmath.mpf(0)]
-        half[axis + 1] = mpmath.sin(turned / 2)
-        w, x, y, z = (mpmath.mpf(q) for q in scene.quaternion)
-        a, b, c_, d = half
-        return [
-            w * a - x * b - y * c_ - z * d,
-            w * b + x * a + y * d - z * c_,
-            w * c_ - x * d + y * a + z * b,
-            w * d + x * c_ - y * b + z * a,
-        ]
+        return turned_attitude(prepared, axis, turned)
+
+
+def turned_attitude(prepared: InitialValueProblem, axis: int, angle: mpmath.mpf) -> list[mpmath.mpf]:
+    """The attitude after the start's has turned by an angle about an axis of the body."""
+    half = [mpmath.cos(angle / 2), mpmath.mpf(0), mpmath.mpf(0), mpmath.mpf(0)]
+    half[axis + 1] = mpmath.sin(angle / 2)
+    w, x, y, z = (mpmath.mpf(q) for q in prepared.scene.quaternion)
+    a, b, c, d = half
+    return [
+        w * a - x * b - y * c - z * d,
+        w * b + x * a + y * d - z * c,
+        w * c - x * d + y * a + z * b,
+        w * d + x * c - y * b + z * a,
+    ]
 
 
 def _integral_of_kink(end: mpmath.mpf, c: mpmath.mpf) -> mpmath.mpf:

@@ -91,6 +91,7 @@ def assemble_states(
         plan.orbit_tags,
         plan.surfaces,
         plan.tables,
+        plan.clocked,
         loads=list(plan.loads),
     )
     if canonical is not None:

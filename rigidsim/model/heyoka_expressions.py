@@ -19,12 +19,15 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.clock import Clock
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.expressions import tree as expressions
+from rigidsim.scene.expressions.lines import Line, line_of
 from rigidsim.scene.expressions.tree import Expression, Name, Node
 
 _NO_SIDES: Mapping[Node, Any] = {}
+_LINEAR = ("sum", "negative", "product", "quotient")
 
 
 def to_heyoka(
@@ -38,7 +41,7 @@ def to_heyoka(
 
     Args:
         variables: a heyoka expression for every name that the expression uses; ``t`` is heyoka's time
-            unless it is given here.
+            unless it is given here, as an expression or as a ``Clock``.
         number: rounds an mpf once to the working precision's scalar.
         context: mpmath context with guard bits, in which constant parts are worked out.
         sides: heyoka expressions for the signs of arguments that are switching surfaces; those of others are
@@ -49,21 +52,33 @@ def to_heyoka(
         ExpressionError: a constant has no finite value, or lies beyond the range of the numbers.
     """
 
+    clock = variables.get("t")
+
     def literal(node: Node, value: Any) -> Any:
-        """A constant (mpf) as an expression; an expression is returned unchanged."""
+        """A constant (mpf) or a line in time as an expression; an expression is returned unchanged."""
         if isinstance(value, hy.expression):
             return value
+        if isinstance(value, Line):
+            assert isinstance(clock, Clock)
+            return clock.expression(value, number, context)
         try:
             return hy.expression(rounded(number(value)))
         except OverflowError:
             raise expression.error("a constant beyond the range of the working precision", node) from None
 
     def combine(node: Node, operands: list[Any]) -> Any:
-        """An mpf as long as all operands are constant, otherwise an expression."""
+        """An mpf as long as all operands are constant, a line in time, or an expression."""
         if isinstance(node, expressions.Constant):
             return node.value.at(context)
         if isinstance(node, Name):
+            if node.name == "t" and isinstance(clock, Clock):
+                return Line(context.one, context.zero)
             return hy.time if node.name == "t" and "t" not in variables else variables[node.name]
+        if any(isinstance(operand, Line) for operand in operands):
+            operands = _with_lines(node, operands)
+            if len(operands) == 1 and node.operator in _LINEAR:
+                return operands[0]
+            operands = [literal(node, x) if isinstance(x, Line) else x for x in operands]
         if not any(isinstance(operand, hy.expression) for operand in operands):
             return expressions.operate(expression, node, operands, context)
         if node.operator == "sign":
@@ -80,6 +95,15 @@ def to_heyoka(
         return _symbolic(node.operator, [literal(node, operand) for operand in operands])
 
     return literal(expression.root, expressions.fold(expression, combine))
+
+
+def _with_lines(node: expressions.Operation, operands: list[Any]) -> list[Any]:
+    """Operands with the lines and numbers among them joined into one, if the operation leaves them a line."""
+    plain = [x for x in operands if not isinstance(x, hy.expression)]
+    if node.operator not in _LINEAR or (len(plain) < len(operands) and node.operator != "sum"):
+        return operands
+    joined = line_of(node.operator, plain)
+    return operands if joined is None else [joined, *(x for x in operands if isinstance(x, hy.expression))]
 
 
 def whole_power(base: Any, exponent: int) -> Any:

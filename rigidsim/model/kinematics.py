@@ -45,6 +45,7 @@ class Kinematics:
         orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
         surfaces: switching surfaces, between which expressions are smooth.
         tables: positions of the states and parameters of tabulated orbits.
+        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.clock``).
     """
 
     scene: Scene
@@ -59,6 +60,7 @@ class Kinematics:
     orbit_tags: Mapping[KeplerOrbit, str] = field(default_factory=dict)
     surfaces: Surfaces = field(default_factory=Surfaces)
     tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
+    clocked: bool = False
     _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
         default_factory=dict, init=False, repr=False
     )

@@ -19,6 +19,7 @@ from rigidsim.model.planar import PlaneOfMotion, asked_plane, gradient_plane
 from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
+from rigidsim.scene.moments import happens_at_a_moment
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.records import dataclass
@@ -42,6 +43,7 @@ class ModelPlan:
         surfaces: switching surfaces on which the equations change.
         plane: plane that the motion stays in, if the formulation is planar.
         tables: positions of the states and parameters of tabulated orbits.
+        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.clock``).
         average: the average that replaces the motion, if rotations are averaged over.
     """
 
@@ -56,6 +58,7 @@ class ModelPlan:
     surfaces: Surfaces
     plane: PlaneOfMotion | None = None
     tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
+    clocked: bool = False
     average: Average | None = None
 
     @property
@@ -127,6 +130,7 @@ def plan_model(
         surfaces,
         plane,
         tables,
+        not tables and happens_at_a_moment(scene),
     )
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.clock import Clock
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
@@ -27,11 +29,15 @@ def carries_sign(m: Kinematics) -> bool:
     return m.surfaces.signed and m.attitude is not None and m.attitude.quaternion_sign != "state"
 
 
-def state_names(m: Kinematics, names: Collection[str]) -> dict[str, Symbolic]:
-    """Expressions in SI units for the names that a user's expression reads.
+def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) -> dict[str, Any]:
+    """Expressions in SI units for the names that a user's expression reads; a ``Clock`` for the time where it
+    takes two numbers.
 
     Parameters ``par[..]`` stand for what the state alone doesn't tell: after the sides of the surfaces, the
-    full turns of angles, then the sign of the quaternion.
+    full turns of angles, then the sign of the quaternion, then the second number of the time.
+
+    Args:
+        clocked: False to have the time as one number in any case.
 
     Raises:
         KeyError: a name that the scene doesn't carry.
@@ -41,7 +47,10 @@ def state_names(m: Kinematics, names: Collection[str]) -> dict[str, Symbolic]:
     def si(expression: Symbolic, exponent: int) -> Symbolic:
         return expression if exponent == 0 else m.number(context.ldexp(context.one, exponent)) * expression
 
-    found: dict[str, Symbolic] = {"t": si(hy.time, scaling.time)}
+    found: dict[str, Any] = {"t": si(hy.time, scaling.time)}
+    if clocked and m.clocked:
+        place = len(m.surfaces.found) + len(m.surfaces.turning) + carries_sign(m)
+        found["t"] = Clock(context.ldexp(context.one, scaling.time), hy.par[place])
     for name, state, e in zip(RATE_NAMES, m.rate_states, scaling.rates, strict=True):
         found[name] = si(state, e - scaling.time)
     if m.attitude is not None and set(names) & set(ATTITUDE_NAMES):

@@ -35,7 +35,7 @@ def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, argument) for all loads and events."""
     found = [(load.title, u) for load in m.loads for u in load.narrow(m)]
     for event in m.scene.events:
-        names = state_names(m, event.reads)
+        names = state_names(m, event.reads, clocked=False)
         found += [
             (f"event {event.name}", to_heyoka(part, names, m.number, m.scene.context, m.sides))
             for part in narrow_parts(event.expression)
@@ -66,14 +66,17 @@ def pace_derivative(
 
 
 def along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
-    """Time derivative of an expression of time and the states, internal units."""
+    """Time derivative of an expression of time and the states, internal units.
+
+    Any other variable in it is a swept number, which doesn't change along a motion.
+    """
     by_time, by_state = slopes(u)
-    terms = [slope * derivatives[name] for name, slope in by_state.items()]
+    terms = [slope * derivatives[name] for name, slope in by_state.items() if name in derivatives]
     return hy.sum([*terms, *by_time]) if terms or by_time else hy.expression(0.0)
 
 
 def slopes(u: Symbolic) -> tuple[list[Symbolic], dict[str, Symbolic]]:
-    """Partial derivatives of an expression: by time, if it depends on it, and by states."""
+    """Partial derivatives of an expression: by time, if it depends on it, and by its variables."""
     clock = hy.make_vars(_CLOCK)
     plain = hy.subs(u, {hy.time: clock})
     found = {

@@ -9,6 +9,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
+from rigidsim.model.crossings import Crossing, crossings_of
 from rigidsim.model.euler_charts import across, partner_sequence
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
@@ -24,19 +25,8 @@ from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.state_names import carries_sign, plain_angles, state_names
 from rigidsim.model.state_selection import Requirements
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import largest_of
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """An event as an expression of the states; ``direction`` is -1, 0 (any) or 1."""
-
-    name: str
-    expression: Symbolic
-    direction: int
-    stop: bool
 
 
 class System:
@@ -245,7 +235,7 @@ class System:
     @cached_property
     def crossings(self) -> list[Crossing]:
         """Events to be located along the motion."""
-        return _crossings(self.mechanics)
+        return crossings_of(self.mechanics)
 
     # --- what changes at given times ------------------------------------------------------------------------
 
@@ -298,14 +288,21 @@ class System:
         return list(m.carried(m.attitude).quaternion) if carries_sign(m) else []
 
     @property
+    def clocked(self) -> bool:
+        """Whether the second number of the time is the last parameter."""
+        return self.plan.clocked
+
+    @property
     def parameters(self) -> int:
         """Number of parameters that equations and events may use."""
-        return len(self.surfaces) + len(self.turning) + bool(self.signed)
+        return len(self.surfaces) + len(self.turning) + bool(self.signed) + self.clocked
 
     @property
     def switches(self) -> bool:
-        """Whether there are any switching surfaces."""
-        return self.parameters > 0
+        """Whether there are any switching surfaces, or angles or a quaternion that are continued from step to
+        step.
+        """
+        return self.parameters > self.clocked
 
 
 def build_system(plan: ModelPlan, number: Rounder) -> System:
@@ -330,16 +327,3 @@ def build_system(plan: ModelPlan, number: Rounder) -> System:
 def _label(block: StateBlock) -> str:
     names = list(block.names)
     return f"{names[0]} ... {names[-1]}" if len(names) > 6 else " ".join(names)
-
-
-def _crossings(m: Mechanics) -> list[Crossing]:
-    signs = {"any": 0, "up": 1, "down": -1}
-    return [
-        Crossing(
-            event.name,
-            to_heyoka(event.expression, state_names(m, event.reads), m.number, m.scene.context, m.sides),
-            signs[event.direction],
-            event.stop,
-        )
-        for event in m.scene.events
-    ]

@@ -14,10 +14,15 @@ from rigidsim.scene.expressions.tree import (
     RATE_NAMES,
     Expression,
     ExpressionError,
+    Node,
+    Operation,
     evaluate,
     names_used,
 )
 from rigidsim.scene.scene import Scene
+
+_SINGULAR = 2.0**-30  # rad from a singularity of Euler angles, where no step would be long enough
+_TIMES = 8  # of a run's span, at which functions of time alone are tried
 
 
 def start_values(scene: Scene) -> dict[str, Any]:
@@ -36,20 +41,22 @@ def start_values(scene: Scene) -> dict[str, Any]:
 
 
 def check_start(scene: Scene) -> None:
-    """Evaluate the components of loads and the events once.
+    """Evaluate the components of loads and the events at the start, and what depends on time alone later.
 
     Raises:
-        ConfigError: some have no finite value (all of them are named), or read Euler angles of which the
-            start has the other triple.
+        ConfigError: some have no finite value (all of them are named), or read Euler angles that are
+            singular at the start, or of which it has the other triple.
     """
     values = start_values(scene)
-    problems = _check_branch(scene)
+    problems = _check_branch(scene) or _check_singular(scene, values)
     for load in scene.loads:
         for where, expression in load.formulas():
             problems += _check(where, expression, values, scene.context)
+            problems += _check_span(where, expression, scene)
     for number, event in enumerate(scene.events):
         where = f"[[events]] number {number + 1} expression"
         problems += _check(where, event.expression, values, scene.context)
+        problems += _check_span(where, event.expression, scene)
     if problems:
         raise ConfigError(problems)
 
@@ -79,6 +86,27 @@ def _check_branch(scene: Scene) -> list[Problem]:
     return [Problem("[initial] euler_angles", what)]
 
 
+def _check_singular(scene: Scene, values: dict[str, Any]) -> list[Problem]:
+    """Refuse loads that read Euler angles if these are singular at the start, where they have no
+    derivatives.
+    """
+    formulas = [formula for load in scene.loads for formula in load.formulas()]
+    reading = [(where, names_used(e) & set(ATTITUDE_NAMES[4:])) for where, e in formulas]
+    if not any(names for _, names in reading):
+        return []
+    context, sequence = scene.context, scene.config.integrator.euler_sequence
+    middle = values[ATTITUDE_NAMES[5]]
+    proper = sequence[0] == sequence[2]
+    if abs(context.sin(middle) if proper else context.cos(middle)) > _SINGULAR:
+        return []
+    why = (
+        f"which the start leaves open: the middle angle of the sequence {sequence} is "
+        f"{context.nstr(middle, 8)} rad there, where its outer axes coincide; choose another [integrator] "
+        "euler_sequence, start elsewhere, or write the load with the quaternion (qw, qx, qy, qz)"
+    )
+    return [Problem(where, f"reads {', '.join(sorted(names))}, {why}") for where, names in reading if names]
+
+
 def _check(where: str, expression: Expression, values: dict[str, Any], context: Any) -> list[Problem]:
     try:
         evaluate(expression, values, context)
@@ -89,3 +117,34 @@ def _check(where: str, expression: Expression, values: dict[str, Any], context: 
             Problem(where, f"no finite value at the start ({given}); start elsewhere or rewrite it: {error}")
         ]
     return []
+
+
+def _check_span(where: str, expression: Expression, scene: Scene) -> list[Problem]:
+    """Refuse a function of time alone, such as sqrt(-t), that has no value at any later time of the run."""
+    problems = []
+    for node in _functions_of_time(expression):
+        part, refusals = Expression(expression.text, node), []
+        for n in range(1, _TIMES + 1):
+            then = scene.start + (scene.end - scene.start) * n / _TIMES
+            try:
+                evaluate(part, {"t": then}, scene.context)
+                break
+            except ExpressionError as error:
+                refusals.append(error)
+        else:
+            what = f"no finite value at any time after the start; rewrite it: {refusals[0]}"
+            problems.append(Problem(where, what))
+    return problems
+
+
+def _functions_of_time(expression: Expression) -> list[Node]:
+    """The largest parts of an expression that depend on time and on nothing else."""
+    found, waiting = [], [expression.root]
+    while waiting:
+        node = waiting.pop()
+        names = names_used(Expression(expression.text, node))
+        if names == {"t"}:
+            found.append(node)
+        elif names and isinstance(node, Operation):
+            waiting += node.operands
+    return found

@@ -50,6 +50,8 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     parameters = random.uniform(-1.0, 1.0, (STATES, compiled.nparams))
     sides = len(system.surfaces)
     parameters[:, sides : sides + len(system.turning)] *= end - start  # full turns, for rates of order one
+    if system.clocked:
+        parameters[:, system.parameters - 1 :] = 0.0  # a part of the time far below its last digit
     largest = np.zeros(len(expressions))
     for part in TIMES:
         values = _evaluated(compiled, states, parameters, start + part * (end - start))

@@ -309,9 +309,11 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     """
     outputs = [right for _, right in system.equations]
     sides = {}
-    if system.switches:  # on whichever side
+    if system.parameters:  # on whichever side
         outputs.append(hy.par[system.parameters - 1])
         sides["pars"] = precision.array([mpmath.mpf(1)] * system.parameters)
+        if system.clocked:
+            sides["pars"][-1] = precision.of_double(0.0)
     elif system.pieces is not None:
         sides["pars"] = np.array(system.pieces.parameters(0), dtype=precision.scalar)
     rhs = compiled_function(outputs, system.variables, compact_mode=True, **precision.options)

@@ -27,7 +27,7 @@ _ARRIVED = hy.taylor_outcome.time_limit
 _LOST = hy.taylor_outcome.err_nf_state
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 _MOST_TO_WHOLE_TIME = 1000  # steps
-_CHUNK_TO, _MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
+CHUNK_TO, MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
 _HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they would take years
 _TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
@@ -275,9 +275,9 @@ class Stepper:
 
     def to(self, time: float) -> bool:
         """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
-        for _ in range(_MOST_CHUNKS_TO):  # Ctrl-C is heeded between chunks
+        for _ in range(MOST_CHUNKS_TO):  # Ctrl-C is heeded between chunks
             engine = self._integrator
-            outcome = engine.propagate_until(time, max_steps=_CHUNK_TO, max_delta_t=self._longest)[0]
+            outcome = engine.propagate_until(time, max_steps=CHUNK_TO, max_delta_t=self._longest)[0]
             if outcome != hy.taylor_outcome.step_limit:
                 break
         return bool(outcome == _ARRIVED)

@@ -26,6 +26,10 @@ def stepper_of(
         from rigidsim.solve.table_stepper import TableStepper
 
         return TableStepper(system, precision, tolerance, start, log)
+    if not system.switches and system.clocked:
+        from rigidsim.solve.clocked_stepper import ClockedStepper
+
+        return ClockedStepper(system, precision, tolerance, start, log)
     if not system.switches:
         return Stepper(system, precision, tolerance, start, log)
     from rigidsim.solve.switching.stepper import SwitchingStepper

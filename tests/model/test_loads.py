@@ -556,12 +556,13 @@ def test_torques_in_body_axes_need_no_attitude(load: str) -> None:
     ("title", "load"), [(title, load) for title, loads in READERS.items() for load in loads]
 )
 def test_loads_that_read_the_attitude_say_so(title: str, load: str) -> None:
-    system = prepared(FREE, SPIN, load, record='["angular_velocity"]').system
+    turned = SPIN + "\neuler_angles = [0, 1, 0]"  # where Euler angles have values
+    system = prepared(FREE, turned, load, record='["angular_velocity"]').system
     reasons = dict(system.reasons)
     why = reasons.get("qw qx qy qz") or reasons["pw px py pz"].split(";")[0]
     assert why == f"{title} reads it"
     with pytest.raises(ConfigError, match=f'given "rates", but {title} reads the attitude; choose "auto"'):
-        prepared(FREE, SPIN, load, integrator='formulation = "rates"')
+        prepared(FREE, turned, load, integrator='formulation = "rates"')
 
 
 def test_reasons_name_every_load_that_reads() -> None:

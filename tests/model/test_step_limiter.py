@@ -151,7 +151,7 @@ def test_what_is_smooth_has_no_extra_state() -> None:
     smooth = ("sin(3*t)", "k*sin(t)^2", "t^2 - 3*t", "-0.1*wx", "exp(-cos(t)^2)", "qw*qx + sin(phi)")
     for torque in smooth:
         load = f'kind = "torque"\ncomponents = ["{torque}", 0, 0]'
-        spin = "angular_velocity = [0, 0, 1]"
+        spin = "angular_velocity = [0, 0, 1]\neuler_angles = [0, 0.5, 0]"  # where phi has a value
         system = prepared("principal_moments = [1, 2, 2.5]", spin, load, parameters="k = 2").system
         assert "pace" not in system.states
     flat = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [0, 0, 1]",

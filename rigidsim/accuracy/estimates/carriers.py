@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidsim.accuracy.estimates.course import Course
 from rigidsim.accuracy.estimates.margins import Margins
+from rigidsim.scene.moments import acts_at_moments_alone
 from rigidsim.solve.neighbours.lanes import (
     TIGHT,
     BatchLanes,
@@ -103,6 +104,8 @@ def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
         plain = replace(
             plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
         )
+    if prepared.system.clocked and acts_at_moments_alone(prepared.scene):
+        plain = replace(plain, clock=0.0)
     if formulation not in ("euler_angles", "canonical"):
         return plain
     angles = replace(plain, own=plain.own * margins.angles, series=margins.angle_series)

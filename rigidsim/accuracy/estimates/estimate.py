@@ -96,9 +96,14 @@ def estimate_errors(
     carried = system.requirements.formulation != "rates"
     if prepared.closed is not None:
         error = CLOSED_FORM * float(prepared.precision.epsilon)
-        return _of_closed_form(prepared, error, carried)
+        return _everywhere(prepared, error, carried, "a few roundings of the closed form")
     start = float(prepared.clock.start)
     end = start + math.ldexp(reached - float(scene.start), -system.scaling.time)
+    if steps == 0 or end <= start:
+        rounding = LAST_BITS * float(prepared.precision.epsilon)
+        return _everywhere(
+            prepared, rounding, carried, "the rounding of the start, which the run didn't leave"
+        )
     if trail is not None and trail.samples:
         form, _ = closed_form_if_any(scene, driven=bool(prepared.python_loads))
         if form is not None:
@@ -116,14 +121,15 @@ def estimate_errors(
     return _conclusion(course, found, margins)
 
 
-def _of_closed_form(prepared: InitialValueProblem, error: float, carried: bool) -> Estimate:
+def _everywhere(prepared: InitialValueProblem, error: float, carried: bool, how: str) -> Estimate:
+    """Estimate of a relative error that is the same for all states."""
     flight = prepared.scene.free_flight
     return Estimate(
         error if carried else None,
         error,
         error * _size(prepared.scene.position) if flight else None,
         error * _size(prepared.scene.velocity) if flight else None,
-        how="a few roundings of the closed form",
+        how=how,
     )
 
 

@@ -37,6 +37,7 @@ class Alone(Enum):
     ANGLES = "full turns of recorded angles are counted along the motion"
     SWITCHING = "the equations change along the motion"
     TABLE = "an orbit goes by a table"
+    MOMENT = "something happens so late, within so short a while, that steps need the time in two numbers"
     BODIES = "point masses move beside the body"
     LYAPUNOV = "the Lyapunov spectrum has an integrator of its own"
     KEY = "what is swept is not a number of the body, the start, a load or a parameter"
@@ -87,6 +88,8 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
         return Alone.SWITCHING
     if system.pieces is not None:
         return Alone.TABLE
+    if system.clocked:
+        return Alone.MOMENT
     if system.scene.bodies is not None:
         return Alone.BODIES
     planar = system.requirements.formulation == "planar"

@@ -17,6 +17,7 @@ import numpy as np
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
+from rigidsim.solve.clocked_stepper import propagation
 from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.stepper import Stepper
@@ -154,6 +155,7 @@ class BatchLanes:
         if self._level:
             options = {"compact_mode": system.wide, "opt_level": 1 if system.wide else self._level - 1}
         self._integrator = hy.taylor_adaptive_batch(equations, initial, tol=tolerance, **options)
+        self._propagate = propagation(system)
         self._even = _Evenly()
 
     @staticmethod
@@ -177,7 +179,7 @@ class BatchLanes:
         def go(most: int) -> tuple[int, float, float]:
             integrator.state[:] = states[carried]
             integrator.set_time([float(t) for t in begin])
-            integrator.propagate_until([float(t) for t in end], max_steps=most)
+            self._propagate(integrator, [float(t) for t in end], most)
             _, shortest, longest, steps = integrator.propagate_res[0]
             return steps, shortest, longest
 
@@ -185,7 +187,7 @@ class BatchLanes:
         reached = float(integrator.time[0])
         if any(result[0] != hy.taylor_outcome.time_limit for result in results):
             # the others took steps of almost the same lengths
-            integrator.propagate_until([float(t) for t in end - end[0] + reached], max_steps=_HOPELESS_STEPS)
+            self._propagate(integrator, [float(t) for t in end - end[0] + reached], _HOPELESS_STEPS)
             results = integrator.propagate_res
             if any(result[0] != hy.taylor_outcome.time_limit for result in results):
                 return None
@@ -208,6 +210,7 @@ class OwnLanes:
     def __init__(self, system: System, integrator: TaylorEngine, then: float | None = TOLERANCE) -> None:
         self._system, self._then = system, then
         self._integrator = copy.deepcopy(integrator)
+        self._propagate = propagation(system)
         self.until = own_until(integrator)
         self.tolerance = float(integrator.tol)
         self._even = _Evenly()
@@ -229,7 +232,7 @@ class OwnLanes:
         def go(most: int) -> tuple[int, float, float]:
             integrator.time = float(begin[0])
             integrator.state[:] = states[:, 0]
-            _, shortest, longest, steps, *_ = integrator.propagate_until(float(end[0]), max_steps=most)
+            _, shortest, longest, steps, *_ = self._propagate(integrator, float(end[0]), most)
             return steps, shortest, longest
 
         steps = self._even.go(go, most)
@@ -239,7 +242,7 @@ class OwnLanes:
         for lane in range(1, states.shape[1]):
             integrator.time = float(begin[lane])
             integrator.state[:] = states[:, lane]
-            outcome, *_ = integrator.propagate_until(float(end[lane]) - early, max_steps=_HOPELESS_STEPS)
+            outcome, *_ = self._propagate(integrator, float(end[lane]) - early, _HOPELESS_STEPS)
             if outcome != hy.taylor_outcome.time_limit:
                 return None
             result[:, lane] = integrator.state

@@ -26,8 +26,6 @@ from rigidsim.solve.switching.resting import Meeting
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe, continued
 from rigidsim.solve.switching.sliding import sliding
 
-_BISECTIONS = 4  # bisections of a step per bit of the precision
-
 Root = tuple[Any, int, int]
 """Time, number of a surface, and the side to which it leads."""
 
@@ -183,11 +181,28 @@ class SwitchedEngines(Stepper):
 
     # --- parameters -----------------------------------------------------------------------------------------
 
-    def _pars(self, turns: list[float], sign: float, over: dict[int, int] | None = None) -> np.ndarray:
+    def _pars(
+        self,
+        turns: list[float],
+        sign: float,
+        over: dict[int, int] | None = None,
+        low: Scalar | None = None,
+    ) -> np.ndarray:
         modes = [(over or {}).get(j, mode) or 1 for j, mode in enumerate(self._modes)]
         sides = [math.copysign(1.0, mode) for mode in modes]
         numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
-        return self._array(numbers)
+        pars = self._array(numbers)
+        if not self._probe.clocked:
+            return pars
+        rest = self._array([0.0])
+        if low is not None:
+            rest[0] = low
+        return np.concatenate([pars, rest])
+
+    @property
+    def _low(self) -> Scalar:
+        """Second number of the time."""
+        return self._integrator.dtime[1]
 
     def _array(self, numbers: list[float]) -> np.ndarray:
         return np.array([self.precision.of_double(x) for x in numbers], dtype=self.precision.scalar)
@@ -195,15 +210,15 @@ class SwitchedEngines(Stepper):
     def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
         """Parameters at this boundary; turns and sign continue from the latest step."""
         turns, sign = self._joined(self.state, self.time)
-        return self._pars(turns, sign, over)
+        return self._pars(turns, sign, over, self._low)
 
-    def _look(self, state: np.ndarray, time: Scalar) -> Look:
-        """Look at the surfaces in a state of the latest step."""
-        return self._probe.look(state, time, self._pars(*self._joined(state, time)))
+    def _look(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> Look:
+        """Look at the surfaces in a state of the latest step, at a time in one number or two."""
+        return self._probe.look(state, time, self._pars(*self._joined(state, time), low=low))
 
-    def _values(self, state: np.ndarray, time: Scalar) -> np.ndarray:
-        """Arguments of the surfaces in a state of the latest step."""
-        return self._probe.values(state, time, self._pars(*self._joined(state, time)))[0]
+    def _values(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> np.ndarray:
+        """Arguments of the surfaces in a state of the latest step, likewise."""
+        return self._probe.values(state, time, self._pars(*self._joined(state, time), low=low))[0]
 
     def _joined(self, state: np.ndarray, time: Scalar) -> tuple[list[float], float]:
         if not (self._angles or self._quaternion):
@@ -275,45 +290,12 @@ class SwitchedEngines(Stepper):
     def _keep_to_surfaces(self) -> None:
         """Remove the rounding that moved the state off the surfaces along which it slides."""
         state = self._integrator.state
-        look = self._look(state, self.time)
+        look = self._look(state, self.time, self._low)
         for j in (*self._along, *self._held):
             gradient = look.gradients[j]
             square = sum((g * g for g in gradient), gradient[0] * 0)
             if square != 0:
                 state[:] = state - (look.u[j] / square) * gradient
-
-    def _seen(self, j: int, begin: Scalar, before: np.ndarray) -> Scalar | None:
-        """A time within the latest step at which an argument has the sign of its side, or None.
-
-        Args:
-            before: the state at the step's beginning.
-        """
-        end, mode = self._integrator.time, self._modes[j]
-        look = self._look(before, begin)
-        known = self._probe.noise(look, j, [before])
-        beside = mode * float(look.u[j]) > known  # of the surface, as the step began
-        some = self.precision.bits // 2
-        for power in range(1, _BISECTIONS * self.precision.bits):
-            then = begin + (end - begin) * self.precision.of_double(2.0**-power)
-            value = mode * float(self._values(self._integrator.update_d_output(then), then)[j])
-            if value > 0:
-                return then
-            if power >= some and (beside or abs(value) <= known):  # nearer than that it is on the surface
-                break
-        return begin if beside else None
-
-    def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
-        """A root that the engine missed, by bisection."""
-        for _ in range(_BISECTIONS * self.precision.bits):
-            middle = begin + (end - begin) / 2
-            if not begin < middle < end:
-                break
-            value = self._values(self._integrator.update_d_output(middle), middle)[j]
-            if self._modes[j] * float(value) > 0:
-                begin = middle
-            else:
-                end = middle
-        return end
 
     def _moved(self, j: int) -> int:
         """The side of a surface to which a trial step leads (it is taken back); 0 for none."""

@@ -20,6 +20,7 @@ from rigidsim.model.step_limiter import slopes
 from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.switching.moments import moments_of
 
 SLIDES = 0
 """Mode in place of a side (1 or -1): the motion slides along the surface."""
@@ -72,7 +73,9 @@ class Probe:
         self._epsilon = float(precision.epsilon)
         self.surfaces, self._states = len(system.surfaces), len(system.states)
         self.angles, self.signed = len(system.turning), bool(system.signed)
-        self.parameters = self.surfaces + self.angles + self.signed
+        self.parameters = system.parameters
+        self.clocked = system.clocked
+        self.moments = moments_of(system, precision)
         named = [hy.par[self.parameters - 1], hy.time]  # functions without them take no such argument
         variables = system.variables
         by_time, gradients = [], []
@@ -116,6 +119,8 @@ class Probe:
 
     def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
         """Size below which an argument counts as zero because of rounding."""
+        if self.moments[j].at_known_time:  # what is left is the rounding of the second number
+            return _ROUNDINGS * self._epsilon**2 * abs(float(look.by_time[j]) * float(look.time))
         return _ROUNDINGS * self._epsilon * look.size(j, states)
 
     def swing_noise(self, look: Look, j: int, state: np.ndarray) -> float:

@@ -17,7 +17,9 @@ from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.step_bounds import bound_of_sparse_series
-from rigidsim.solve.switching.engines import Root, SwitchedEngines
+from rigidsim.solve.switching.engines import Root
+from rigidsim.solve.switching.moments import between
+from rigidsim.solve.switching.roots import SurfaceRoots
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE
 
@@ -29,10 +31,9 @@ rounding, whose period is the square root of its size.
 _SHORTEST = 2.0**-8  # internal units of time; with more digits less, see ``_window``
 _ROUNDINGS = 2.0**15  # in the square of an interval
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
-_NEAR = 2.0**-12  # of a step: within it Newton's method improves a root
 
 
-class SwitchingStepper(SwitchedEngines):
+class SwitchingStepper(SurfaceRoots):
     """Stepper of a system with surfaces, or with angles whose turns matter.
 
     Attributes:
@@ -122,13 +123,14 @@ class SwitchingStepper(SwitchedEngines):
             if outcome == hy.taylor_outcome.err_nf_state:
                 return False, False
             natural = abs(float(size))
-            root = self._first_root(time[0], before)
+            root = self._first_root(time, before)
             if root is None:
                 break
             log.drop_after(events, root[0] + self._width(root[0]))
-            at_once = root[0] - time[0] - time[1] <= 0
-            if not at_once:
-                size = self._again(root, time, before)
+            moment, known = self.moment(root)
+            left = between(time, moment)
+            if left > 0:
+                size = self._again(root, time, before, left, moment if known else None)
                 break
             # the step begins on the surface and leaves its side at once
             log.back_to(events)
@@ -160,58 +162,6 @@ class SwitchingStepper(SwitchedEngines):
         """Suppress events at the surface where the latest step ended, which found them."""
         time = self.time
         self.log.quiet_until = time + self._width(time) if self._fresh else None
-
-    def _again(self, root: Root, time: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar:
-        """Repeat the step up to a root, closer to it; returns the step's size."""
-        engine, size = self._integrator, root[0] - time[0] - time[1]
-        muted, self.log.muted = self.log.muted, True
-        try:
-            for attempt in range(2):
-                engine.dtime = time
-                engine.state[:] = before
-                engine.step(size, write_tc=True)
-                if attempt or root[1] in self._along:
-                    break
-                look = self._look(engine.state, engine.time)
-                rate = look.rate(root[1])
-                if rate == 0:
-                    break
-                correction = look.u[root[1]] / rate
-                if not 0 < abs(float(correction)) < _NEAR * float(size):
-                    break
-                size = size - correction
-        finally:
-            self.log.muted = muted
-        return size
-
-    def _first_root(self, begin: Scalar, before: np.ndarray) -> Root | None:
-        """The first root at which the step just taken leaves its side; None if there is none."""
-        engine = self._integrator
-        end, after = engine.time, np.array(engine.state)
-        states = [before, after]
-        roots = sorted(self._roots, key=lambda root: root[0])
-        for n, (time, j, side) in enumerate(roots):
-            if self._modes[j] == SLIDES:
-                return roots[n]
-            if side != -self._modes[j]:
-                continue
-            following = next((t for t, i, _ in roots[n + 1 :] if i == j), end)
-            middle = time + (following - time) / 2
-            look = self._look(engine.update_d_output(middle), middle)
-            if float(look.u[j]) * side > self._probe.noise(look, j, states):
-                return roots[n]
-        values = self._values(after, end)
-        for j, mode in enumerate(self._modes):
-            if abs(mode) >= HELD or mode * float(values[j]) >= 0:
-                continue
-            look = self._look(after, end)
-            if -mode * float(look.u[j]) <= self._probe.noise(look, j, states):
-                continue
-            inside = self._seen(j, begin, before)
-            if inside is None:
-                return begin, j, -mode
-            return self._bisected(j, inside, end), j, -mode
-        return None
 
     # --- surfaces -------------------------------------------------------------------------------------------
 
@@ -254,7 +204,7 @@ class SwitchingStepper(SwitchedEngines):
                     self._modes[i] = sign * side
             self._enter()
             return True
-        look = self._look(self.state, self.time)
+        look = self._look(self.state, self.time, self._low)
         on = [j, *self._along, *self._held]
         for i in range(len(self._modes)):
             if i not in on and abs(float(look.u[i])) <= self._probe.noise(look, i, states):
@@ -270,7 +220,7 @@ class SwitchingStepper(SwitchedEngines):
         reads another surface's side jumps with it; returns the last look.
         """
         for _ in range(len(self._modes) + 1):
-            look, changed = self._look(self.state, self.time), False
+            look, changed = self._look(self.state, self.time, self._low), False
             for j, mode in enumerate(self._modes):
                 u = float(look.u[j])
                 beyond = mode * u < 0 and abs(u) > self._probe.noise(look, j, [self.state])

@@ -1,0 +1,110 @@
+"""Pulses and spikes late in a run: their impulse is the one that was written, not that of rounded times."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from support import EPSILON, run_estimated, run_text, wide
+
+from experiments.coverage.families import FAMILIES, coverage_scene
+from experiments.coverage.judging import judge
+
+FAULTS = Path(__file__).parents[1] / "data" / "faults"
+LATE = """name = "late"
+[body]
+principal_moments = [1, 1, 1]
+[initial]
+angular_velocity = [0, 0, {spin}]
+[[loads]]
+kind = "torque"
+components = [0, 0, "{torque}"]
+[time]
+end = {end}
+samples = 3
+[integrator]
+precision = "{precision}"
+"""
+
+
+def turned(run: object) -> float:
+    """Angle about the third axis at the end, between -pi and pi."""
+    w, *_, z = run.dataset["quaternion"].values[-1]  # type: ignore[attr-defined]
+    return 2 * math.atan2(z, w)
+
+
+def apart(angle: float, exact: mpmath.mpf) -> float:
+    """Difference of angles, less full turns."""
+    with mpmath.workdps(40):
+        return abs(float(mpmath.fmod(angle - exact + 101 * mpmath.pi, 2 * mpmath.pi) - mpmath.pi))
+
+
+@pytest.mark.parametrize(("name", "width"), [("short_pulse", "1e-6"), ("short_pulse_ms", "1e-3")])
+def test_a_short_pulse_has_the_impulse_that_was_written(name: str, width: str) -> None:
+    run = run_estimated((FAULTS / f"{name}.toml").read_text())
+    assert run.dataset["angular_velocity"].values[-1].tolist() == [0, 0, 1]
+    with mpmath.workdps(40):
+        begin = mpmath.mpf("5000" if name == "short_pulse" else "5000.1")
+        exact = mpmath.mpf(10000) - begin - mpmath.mpf(width) / 2
+    assert apart(turned(run), exact) <= run.summary["accuracy"]["estimated_attitude_error"] < 1e-10
+
+
+def test_a_smooth_spike_errs_by_rounding() -> None:
+    run = run_estimated((FAULTS / "gauss_spike.toml").read_text())
+    with mpmath.workdps(40):
+        kick = mpmath.sqrt(mpmath.pi)  # 1e2 times 1e-2
+        exact = mpmath.mpf(10000) + kick * (10000 - mpmath.mpf("5000.3"))
+    announced = run.summary["accuracy"]["estimated_attitude_error"]
+    # the round-off law, (eps / 2) sqrt(steps) |w| t / sqrt 3, with a margin of 3
+    assert apart(turned(run), exact) <= 3 * EPSILON["double"] * math.sqrt(1e4) * 2.8 * 1e4 / math.sqrt(12)
+    assert apart(turned(run), exact) <= announced < 1e-9
+
+
+@pytest.mark.parametrize("precision", ["single", "double", "extended"])
+@pytest.mark.parametrize("kind", ["pulse", "spike"])
+def test_narrow_beside_the_last_digit_of_the_time(precision: str, kind: str) -> None:
+    """A pulse also where one number of the precision can't tell its beginning from its end."""
+    widths = {"single": ("2^-18", "2^-8"), "double": ("2^-47", "2^-30"), "extended": ("2^-50", "2^-36")}
+    width = widths[precision][kind == "spike"]
+    torque = "pulse(t, 700.3, 700.3 + {w})/{w}" if kind == "pulse" else "exp(-((t - 700.3)/{w})^2)/{w}"
+    text = LATE.format(spin=0, torque=torque.format(w=f"({width})"), end=1000, precision=precision)
+    gained = wide(run_text(text).dataset, "angular_velocity")[-1, 2]
+    exact = 1 if kind == "pulse" else np.longdouble("1.7724538509055160273")  # sqrt(pi)
+    # some fifty steps through the spike, each of which rounds the rate twice
+    assert abs(gained - exact) <= (4 if kind == "pulse" else 2 * math.sqrt(50)) * EPSILON[precision]
+
+
+def test_pulses_of_a_square_wave_don_t_wander() -> None:
+    """Each switch is at its own exact time: after 1000 of them the rate is a triangle wave's."""
+    text = LATE.format(spin=0, torque="sign(sin(pi*t))", end=1001, precision="double")
+    assert abs(run_text(text).dataset["angular_velocity"].values[-1, 2] - 1) <= 1e-14
+
+
+def test_times_that_matter_to_no_digit_move_no_bit() -> None:
+    """An early or wide change needs no second number of the time."""
+    for torque, states in (("exp(-((t - 5)/2)^2)", False), ("tanh((t - 500)/0.1)", True)):
+        text = LATE.format(spin=1, torque=torque, end=1000, precision="double")
+        from rigidsim.solve.problem import prepare
+        from rigidsim.workflows.read import parse
+
+        assert prepare(parse(text)).system.clocked is states
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["late switch", "late spike"])
+def test_announced_errors_of_late_pulses_and_spikes(family: str) -> None:
+    """Sixty random scenes against exact solutions."""
+    place, beyond, judged = list(FAMILIES).index(family), 0, 0
+    for n in range(60):
+        found = judge(coverage_scene(place + n * len(FAMILIES), seed=1125))
+        if found.ended != "finished":
+            assert found.ended == "refused"
+            continue
+        judged += 1
+        beyond += found.true > 3 * found.announced
+        assert found.true <= 10 * found.announced or found.warned or found.gone, found.line
+    assert judged >= 50
+    assert beyond <= 1

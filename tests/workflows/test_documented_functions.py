@@ -1,0 +1,139 @@
+"""Every documented function of time, the state and swept numbers: no combination ends in a traceback."""
+
+from __future__ import annotations
+
+import random
+import re
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigidsim
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.expressions.tree import FUNCTIONS, PIECEWISE
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.workflows.check import check
+from rigidsim.workflows.sweeps.plan import plan_sweep
+
+FAULTS = Path(__file__).parents[1] / "data" / "faults"
+DOCUMENTED = Path(__file__).parents[2] / "docs" / "expressions.md"
+SCENE = """name = "functions"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 1, 0.2]
+euler_angles = [0.1, 0.7, 0.2]
+[parameters]
+k = 1
+[[loads]]
+kind = "torque"
+components = ["0.01*({torque})", "0", "0"]
+[integrator]
+formulation = "{formulation}"
+[time]
+end = 2
+samples = 3
+[output]
+timeline = false
+"""
+SWEPT = """[sweep]
+keep = ["final"]
+batch = {batch}
+axes."parameters.k" = {{values = [1, 1.5, 2]}}
+"""
+ONE = [name for name, count in {**FUNCTIONS, **PIECEWISE}.items() if count == 1]
+
+
+def test_every_function_is_documented() -> None:
+    named = set(re.findall(r"^\| `(\w+)\(", DOCUMENTED.read_text(), re.M))
+    assert named == {*FUNCTIONS, *PIECEWISE}
+
+
+@pytest.mark.parametrize("batch", ["true", "false"])
+def test_a_swept_parameter_within_a_function_of_time(tmp_path: Path, batch: str) -> None:
+    text = (FAULTS / "sweep_parameter_crash.toml").read_text()
+    text = text.replace('keep = ["final"]', f'keep = ["final"]\nbatch = {batch}')
+    path = tmp_path / "swept.toml"
+    path.write_text(text)
+    assert check(path).valid
+    found = rigidsim.sweep(rigidsim.load(path), out=tmp_path).dataset["quaternion_final"].values
+    for n, k in enumerate((1, 2, 3, 4)):
+        single = rigidsim.parse(text, overrides=[f"parameters.k={k}", "output.estimate=false"])
+        alone = rigidsim.run(single, out=None).dataset["quaternion"].values[-1]
+        # rounding of some twenty steps; one by one the bits are those of single runs
+        assert np.abs(np.squeeze(found[n]) - alone).max() <= (1e-14 if batch == "true" else 0)
+
+
+@pytest.mark.parametrize(
+    ("torque", "words"),
+    [
+        ("-0.1*wrap(psi)", "reads psi, which the start leaves open"),
+        ("sqrt(-t)", "at any time after the start"),
+    ],
+)
+def test_what_has_no_value_is_refused(torque: str, words: str) -> None:
+    text = (FAULTS / "wrap_crash.toml").read_text().replace("-0.1*wrap(psi)", torque)
+    with pytest.raises(rigidsim.ConfigError, match=words):
+        rigidsim.run(rigidsim.parse(text), out=None)
+
+
+def test_a_run_that_never_leaves_its_start_ends_in_words() -> None:
+    """sqrt(t) has a value at t = 0, and no series there."""
+    text = SCENE.format(torque="sqrt(t)", formulation="quaternion")
+    run = rigidsim.run(rigidsim.parse(text), out=None)
+    assert run.status in ("finished", "stopped: non-finite state", "stopped: steps too small")
+
+
+def _argument(generator: random.Random) -> str:
+    name = generator.choice(["t", "t", "wx", "wz", "qx*qy", "phi", "theta", "psi", "t*wz"])
+    form = generator.choice(
+        ["{n}", "k*{n}", "{n} - k", "k - {n}", "({n} - k)/0.01", "({n} - k)^2", "-{n}", "k"]
+    )
+    return form.format(n=name)
+
+
+def _torque(generator: random.Random) -> str:
+    argument = _argument(generator)
+    return generator.choice(
+        [f"{generator.choice(ONE)}({argument})"] * 6
+        + [
+            f"1/({argument})",
+            f"1/(1 + ({argument})^2)",
+            f"exp(-({argument})^2)",
+            f"pulse({argument}, 0.3, k)",
+        ]
+        + [f"{name}({argument}, {_argument(generator)})" for name in ("min", "max", "atan2")]
+        + [f"({argument})^{power}" for power in ("3", "-2", "0.5", "20")]
+        + [f"{generator.choice(ONE)}({generator.choice(ONE)}({argument}))"]
+    )
+
+
+def _tried(number: int, folder: Path) -> None:
+    """Run, sweep, check and plan one random torque: each ends, or is refused in words."""
+    generator = random.Random(number)
+    formulation = generator.choice(["auto", "quaternion", "euler_angles", "rotation_matrix"])
+    text = SCENE.format(torque=_torque(generator), formulation=formulation)
+    swept = text + SWEPT.format(batch=generator.choice(["true", "false"]))
+    path = folder / "tried.toml"
+    path.write_text(swept)
+    check(path)
+    for action in (
+        lambda: rigidsim.run(rigidsim.parse(text), out=None),
+        lambda: rigidsim.sweep(rigidsim.parse(swept), out=folder, force=True),
+        lambda: plan_sweep(Sweep.of(rigidsim.parse(swept))),
+    ):
+        with suppress(RigidsimError):  # anything else fails the test
+            action()
+
+
+def test_some_functions_end_in_no_traceback(tmp_path: Path) -> None:
+    for number in range(2):
+        _tried(number, tmp_path)
+
+
+@pytest.mark.slow
+def test_functions_end_in_no_traceback(tmp_path: Path) -> None:
+    for number in range(60):
+        _tried(number, tmp_path)
