@@ -28,12 +28,14 @@ class Family:
         radians: powers of ten between which the horizon is drawn.
         averaged: whether it is an averaged model, which has its own states and settings.
         finish: writes what depends on the end of the run, s.
+        epochs: years between which the run's is drawn; None without one.
     """
 
     draw: Callable[[Draw], None]
     radians: tuple[float, float] = (1.0, 3.3)
     averaged: bool = False
     finish: Callable[[Draw, float], None] | None = None
+    epochs: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,20 @@ def _signed(draw: Draw) -> None:
     draw.load("torque", f"components = {torque}")
 
 
+def _ephemeris(draw: Draw) -> None:
+    """The Sun, the Moon or both by their series, over years, at any epoch: a time of 1e9 s is rounded."""
+    draw.time = 86400 * draw.decades(0.3, 1)
+    draw.body(draw.moments())
+    draw.start(draw.direction() * draw.between(0.5, 1.5))
+    distances = {"sun": 149597870700, "moon": 384400000}
+    chosen = draw.random.choice(["sun", "moon", "both"])
+    for body in distances if chosen == "both" else (str(chosen),):
+        strength = (draw.decades(-1.5, -0.3) / draw.time) ** 2 * distances[body] ** 3
+        draw.load(
+            "gravity_gradient", f'ephemeris = "{body}"', f"gravitational_parameter = {float(strength)!r}"
+        )
+
+
 FAMILIES: dict[str, Family] = {
     "central gravity": Family(KINDS["central gravity"], (1.0, 3.0)),
     "eccentric orbit": Family(_eccentric, (1.3, 3.5)),
@@ -232,6 +248,7 @@ FAMILIES: dict[str, Family] = {
     HYPERBOLIC: Family(hyperbolic_average, (0.18, 0.9), averaged=True),
     "late switch": Family(switch, (2.0, 4.0), finish=put_late),
     "late spike": Family(spike, (2.0, 4.0), finish=put_late),
+    "long ephemeris": Family(_ephemeris, (1.5, 2.7), epochs=(1950, 2100)),
 }
 """By the name under which the table shows them."""
 
@@ -248,6 +265,9 @@ def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
         draw.parameters.append(f"late = {end * draw.between(0.5, 0.95)!r}")
     if family.finish is not None:
         family.finish(draw, end)
+    span = [f"end = {end!r}", f"samples = {SAMPLES}"]
+    if family.epochs is not None:
+        span.append(f'epoch = "{draw.random.integers(*family.epochs)}-01-01T12:00:00 TDB"')
     formulation = str(draw.random.choice(_FORMULATIONS))
     if name == "long, regular" and formulation == "canonical":
         formulation = "quaternion"
@@ -270,7 +290,8 @@ def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
         "[body]",
         *draw.lines,
         *draw.more,
-        f"[time]\nend = {end!r}\nsamples = {SAMPLES}",
+        "[time]",
+        *span,
         "[integrator]",
         *integrator,
         "[output]\ntimeline = false",

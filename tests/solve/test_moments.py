@@ -63,7 +63,9 @@ def test_a_smooth_spike_errs_by_rounding() -> None:
     assert apart(turned(run), exact) <= announced < 1e-9
 
 
-@pytest.mark.parametrize("precision", ["single", "double", "extended"])
+@pytest.mark.parametrize(
+    "precision", ["double", *(pytest.param(name, marks=pytest.mark.slow) for name in ("single", "extended"))]
+)
 @pytest.mark.parametrize("kind", ["pulse", "spike"])
 def test_narrow_beside_the_last_digit_of_the_time(precision: str, kind: str) -> None:
     """A pulse also where one number of the precision can't tell its beginning from its end."""
