@@ -309,11 +309,9 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     """
     outputs = [right for _, right in system.equations]
     sides = {}
-    if system.parameters:  # on whichever side
-        outputs.append(hy.par[system.parameters - 1])
-        sides["pars"] = precision.array([mpmath.mpf(1)] * system.parameters)
-        if system.clocked:
-            sides["pars"][-1] = precision.of_double(0.0)
+    if count := system.parameters:  # on whichever side, and at the start's own time
+        outputs.append(hy.par[count - 1])
+        sides["pars"] = precision.array([mpmath.mpf(n < count - system.clocked) for n in range(count)])
     elif system.pieces is not None:
         sides["pars"] = np.array(system.pieces.parameters(0), dtype=precision.scalar)
     rhs = compiled_function(outputs, system.variables, compact_mode=True, **precision.options)
