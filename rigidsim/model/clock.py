@@ -17,7 +17,7 @@ import heyoka as hy
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import rounded
-from rigidsim.scene.expressions.lines import Line
+from rigidsim.scene.expressions.lines import LineInTime
 from rigidsim.scene.records import dataclass
 
 _MOST_PARTS = 64  # doubles in a number of any precision that is in use
@@ -35,7 +35,7 @@ class Clock:
     unit: Any
     low: Symbolic
 
-    def expression(self, line: Line, number: Rounder, context: Any) -> Symbolic:
+    def expression(self, line: LineInTime, number: Rounder, context: Any) -> Symbolic:
         """A line as an expression of the engine's time.
 
         Args:

@@ -23,7 +23,7 @@ from rigidsim.model.clock import Clock
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.expressions import tree as expressions
-from rigidsim.scene.expressions.lines import Line, line_of
+from rigidsim.scene.expressions.lines import LineInTime, line_of
 from rigidsim.scene.expressions.tree import Expression, Name, Node
 
 _NO_SIDES: Mapping[Node, Any] = {}
@@ -58,7 +58,7 @@ def to_heyoka(
         """A constant (mpf) or a line in time as an expression; an expression is returned unchanged."""
         if isinstance(value, hy.expression):
             return value
-        if isinstance(value, Line):
+        if isinstance(value, LineInTime):
             assert isinstance(clock, Clock)
             return clock.expression(value, number, context)
         try:
@@ -72,13 +72,13 @@ def to_heyoka(
             return node.value.at(context)
         if isinstance(node, Name):
             if node.name == "t" and isinstance(clock, Clock):
-                return Line(context.one, context.zero)
+                return LineInTime(context.one, context.zero)
             return hy.time if node.name == "t" and "t" not in variables else variables[node.name]
-        if any(isinstance(operand, Line) for operand in operands):
+        if any(isinstance(operand, LineInTime) for operand in operands):
             operands = _with_lines(node, operands)
             if len(operands) == 1 and node.operator in _LINEAR:
                 return operands[0]
-            operands = [literal(node, x) if isinstance(x, Line) else x for x in operands]
+            operands = [literal(node, x) if isinstance(x, LineInTime) else x for x in operands]
         if not any(isinstance(operand, hy.expression) for operand in operands):
             return expressions.operate(expression, node, operands, context)
         if node.operator == "sign":

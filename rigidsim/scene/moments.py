@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rigidsim.scene.expressions.lines import Line, lines_in
+from rigidsim.scene.expressions.lines import LineInTime, lines_in
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, Operation, evaluate, names_used
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts
@@ -43,7 +43,7 @@ def acts_at_moments_alone(scene: Scene) -> bool:
     return True
 
 
-def _of_switches(expression: Expression, context: Any) -> list[Line]:
+def _of_switches(expression: Expression, context: Any) -> list[LineInTime]:
     """Lines in the arguments of signs, which don't pass through zero at t = 0."""
     found, waiting = [], [expression.root]
     while waiting:
@@ -55,7 +55,7 @@ def _of_switches(expression: Expression, context: Any) -> list[Line]:
     return [line for line in found if line.offset != 0]
 
 
-def _within(line: Line, scene: Scene) -> bool:
+def _within(line: LineInTime, scene: Scene) -> bool:
     return bool(scene.start < line.zero < scene.end)
 
 

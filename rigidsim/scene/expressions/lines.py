@@ -11,7 +11,7 @@ from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)
-class Line:
+class LineInTime:
     """``slope * t + offset`` (mpf, t in s); the slope isn't zero."""
 
     slope: Any
@@ -25,56 +25,56 @@ class Line:
 
 def line_of(operator: str, operands: Sequence[Any]) -> Any | None:
     """An operation on lines and numbers (mpf): a line, a number, or None if it is neither."""
-    lines = [x for x in operands if isinstance(x, Line)]
-    numbers = [x for x in operands if not isinstance(x, Line)]
+    lines = [x for x in operands if isinstance(x, LineInTime)]
+    numbers = [x for x in operands if not isinstance(x, LineInTime)]
     if operator == "sum":
         slope = sum((x.slope for x in lines[1:]), lines[0].slope)
         offset = sum((x.offset for x in lines[1:]), lines[0].offset)
         offset = sum(numbers, offset)
-        return Line(slope, offset) if slope != 0 else offset
+        return LineInTime(slope, offset) if slope != 0 else offset
     first = operands[0]
     if operator == "negative":
-        return Line(-first.slope, -first.offset)
-    if operator == "quotient" and not isinstance(operands[1], Line) and operands[1] != 0:
-        return Line(first.slope / operands[1], first.offset / operands[1])
+        return LineInTime(-first.slope, -first.offset)
+    if operator == "quotient" and not isinstance(operands[1], LineInTime) and operands[1] != 0:
+        return LineInTime(first.slope / operands[1], first.offset / operands[1])
     if operator == "product" and len(lines) == 1:
         factor = math.prod(numbers)
         line = lines[0]
-        return Line(factor * line.slope, factor * line.offset) if factor != 0 else factor
+        return LineInTime(factor * line.slope, factor * line.offset) if factor != 0 else factor
     return None
 
 
-def lines_in(expression: Expression, context: Any) -> list[Line]:
+def lines_in(expression: Expression, context: Any) -> list[LineInTime]:
     """The longest lines in an expression.
 
     Raises:
         ExpressionError: a constant part has no finite value.
     """
-    found: list[Line] = []
+    found: list[LineInTime] = []
     whole = _folded(expression, context, found)
-    return [whole] if isinstance(whole, Line) else found
+    return [whole] if isinstance(whole, LineInTime) else found
 
 
-def as_line(expression: Expression, context: Any) -> Line | None:
+def as_line(expression: Expression, context: Any) -> LineInTime | None:
     """The line that an expression is as a whole; None if it is none.
 
     Raises:
         ExpressionError: a constant part has no finite value.
     """
     whole = _folded(expression, context, [])
-    return whole if isinstance(whole, Line) else None
+    return whole if isinstance(whole, LineInTime) else None
 
 
-def _folded(expression: Expression, context: Any, found: list[Line]) -> Any:
+def _folded(expression: Expression, context: Any, found: list[LineInTime]) -> Any:
     """A number, a line, or None for anything else, whose lines are added to those found."""
 
     def combine(node: Node, operands: list[Any]) -> Any:
         if isinstance(node, Constant):
             return node.value.at(context)
         if isinstance(node, Name):
-            return Line(context.one, context.zero) if node.name == "t" else None
+            return LineInTime(context.one, context.zero) if node.name == "t" else None
         assert isinstance(node, Operation)
-        lines = [x for x in operands if isinstance(x, Line)]
+        lines = [x for x in operands if isinstance(x, LineInTime)]
         if None not in operands:
             whole = (
                 line_of(node.operator, operands) if lines else operate(expression, node, operands, context)
