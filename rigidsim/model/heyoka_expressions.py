@@ -19,9 +19,9 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.clock import Clock
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.two_part import rounded
+from rigidsim.model.two_part_time import TwoPartTime
 from rigidsim.scene.expressions import tree as expressions
 from rigidsim.scene.expressions.lines import LineInTime, line_of
 from rigidsim.scene.expressions.tree import Expression, Name, Node
@@ -41,7 +41,7 @@ def to_heyoka(
 
     Args:
         variables: a heyoka expression for every name that the expression uses; ``t`` is heyoka's time
-            unless it is given here, as an expression or as a ``Clock``.
+            unless it is given here, as an expression or as a ``TwoPartTime``.
         number: rounds an mpf once to the working precision's scalar.
         context: mpmath context with guard bits, in which constant parts are worked out.
         sides: heyoka expressions for the signs of arguments that are switching surfaces; those of others are
@@ -59,7 +59,7 @@ def to_heyoka(
         if isinstance(value, hy.expression):
             return value
         if isinstance(value, LineInTime):
-            assert isinstance(clock, Clock)
+            assert isinstance(clock, TwoPartTime)
             return clock.expression(value, number, context)
         try:
             return hy.expression(rounded(number(value)))
@@ -71,7 +71,7 @@ def to_heyoka(
         if isinstance(node, expressions.Constant):
             return node.value.at(context)
         if isinstance(node, Name):
-            if node.name == "t" and isinstance(clock, Clock):
+            if node.name == "t" and isinstance(clock, TwoPartTime):
                 return LineInTime(context.one, context.zero)
             return hy.time if node.name == "t" and "t" not in variables else variables[node.name]
         if any(isinstance(operand, LineInTime) for operand in operands):

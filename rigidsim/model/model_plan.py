@@ -43,7 +43,7 @@ class ModelPlan:
         surfaces: switching surfaces on which the equations change.
         plane: plane that the motion stays in, if the formulation is planar.
         tables: positions of the states and parameters of tabulated orbits.
-        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.clock``).
+        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.two_part_time``).
         average: the average that replaces the motion, if rotations are averaged over.
     """
 

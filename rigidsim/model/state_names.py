@@ -7,9 +7,9 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.clock import Clock
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
+from rigidsim.model.two_part_time import TwoPartTime
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES
 
 TANGENT = "tangent_"
@@ -30,7 +30,7 @@ def carries_sign(m: Kinematics) -> bool:
 
 
 def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) -> dict[str, Any]:
-    """Expressions in SI units for the names that a user's expression reads; a ``Clock`` for the time where it
+    """Expressions in SI units for the names that a user's expression reads; a ``TwoPartTime`` where the time
     takes two numbers.
 
     Parameters ``par[..]`` stand for what the state alone doesn't tell: after the sides of the surfaces, the
@@ -50,7 +50,7 @@ def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) 
     found: dict[str, Any] = {"t": si(hy.time, scaling.time)}
     if clocked and m.clocked:
         place = len(m.surfaces.found) + len(m.surfaces.turning) + carries_sign(m)
-        found["t"] = Clock(context.ldexp(context.one, scaling.time), hy.par[place])
+        found["t"] = TwoPartTime(context.ldexp(context.one, scaling.time), hy.par[place])
     for name, state, e in zip(RATE_NAMES, m.rate_states, scaling.rates, strict=True):
         found[name] = si(state, e - scaling.time)
     if m.attitude is not None and set(names) & set(ATTITUDE_NAMES):

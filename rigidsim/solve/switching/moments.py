@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rigidsim.model.clock import exactly, in_two_numbers
 from rigidsim.model.system import System
+from rigidsim.model.two_part_time import exactly, in_two_numbers
 from rigidsim.scene.expressions.lines import as_line
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
 from rigidsim.scene.records import dataclass

@@ -24,7 +24,7 @@ _MOST_PARTS = 64  # doubles in a number of any precision that is in use
 
 
 @dataclass(frozen=True)
-class Clock:
+class TwoPartTime:
     """The scene's time in two numbers.
 
     Attributes:
