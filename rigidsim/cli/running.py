@@ -34,7 +34,6 @@ def run_all(
         RigidsimError: a config can't be run, or the arguments contradict each other.
     """
     from rigidsim.scene.config import has_earlier_settings
-    from rigidsim.scene.suspicions import suspicious_angles, suspicious_end
     from rigidsim.session.progress import progress
     from rigidsim.workflows.read import load
     from rigidsim.workflows.run import run as run_experiment
@@ -61,10 +60,9 @@ def run_all(
                 "kept there what --set had replaced); write the values where their keys stand",
                 file=sys.stderr,
             )
-        for problem in (*suspicious_angles(experiment.config), *suspicious_end(experiment.config)):
-            print(f"rigidsim: warning: {experiment.source}: {problem}", file=sys.stderr)
     worst = 0
     for experiment in experiments:
+        _warn(experiment)
         with progress.observer() as observer:
             result = run_experiment(experiment, out=out, force=force, observer=observer)
         code = print_run(result, as_json)
@@ -72,6 +70,17 @@ def run_all(
         if code == 130:
             break
     return worst
+
+
+def _warn(experiment: Experiment) -> None:
+    """Say what in a config may mean something else, before time is spent on it."""
+    from rigidsim.scene.scene import build_scene
+    from rigidsim.session.understood import cautions_about, cautions_of
+
+    config = experiment.config
+    acting = bool(config.loads or config.events) and config.sweep is None  # a sweep is refused later
+    for caution in cautions_of(build_scene(experiment)) if acting else cautions_about(config):
+        print(f"rigidsim: warning: {experiment.source}: {caution.text}", file=sys.stderr)
 
 
 def print_run(result: Run, as_json: bool) -> int:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.scene.known_bodies import KNOWN, known_body
 from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
-_ALIKE = 0.01  # of a gravitational parameter, for a body to be taken for one that is known
 _KEPLER_STEPS = 60  # of Newton's method; from E = M + e sin M it converges for any e < 1
 GREY: Color = (150, 154, 162)
 
@@ -32,30 +32,30 @@ class Globe:
     """An attracting body as it is drawn.
 
     Attributes:
+        called: its name in a sentence.
         radius: m.
         color: approximate colour of its disk.
     """
 
     name: str
-    gravitational_parameter: float
+    called: str
     radius: float
     color: Color
 
 
-GLOBES: tuple[Globe, ...] = (
-    # nominal G M and equatorial radii of IAU 2015 Resolution B3 for Sun, Earth and Jupiter; else G M of JPL's
-    # planetary ephemerides and radii of Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22
-    Globe("Sun", 1.3271244e20, 6.957e8, (255, 214, 110)),
-    Globe("Mercury", 2.2031868e13, 2.4397e6, (160, 150, 140)),
-    Globe("Venus", 3.24858592e14, 6.0518e6, (222, 190, 130)),
-    Globe("Earth", 3.986004e14, 6.3781e6, (70, 122, 190)),
-    Globe("Moon", 4.902800e12, 1.7374e6, (168, 166, 160)),
-    Globe("Mars", 4.2828375e13, 3.39619e6, (196, 112, 72)),
-    Globe("Jupiter", 1.2668653e17, 7.1492e7, (208, 172, 136)),
-    Globe("Saturn", 3.7931206e16, 6.0268e7, (218, 196, 148)),
-    Globe("Uranus", 5.7939512e15, 2.5559e7, (150, 205, 215)),
-    Globe("Neptune", 6.8350999e15, 2.4764e7, (80, 120, 205)),
-)
+_COLORS: dict[str, Color] = {
+    "Sun": (255, 214, 110),
+    "Mercury": (160, 150, 140),
+    "Venus": (222, 190, 130),
+    "Earth": (70, 122, 190),
+    "Moon": (168, 166, 160),
+    "Mars": (196, 112, 72),
+    "Jupiter": (208, 172, 136),
+    "Saturn": (218, 196, 148),
+    "Uranus": (150, 205, 215),
+    "Neptune": (80, 120, 205),
+}
+GLOBES = tuple(Globe(one.name, one.called, one.radius, _COLORS[one.name]) for one in KNOWN)
 
 
 def told(dataset: Table, what: str) -> list[dict[str, Any]]:
@@ -78,16 +78,13 @@ def gravity(dataset: Table) -> Array | None:
 
 def globe_of(one: dict[str, Any]) -> Globe | None:
     """The known body with this gravitational parameter; None if it is no known one."""
-    strength = float(one.get("gravitational_parameter") or 0.0)
-    near = min(GLOBES, key=lambda globe: abs(globe.gravitational_parameter - strength))
-    return near if abs(strength / near.gravitational_parameter - 1) < _ALIKE else None
+    known = known_body(float(one.get("gravitational_parameter") or 0.0))
+    return None if known is None else next(globe for globe in GLOBES if globe.name == known.name)
 
 
 def called(globe: Globe | None, unknown: str) -> str:
     """The attracting body in a sentence: ``the Sun``, ``Saturn``, or ``the`` and a word if unknown."""
-    if globe is None:
-        return f"the {unknown}"
-    return f"the {globe.name}" if globe.name in ("Sun", "Earth", "Moon") else globe.name
+    return f"the {unknown}" if globe is None else globe.called
 
 
 def source_path(one: dict[str, Any], seconds: Array) -> Array | None:

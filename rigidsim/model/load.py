@@ -7,7 +7,7 @@ Loads in a config, rigidsim's own and those you write in Python all derive from 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import heyoka as hy
@@ -25,6 +25,7 @@ from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.validation_messages import shown
+from rigidsim.store.summary_parts import Caution
 
 Term = tuple[Vector, Symbolic]
 """A constant vector (mpf) times an expression."""
@@ -193,10 +194,21 @@ class Load(SceneLoad):
 
     described = "a load given from Python"
 
-    @property
-    def effect(self) -> str:
-        """Its effect, in one sentence for ``rigidsim plan``."""
-        return f"{self.title}: given from Python"
+    def told(self, scene: Scene) -> str:
+        """What it is in a reader's terms, in one sentence for ``check``, ``plan`` and ``info``: sizes at the
+        start with their units, and known bodies by name.
+        """
+        purpose = ((self.Fields or type(self)).__doc__ or "given from Python").partition("\n")[0]
+        return f"{self.title}: {purpose}"
+
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        """Values of it that are allowed, but probably mean something else.
+
+        Args:
+            fields: its keys in the config, an instance of ``Fields``.
+            where: its place in the config, for messages.
+        """
+        yield from ()
 
 
 def own_loads(given: Iterable[Load] | None) -> tuple[Load, ...]:

@@ -150,7 +150,7 @@ def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> P
     shown = ", ".join(f"{x:.3g}" for x in quaternion)
     return Problem(
         where,
-        f"{load.effect} depends on the sign of the quaternion: at q = [{shown}] a part of it is {here:.3g} "
-        f"(in internal units), at -q, which is the same attitude, {there:.3g}; use products such as qw*qx, "
-        "or say where it jumps: sign(qw)*qx",
+        f"{load.described} depends on the sign of the quaternion: at q = [{shown}] a part of it is "
+        f"{here:.3g} (in internal units), at -q, which is the same attitude, {there:.3g}; use products such "
+        "as qw*qx, or say where it jumps: sign(qw)*qx",
     )

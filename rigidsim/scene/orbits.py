@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field, StrictStr
 
-from rigidsim.scene.exact import ZERO
+from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
 from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.records import dataclass
@@ -17,8 +17,9 @@ from rigidsim.scene.validation_messages import nearest
 class Orbit(ConfigTable):
     """A Kepler orbit of the attracting body, whose node and periapsis may move uniformly.
 
-    Angles are those at time zero of the scene, as classical elements in space axes. ``period`` replaces
-    the one of Kepler's third law. A ``table`` gives elements over time; those that it hasn't are constant.
+    Angles are those at time zero of the scene, as classical elements in space axes. One of ``period``,
+    ``sidereal_period`` and ``longitude_rate`` may replace the mean motion of Kepler's third law. A ``table``
+    gives elements over time; those that it hasn't are constant.
     """
 
     body: StrictStr | None = Field(
@@ -49,8 +50,20 @@ class Orbit(ConfigTable):
     periapsis_rate: Rate = Field(default=ZERO, description="rate of the argument of periapsis")
     period: Second | None = Field(
         default=None,
-        description="orbital period, instead of that from Kepler's third law",
-        examples=["27.3 day"],
+        description="anomalistic period, from periapsis to periapsis: that of the mean anomaly (beside a "
+        "table without one, of the mean longitude); by default that of Kepler's third law",
+        examples=["27.55455 day"],
+    )
+    sidereal_period: Second | None = Field(
+        default=None,
+        description="period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal "
+        "month or year, instead of period",
+        examples=["27.321661 day"],
+    )
+    longitude_rate: Rate | None = Field(
+        default=None,
+        description="rate of the mean longitude (node + periapsis + mean anomaly), instead of period",
+        examples=["13.17639648 deg/day"],
     )
 
 
@@ -62,7 +75,7 @@ class KeplerOrbit:
     motion here, and so are the node's if the orbit lies in the plane from which inclinations count.
 
     Attributes:
-        mean_motion: rad/s, from Kepler's third law or from the period that was given.
+        mean_motion: rate of the mean anomaly, rad/s, from Kepler's third law or the pace that was given.
     """
 
     semi_major_axis: Any
@@ -127,6 +140,61 @@ def attracting_body(orbit: Orbit, around: Surroundings) -> int:
     return found
 
 
+PACES = ("period", "sidereal_period", "longitude_rate")
+"""Keys of which one may replace the mean motion of Kepler's third law."""
+
+
+def pace_of(table: Orbit, around: Surroundings) -> tuple[str, ExactNumber] | None:
+    """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given.
+
+    Raises:
+        ConfigError: several are given, or a value that isn't positive.
+    """
+    given = [(key, getattr(table, key)) for key in PACES if getattr(table, key) is not None]
+    for key, value in given:
+        if value.sign <= 0:
+            what = "rate" if key == "longitude_rate" else "time"
+            raise around.fault(f"orbit.{key}", f"given {float(value):g}; a positive {what} is allowed")
+    if len(given) > 1:
+        what = f"given beside {given[0][0]}; at most one of {', '.join(PACES)} is allowed"
+        raise around.fault(f"orbit.{given[1][0]}", what)
+    return given[0] if given else None
+
+
+def rate_of(pace: tuple[str, ExactNumber], context: Any) -> Any:
+    """The rate (mpf, rad/s) that a pace means, of the mean anomaly for a period, else of the longitude."""
+    key, value = pace
+    return value.at(context) if key == "longitude_rate" else 2 * context.pi / value.at(context)
+
+
+def mean_motion(table: Orbit, strength: Any | None, around: Surroundings) -> Any:
+    """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law.
+
+    The mean longitude is ascending node + periapsis + mean anomaly.
+
+    Args:
+        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
+
+    Raises:
+        ConfigError: there is no pace, or the mean anomaly would stand still or go backwards.
+    """
+    context, pace = around.context, pace_of(table, around)
+    if pace is None:
+        if strength is None:
+            what = "missing; give it, or gravitational_parameter for the one of Kepler's third law"
+            raise around.fault("orbit.period", what)
+        assert table.semi_major_axis is not None
+        return context.sqrt(strength / table.semi_major_axis.at(context) ** 3)
+    rate = rate_of(pace, context)
+    if pace[0] == "period":
+        return rate
+    motion = rate - table.node_rate.at(context) - table.periapsis_rate.at(context)
+    if not motion > 0:
+        what = f"less node_rate and periapsis_rate leaves the mean anomaly {context.nstr(motion, 8)} rad/s; "
+        raise around.fault(f"orbit.{pace[0]}", what + "a positive rate is allowed")
+    return motion
+
+
 def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> KeplerOrbit:
     """Work out the orbit's elements.
 
@@ -149,16 +217,7 @@ def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> K
             "orbit.eccentricity",
             f"given {context.nstr(eccentricity, 8)}; 0 (a circle) to below 1 is allowed",
         )
-    if table.period is not None:
-        if table.period.sign <= 0:
-            raise around.fault("orbit.period", f"given {float(table.period):g} s; a positive time is allowed")
-        motion = 2 * context.pi / table.period.at(context)
-    elif strength is None:
-        raise around.fault(
-            "orbit.period", "missing; give it, or gravitational_parameter for the one of Kepler's third law"
-        )
-    else:
-        motion = context.sqrt(strength / axis**3)
+    motion = mean_motion(table, strength, around)
     node, node_rate = table.ascending_node.at(context), table.node_rate.at(context)
     periapsis, periapsis_rate = table.periapsis.at(context), table.periapsis_rate.at(context)
     anomaly, zero = table.mean_anomaly.at(context), context.zero

@@ -32,6 +32,7 @@ class Scene:
         position, velocity: those of the centre of mass, space axes; None unless the body moves freely.
         gravity: sum of all uniform fields, space axes, m/s^2; None without such a load.
         loads: the others, without those that are always zero.
+        given_loads: all loads of the config, in its order.
         events: crossings that are recorded, or end the run.
         inverse_inertia: pseudo-inverse of ``body.inertia``.
         axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
@@ -63,6 +64,7 @@ class Scene:
     reference: Vector | None
     config: schema.Config
     bodies: PointMasses | None = None
+    given_loads: tuple[SceneLoad, ...] = ()
 
     @property
     def free_flight(self) -> bool:
@@ -147,6 +149,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             reference=reference_normal(config, context),
             config=config,
             bodies=masses,
+            given_loads=tuple(resolved),
         )
     except ConfigError as error:
         raise error.at(experiment.source) from None

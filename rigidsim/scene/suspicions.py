@@ -10,7 +10,8 @@ from pydantic import BaseModel
 from rigidsim.errors import Problem
 from rigidsim.scene.events import Event
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Constant, Name, Operation
+from rigidsim.scene.expressions.tree import Constant, Expression, Name, Node, Operation, fold
+from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.units import time_unit
 from rigidsim.scene.validation_messages import key_path
@@ -22,11 +23,19 @@ Path = tuple[str | int, ...]
 def suspicious_angles(config: Config) -> list[Problem]:
     """Angles beyond a full turn that were given without a unit: taken as radians, meant as degrees?
 
+    So are whole numbers beyond pi of an angle that only goes to pi: inclination, or the middle Euler angle.
     A multiple of pi is meant in radians, and a value with a unit is unambiguous.
     """
     found = []
     for path, numbers in _numbers((), config):
-        beyond = [x for x in numbers if x.assumed == "rad" and not x.pi_power and abs(x.rational) > _TURN]
+        bare = [x for x in numbers if x.assumed == "rad" and not x.pi_power]
+        half = [numbers[1]] if path[-1] == "euler_angles" else numbers if path[-1] == "inclination" else []
+        beyond = [
+            x
+            for x in bare
+            if abs(x.rational) > _TURN
+            or (x.rational.denominator == 1 and abs(x.rational) > math.pi and any(x is one for one in half))
+        ]
         if beyond:
             given, degrees = (
                 ", ".join(f"{value:.6g}" for value in values)
@@ -40,6 +49,44 @@ def suspicious_angles(config: Config) -> list[Problem]:
                     f'"{first} deg" if degrees are meant, "{first} rad" if not',
                 )
             )
+    return found
+
+
+def suspicious_expressions(scene: Scene) -> list[Problem]:
+    """Sines, cosines and tangents of whole numbers beyond a full turn: of degrees?"""
+    formulas = [formula for load in scene.loads for formula in load.formulas()]
+    formulas += [
+        (f"[[events]] number {number} expression", event.expression)
+        for number, event in enumerate(scene.events, start=1)
+    ]
+    found = []
+    for where, expression in formulas:
+        for name, value in _constant_arguments(expression):
+            number, degrees = f"{float(value):.6g}", f"{math.degrees(float(value)):.6g}"
+            found.append(
+                Problem(
+                    where,
+                    f"given {name}({number}), whose argument is taken as radians: {degrees} deg; write "
+                    f"{name}({number} deg) if degrees are meant, {name}({number} rad) if not",
+                )
+            )
+    return found
+
+
+def _constant_arguments(expression: Expression) -> list[tuple[str, ExactNumber]]:
+    """Trigonometric functions of whole numbers of radians beyond a full turn, as written."""
+    found = []
+
+    def look(node: Node, _: list[None]) -> None:
+        if isinstance(node, Operation) and node.operator in ("sin", "cos", "tan"):
+            (argument,) = node.operands
+            value = argument.value if isinstance(argument, Constant) else None
+            whole = value is not None and not value.pi_power and value.rational.denominator == 1
+            literal = expression.text[slice(*argument.span)].lstrip("+- ").replace(".", "").isdigit()
+            if value is not None and whole and literal and abs(value.rational) > _TURN:
+                found.append((node.operator, value))
+
+    fold(expression, look)
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words, told_loads
 from rigidsim.session.variables import unused_variables
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
@@ -99,6 +99,7 @@ def summarise(
         body=body_of(scene),
         start=start_of(scene),
         time=span_of(scene),
+        loads=told_loads(prepared),
         bit_for_bit=_bit_for_bit(prepared, progress, attributes.mixed_provenance),
         provenance=attributes.of_use(Use.REPEATED),
         events=events,

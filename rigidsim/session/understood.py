@@ -5,10 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from rigidsim.look.readable_time import TimeWords
+from rigidsim.model.load import Load
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.suspicions import suspicious_angles, suspicious_end, unreachable_events
+from rigidsim.scene.schema import Config
+from rigidsim.scene.suspicions import (
+    suspicious_angles,
+    suspicious_end,
+    suspicious_expressions,
+    unreachable_events,
+)
+from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary_fields import Three
 from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.store.understood import Span, Start, UnderstoodBody
@@ -56,17 +64,32 @@ def span_of(scene: Scene) -> Span:
     )
 
 
+def told_loads(prepared: InitialValueProblem) -> tuple[str, ...]:
+    """The loads in a reader's terms, one sentence for each."""
+    plan = prepared.system.plan
+    return tuple(load.told(plan.scene) for load in plan.loads)
+
+
 def time_words(scene: Scene) -> TimeWords:
     """How times of the scene are written in messages."""
     attributes = {"epoch": scene.epoch, "time_unit": scene.config.time.unit}
     return TimeWords.of(attributes, float(scene.start), float(scene.samples.last))
 
 
+def cautions_about(config: Config) -> list[Caution]:
+    """Numbers in a config that may mean something other than was understood."""
+    found = [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(p)) for p in suspicious_angles(config)]
+    return found + [Caution(WarningCode.TIME_WITHOUT_UNIT, str(p)) for p in suspicious_end(config)]
+
+
 def cautions_of(scene: Scene) -> list[Caution]:
     """Values that may mean something other than was understood, found before anything runs."""
-    found = [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(p)) for p in suspicious_angles(scene.config)]
-    found += [Caution(WarningCode.TIME_WITHOUT_UNIT, str(p)) for p in suspicious_end(scene.config)]
+    found = cautions_about(scene.config)
+    found += [Caution(WarningCode.ANGLE_WITHOUT_UNIT, str(p)) for p in suspicious_expressions(scene)]
     found += [Caution(WarningCode.NEVER_HAPPENS, str(p)) for p in unreachable_events(scene.events)]
+    for number, (fields, load) in enumerate(zip(scene.config.loads, scene.given_loads, strict=True), start=1):
+        if isinstance(load, Load):
+            found += load.cautions(fields, f"[[loads]] number {number}", scene)
     if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
         found.append(
             Caution(

@@ -64,6 +64,7 @@ class Summary(Brief):
         time_reached: time of the last sample, or of the event that ended the run, s.
         engine_time: time that the integration reached, s; its own steps go past the last sample.
         events, event_times: how often each event happened, and when.
+        loads: what acts on the body, in a reader's terms.
         tables: interpolation errors of tabulated orbits, by name.
         advice: settings that would do better at about the same cost, the best last.
         undefined_samples: number of NaN samples of each recorded variable that has any.
@@ -93,6 +94,7 @@ class Summary(Brief):
     body: Annotated[UnderstoodBody, Claim()]
     start: Annotated[Start | None, Claim()] = None
     time: Annotated[Span | None, Claim()] = None
+    loads: tuple[Text, ...] = ()
     bit_for_bit: BitForBit
     provenance: dict[Text, StrictStr | StrictInt]
     events: Annotated[dict[Text, StrictInt], Claim()] = Field(default_factory=dict)

@@ -32,6 +32,11 @@ class WarningCode(Enum):
     TIME_WITHOUT_UNIT = "time_without_unit"
     MODEL_UNCERTAIN = "model_uncertain"
     UNDEFINED = "undefined"
+    LENGTH_WITHOUT_UNIT = "length_without_unit"
+    BELOW_SURFACE = "below_surface"
+    PERIOD_CONTRADICTS = "period_contradicts"
+    GRAVITY_UPWARDS = "gravity_upwards"
+    NEAR_RESONANCE = "near_resonance"
     MODEL_UNMEASURED = "model_unmeasured"
 
 

@@ -11,7 +11,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.event_variables import refuse_taken_names
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.problem import prepare
 from rigidsim.store.summary_parts import Caution
 from rigidsim.store.understood import Span, Start, UnderstoodBody
@@ -28,6 +28,7 @@ class Checked:
         problems: why it can't be run; empty for a valid config.
         cautions: values that may have been meant differently.
         body, start, time: how the config was understood; None if it can't be run.
+        loads: what acts on the body, in a reader's terms.
     """
 
     source: str
@@ -36,6 +37,7 @@ class Checked:
     body: UnderstoodBody | None = None
     start: Start | None = None
     time: Span | None = None
+    loads: tuple[str, ...] = ()
 
     @property
     def valid(self) -> bool:
@@ -53,6 +55,7 @@ class Checked:
             "body": None if self.body is None else self.body.as_dict(),
             "start": None if self.start is None else self.start.as_dict(),
             "time": None if self.time is None else self.time.as_dict(),
+            "loads": list(self.loads),
         }
 
 
@@ -74,4 +77,5 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
         return Checked(error.source or str(path), problems=tuple(error.problems))
     scene = prepared.scene
     cautions = tuple(cautions_of(scene))
-    return Checked(str(path), (), cautions, body_of(scene), start_of(scene), span_of(scene))
+    parts = body_of(scene), start_of(scene), span_of(scene)
+    return Checked(str(path), (), cautions, *parts, told_loads(prepared))

@@ -23,7 +23,7 @@ from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.storage import storage
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.session.variables import dataset_variables, unused_variables
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
@@ -106,7 +106,7 @@ def plan(
         "euler_partner_sequence": None if system.partner is None else system.partner.sequence,
         "states": system.states,
         "state_count": len(system.states),
-        "loads": [load.effect for load in system.plan.loads],
+        "loads": list(told_loads(prepared)),
         "reasons": [{"states": s, "why": w} for s, w in system.reasons],
         "left_out": [{"what": s, "why": w} for s, w in system.requirements.left_out],
         "switching": [{"surface": s.text, "where": s.where} for s in system.plan.surfaces.found],

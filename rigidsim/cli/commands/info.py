@@ -32,7 +32,7 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
         print_json(opened.summary)
         opened.refuse_damaged()
         return
-    tables.print_summary(opened.outcome, str(opened.folder.path))
+    tables.print_summary(opened.outcome, str(opened.folder.path), loads=True)
     if not opened.saved:
         page().say("dataset  nothing was saved yet")
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.cli.screens.equations import print_equations
@@ -51,8 +52,12 @@ def _drift(value: float | None) -> str:
     return "-" if value is None else f"{value:.2e}"
 
 
-def print_summary(summary: Brief, folder: str, out: Console | None = None) -> None:
-    """Print the table at the end of ``run`` and of ``info``."""
+def print_summary(summary: Brief, folder: str, out: Console | None = None, *, loads: bool = False) -> None:
+    """Print the table at the end of ``run`` and of ``info``.
+
+    Args:
+        loads: whether it says what acts on the body.
+    """
     on = page(out)
     color = "green" if summary.status == "finished" else "yellow"
     on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))
@@ -61,21 +66,27 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None) -> No
     if summary.status != "finished":
         on.say(summary.message)
     if isinstance(summary, Summary):
-        _print_ended(summary, on)
+        _print_ended(summary, summary.loads if loads else (), on)
     on.line("folder", folder)
     for number, command in enumerate(next_lines(summary.status, summary.exit_code, folder)):
         on.line("" if number else "next", command, "cyan")
 
 
 def print_understood(
-    body: UnderstoodBody | None, start: Start | None, time: Span | None, out: Console
+    body: UnderstoodBody | None,
+    start: Start | None,
+    time: Span | None,
+    out: Console,
+    loads: Sequence[str] = (),
 ) -> None:
-    """Print body, start and time as they were understood."""
-    _print_understood(body, start, time, page(out))
+    """Print body, start, time and loads as they were understood."""
+    _print_understood(body, start, time, loads, page(out))
 
 
-def _print_understood(body: UnderstoodBody | None, start: Start | None, time: Span | None, on: Page) -> None:
-    for label, text in understood(body, start, time):
+def _print_understood(
+    body: UnderstoodBody | None, start: Start | None, time: Span | None, loads: Sequence[str], on: Page
+) -> None:
+    for label, text in understood(body, start, time, loads):
         on.line(label, text)
 
 
@@ -83,8 +94,8 @@ def _from_step(step: int | None) -> str:
     return "" if step is None else f" from step {step:,} on"
 
 
-def _print_ended(summary: Summary, on: Page) -> None:
-    _print_understood(summary.body, summary.start, summary.time, on)
+def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
+    _print_understood(summary.body, summary.start, summary.time, loads, on)
     how = f"tolerance {summary.tolerance:.3g}"
     if summary.method == "closed_form":
         how = "in closed form"
@@ -214,9 +225,7 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     on = page(out)
     on.say((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}")
     parts = UnderstoodBody(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
-    _print_understood(*parts, on)
-    for effect in plan["loads"]:
-        on.line("load", effect)
+    _print_understood(*parts, plan["loads"], on)
     for surface in plan["switching"]:
         where = f"steps end on the kinks and jumps of {surface['surface']} ({surface['where']})"
         on.say("  " + where)
@@ -290,7 +299,7 @@ def print_checked(found: Checked) -> None:
         return
     on = page()
     on.say((found.source, "bold"), "  ", ("valid", "bold green"))
-    _print_understood(found.body, found.start, found.time, on)
+    _print_understood(found.body, found.start, found.time, found.loads, on)
     for caution in found.cautions:
         on.line("warning", caution.text, "bold red")
 

@@ -23,7 +23,7 @@ _STRAIGHT = 1e-9  # of a direction's component: what is less is shown as zero
 
 
 def understood(
-    body: UnderstoodBody | None, start: Start | None, time: Span | None
+    body: UnderstoodBody | None, start: Start | None, time: Span | None, loads: Sequence[str] = ()
 ) -> Iterator[tuple[str, str]]:
     """Labels and texts for whatever is present (older summaries have less)."""
     if body is not None:
@@ -32,6 +32,8 @@ def understood(
         yield "start", start_text(start)
     if time is not None:
         yield "time", time_text(time)
+    for load in loads:
+        yield "load", load
 
 
 def body_text(body: UnderstoodBody) -> str:

@@ -11,9 +11,13 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import span_words, value_text
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.state_names import state_names
-from rigidsim.scene.arithmetic import Vector, cross, diagonal, parallel
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
+from rigidsim.scene.arithmetic import apply as apply_numbers
+from rigidsim.scene.arithmetic import transpose as transposed
+from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
@@ -22,14 +26,18 @@ from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
     ExpressionError,
+    evaluate,
     names_used,
 )
 from rigidsim.scene.fields import Metre, Triple, refuse
+from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, root_parts
 from rigidsim.scene.validation_messages import shown
+
+_LONGEST = 60  # characters of an expression that are shown
 
 
 def _component(value: Any) -> str:
@@ -142,11 +150,39 @@ class Applied(Load):
         """See ``Load``."""
         return f"a {self.title} given by expressions"
 
-    @property
-    def effect(self) -> str:
+    def told(self, scene: Scene) -> str:
         """See ``Load``."""
-        texts = ", ".join(component.text for component in self.components)
-        return f"{self.title}: [{texts}] in {self.frame} axes"
+        context, values = scene.context, start_values(scene)
+        found = [evaluate(component, values, context) for component in self.components]
+        texts = ", ".join(_brief(component.text) for component in self.components)
+        said = f"{self.title} [{texts}] {self.unit} in {self.frame} axes"
+        size = norm(context, found)
+        if size == 0:
+            return f"{said}: zero at the start"
+        return f"{said}: {value_text(size, self.unit)} at the start{self._effect(scene, found)}"
+
+    def _effect(self, scene: Scene, found: Vector) -> str:
+        """What a torque or force of this size at the start would do, in words."""
+        context = scene.context
+        turning = found if self.title == "torque" else self._moment(scene, found)
+        size, momentum = (
+            norm(context, turning),
+            norm(context, apply_numbers(scene.body.inertia, scene.angular_velocity)),
+        )
+        said = ""
+        if self.pushes:
+            said = f", {value_text(norm(context, found) / scene.body.mass, 'm/s^2')}"
+        if self.title == "force" and size:
+            said += f", torque {value_text(size, 'N m')}"
+        if size and momentum:
+            said += f", which in {span_words(momentum / size)} would add up to the angular momentum"
+        return said
+
+    def _moment(self, scene: Scene, force: Vector) -> Vector:
+        """Torque arm x force, body axes."""
+        if self.frame == "space":
+            force = apply_numbers(transposed(rotation_matrix(scene.quaternion)), force)
+        return cross(self.arm, force)
 
     def _components(self, m: Kinematics) -> list[Symbolic]:
         variables = state_names(m, self.names)
@@ -188,6 +224,10 @@ class Applied(Load):
         variables = state_names(m, self.names)
         parts = {part.root: part for c in self.components for part in root_parts(c)}
         return [to_heyoka(p, variables, m.number, m.scene.context, m.sides) for p in parts.values()]
+
+
+def _brief(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 def _vanishes(component: Expression) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Literal
 
 from pydantic import Field
@@ -10,9 +11,11 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
 from rigidsim.model.loads.gravity_gradient import positive_strength
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.numbers import unit_vectors
+from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ZERO
@@ -21,6 +24,7 @@ from rigidsim.scene.orbits import Orbit, attracting_body
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution
 
 
 class CentralGravityFields(LoadFields):
@@ -197,7 +201,26 @@ class CentralGravity(Load):
             return norm(context, self.position) + reach, swiftest + fed
         return norm(context, scene.position) + (swiftest + fed) * horizon, swiftest + fed
 
-    @property
-    def effect(self) -> str:
+    def told(self, scene: Scene) -> str:
         """See ``Load``."""
-        return "central_gravity: force and torque of an attracting point, to second degree"
+        context, strength = scene.context, self.gravitational_parameter
+        offset, speed = self._relative(scene)
+        distance = norm(context, offset)
+        source = f"{source_text(strength)}, {reach_text(strength, distance)} at the start"
+        energy, least = speed**2 / 2 - strength / distance, self.nearest_approach(scene)
+        path = f"unbound, no nearer than {length_text(float(least))}"
+        if energy < 0:
+            axis = -strength / (2 * energy)
+            period = span_words(2 * context.pi * context.sqrt(axis**3 / strength))
+            path = f"on an orbit of {length_text(float(least), float(2 * axis - least))}, period {period}"
+        return f"central gravity of {source}, {path}; torque up to {value_text(self.amplitude(scene), 'N m')}"
+
+    def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
+        """See ``Load``."""
+        given = fields.gravitational_parameter
+        assert given is not None
+        assert scene.velocity is not None
+        offset, _ = self._relative(scene)
+        distance = float(norm(scene.context, offset))
+        yield from about_strength(given, distance, where)
+        yield from about_start(scene, attracting(given, distance), offset, scene.velocity)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Iterator
 from typing import Any, Literal
 
 import heyoka as hy
@@ -13,10 +15,13 @@ from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.orbits.ephemeris import SourcePosition, source_position
+from rigidsim.model.plausibility import about_distance, about_orbit, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.spin_plausibility import about_spin
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
@@ -29,6 +34,7 @@ from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
+from rigidsim.store.summary_parts import Caution
 
 
 class GravityGradientFields(LoadFields):
@@ -243,16 +249,34 @@ class GravityGradient(Load):
             return self.table.fastest_rate()
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
-    @property
-    def effect(self) -> str:
+    def told(self, scene: Scene) -> str:
         """See ``Load``."""
+        strength, context = self.gravitational_parameter, scene.context
         if self.orbit is not None:
-            where = "on a circular orbit" if self.orbit.circular else "on an eccentric orbit"
+            where = orbit_text(self.orbit, strength)
         elif self.table is not None:
-            where = f"on an orbit {self.table.described}"
+            where = f"{reach_text(strength, self.gradient_source.distance(context))} on average, on an orbit "
+            where += self.table.described
+        elif self.position is not None:
+            where = f"at rest, {reach_text(strength, norm(context, self.position))}"
         else:
-            where = "fixed in space" if self.ephemeris is None else f"at the {self.ephemeris.title()}'s place"
-        return f"gravity_gradient: torque of a distant body {where}"
+            where = f"from its series, about {reach_text(strength, self.gradient_source.distance(context))}"
+        largest = value_text(self.amplitude(scene), "N m")
+        return f"gravity gradient of {source_text(strength)}, {where}; torque up to {largest}"
+
+    def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
+        """See ``Load``."""
+        given = fields.gravitational_parameter
+        assert given is not None
+        if fields.orbit is not None and self.orbit is not None:
+            yield from about_orbit(fields.orbit, self.orbit, given, where, scene)
+            yield from about_spin(fields.orbit, self.orbit, given, where, scene)
+        elif fields.position is not None:
+            distance = math.hypot(*map(float, fields.position))
+            yield from about_strength(given, distance, where)
+            yield from about_distance(
+                attracting(given, distance), distance, fields.position, f"{where} position"
+            )
 
 
 def positive_strength(given: Any, around: Surroundings) -> Any:

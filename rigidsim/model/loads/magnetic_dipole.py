@@ -4,6 +4,7 @@ moves, on a prescribed orbit or as it flies.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import heyoka as hy
@@ -12,7 +13,9 @@ from pydantic import Field
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
+from rigidsim.model.load_words import length_text, orbit_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
+from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, dot, negligible, norm
@@ -22,6 +25,7 @@ from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution
 
 _FIELD_CONSTANT = "1e-7"
 """mu_0 / 4 pi, T m/A: CODATA 2022 has 0.99999999987(16) times this, measured since the SI of 2019."""
@@ -241,13 +245,24 @@ class MagneticDipole(Load):
             return norm(scene.context, scene.velocity or []) / self._far(scene)
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
-    @property
-    def effect(self) -> str:
+    def told(self, scene: Scene) -> str:
         """See ``Load``."""
-        where = "a uniform field" if self.uniform else "the field of a centred dipole along the orbit"
-        if self.place is not None:
-            where = "the field of a centred dipole at the body's own position"
-        return f"magnetic_dipole: torque m x B in {where}"
+        moment = f"magnetic dipole of {value_text(norm(scene.context, self.moment), 'A m^2')}"
+        largest = f"torque up to {value_text(self.amplitude(scene) / 2, 'N m')}"
+        if self.uniform:
+            field = value_text(norm(scene.context, self.source), "T")
+            return f"{moment} in a uniform field of {field}: {largest}"
+        source = value_text(norm(scene.context, self.source), "A m^2")
+        if self.orbit is None:
+            where = f"{length_text(float(self._far(scene)))} away at the start"
+        else:
+            where = orbit_text(self.orbit, implied_strength(self.orbit))
+        return f"{moment} in the field of a dipole of {source}, {where}; {largest}"
+
+    def cautions(self, fields: MagneticDipoleFields, where: str, scene: Scene) -> Iterator[Caution]:
+        """See ``Load``."""
+        if self.orbit is not None and fields.orbit is not None:
+            yield from about_orbit(fields.orbit, self.orbit, fields.gravitational_parameter, where, scene)
 
 
 def _numbers(values: list[ExactNumber], around: Surroundings) -> Vector:

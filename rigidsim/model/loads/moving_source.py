@@ -9,6 +9,7 @@ without the first term if the body itself is one of the point masses, whose mutu
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -19,14 +20,17 @@ from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_pair import PointMassPair
+from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, transpose
-from rigidsim.scene.arithmetic import Vector, cross
+from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution
 
 _UNROLLED = 2
 
@@ -215,15 +219,29 @@ class MovingSource(Load):
         """Angular rate at the least distance, rad/s."""
         return self.encounter(scene)[1]
 
-    @property
-    def effect(self) -> str:
+    def told(self, scene: Scene) -> str:
         """See ``Load``."""
-        name = self.masses.names[self.number]
-        what = "force and torque" if self.pulls else "torque"
+        name, distance = self.masses.names[self.number], norm(scene.context, self.start(scene)[0])
+        kind = "central gravity" if self.pulls else "gravity gradient"
         back = ""
         if self.masses.full:
             back = "; the bodies feel the forces of this one" if self.pulls else "; the bodies feel its shape"
-        return f'{self.title}: {what} of the moving point mass "{name}", to second degree{back}'
+        largest = value_text(self.amplitude(scene), "N m")
+        return (
+            f'{kind} of the moving point mass "{name}", {source_text(self.strength)}, '
+            f"{reach_text(self.strength, distance)} at the start; torque up to {largest}{back}"
+        )
+
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        """See ``Load``."""
+        place, moving = self.start(scene)
+        given, distance = (
+            scene.config.bodies[self.number].gravitational_parameter,
+            float(norm(scene.context, place)),
+        )
+        yield from about_strength(given, distance, f"[[bodies]] number {self.number + 1}")
+        if self.pulls:
+            yield from about_start(scene, attracting(given, distance), place, moving)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Any, Literal
 
 import heyoka as hy
@@ -9,6 +11,7 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import direction_text, value_text
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
@@ -17,6 +20,13 @@ from rigidsim.scene.fields import Acceleration, Triple
 from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution, WarningCode
+
+STANDARD_GRAVITY = 9.80665  # m/s^2
+_ON_EARTH = (
+    0.01  # relative range of gravity on the ground of the Earth, 9.76 to 9.83 m/s^2, and of its rounding
+)
+_UPRIGHT = 0.9  # of its size: a pull along Z
 
 
 def _standard_gravity() -> list[ExactNumber]:
@@ -126,7 +136,23 @@ class UniformGravity(Load):
         """M com (body axes) and g (space axes) about a fixed point; None in free fall."""
         return None if scene.torque_arm is None else (scene.torque_arm, self.acceleration)
 
-    @property
-    def effect(self) -> str:
+    def told(self, scene: Scene) -> str:
         """See ``Load``."""
-        return "uniform_gravity: " + ("its torque about the fixed point" if self.pivoted else "free fall")
+        if all(g == 0 for g in self.acceleration):
+            return "uniform gravity of zero"
+        size = value_text(norm(scene.context, self.acceleration), "m/s^2", 6)
+        field = f"uniform gravity, {size} {direction_text(self.acceleration)}"
+        if scene.torque_arm is not None:
+            return f"{field}: torque about the fixed point up to {value_text(self.amplitude(scene), 'N m')}"
+        return f"{field}: free fall" if scene.free_flight else f"{field}: no effect about the centre of mass"
+
+    def cautions(self, fields: UniformGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
+        """See ``Load``."""
+        pull = [float(x) for x in fields.acceleration]
+        size = math.hypot(*pull)
+        standard = abs(size / STANDARD_GRAVITY - 1) < _ON_EARTH or size == 10
+        if standard and pull[2] > _UPRIGHT * size:
+            given = ", ".join(f"{x:.6g}" for x in pull)
+            falling = ", ".join(f"{-x + 0.0:.6g}" for x in pull)
+            what = f"given [{given}], which points up along Z; write [{falling}] for a fall down along -Z"
+            yield Caution(WarningCode.GRAVITY_UPWARDS, f"{where} acceleration: {what}")

@@ -6,8 +6,10 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from rigidsim.look.readable_time import number_text
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import span_words
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, Triple
 from rigidsim.scene.records import dataclass
@@ -72,7 +74,13 @@ class ViscousTorque(Load):
                 terms.append((vector, m.rate_states[i]))
         return terms
 
-    @property
-    def effect(self) -> str:
-        """See ``Load``."""
-        return "viscous_torque: damping of the body rates"
+    def told(self, scene: Scene) -> str:
+        """See ``Load``; the times are those of the rates about the body axes, moment over coefficient."""
+        sizes = ", ".join(number_text(float(c), 4) for c in self.coefficients)
+        inertia = scene.body.inertia
+        spans = [
+            f"{axis} {span_words(inertia[i][i] / c)}"
+            for i, (axis, c) in enumerate(zip("xyz", self.coefficients, strict=True))
+            if c != 0
+        ]
+        return f"viscous torque, {sizes} kg m^2/s: damps the rates by 1/e in about {', '.join(spans)}"

@@ -9,7 +9,7 @@ from typing import Any
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.elements import ElementTable, TableError, read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
-from rigidsim.scene.orbits import Orbit
+from rigidsim.scene.orbits import PACES, Orbit, pace_of, rate_of
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.tracing.exact import TracedExact
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
@@ -28,7 +28,7 @@ def tabulated_orbit(
     Args:
         name, text: name and text of the table.
         bits: bits of the scene's precision.
-        constants: elements that the table lacks, by name, and possibly the period.
+        constants: elements that the table lacks, by name, and possibly the pace of the mean longitude.
         strength: gravitational parameter of Kepler's third law, m^3/s^2, as the parts of an mpf; None if
             none is known.
 
@@ -43,9 +43,9 @@ def tabulated_orbit(
             raise TableError(f"has a column {key}, which is given beside it, too; remove one of them")
     if "semi_major_axis" not in table.columns and "semi_major_axis" not in given:
         raise TableError("has no column semi_major_axis; add one, or give semi_major_axis beside table")
-    period = given.pop("period", None)
-    if period is not None:
-        rate = 2 * context.pi / period.at(context)
+    paces = [(key, given.pop(key)) for key in PACES if key in given]
+    if paces:
+        rate = rate_of(paces[0], context)
         motion: Callable[[Any], Any] = lambda axis: rate  # noqa: E731
     elif strength is None:
         raise TableError("needs a mean motion; give period beside table")
@@ -85,8 +85,7 @@ def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroun
     for rate in ("node_rate", "periapsis_rate"):
         if getattr(fields, rate).sign != 0:
             raise around.fault(f"orbit.{rate}", "given beside table, whose columns say what moves; remove it")
-    if fields.period is not None and fields.period.sign <= 0:
-        raise around.fault("orbit.period", f"given {float(fields.period):g} s; a positive time is allowed")
+    pace_of(fields, around)
     if name not in around.tables:
         known = ", ".join(around.tables) or "none"
         what = f'given "{name}", but this config was given as text, without files beside it; put the '

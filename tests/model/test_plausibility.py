@@ -1,0 +1,375 @@
+"""Values that are allowed but implausible are warned of in the right words, and nothing else is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from documented_blocks import blocks_of
+from scipy.optimize import brentq
+
+import rigidsim
+from experiments.coverage.families import coverage_scene
+from experiments.random_scenes import random_scene
+from rigidsim.scene.config import parse
+from rigidsim.scene.scene import build_scene
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.understood import cautions_of
+from rigidsim.store.summary_parts import Caution
+
+ROOT = Path(__file__).parents[2]
+EARTH = 'gravitational_parameter = "3.986004418e14 m^3/s^2"\n'
+SUN = "gravitational_parameter = 1.32712440018e20\n"
+MOON = 'semi_major_axis = "384400 km", eccentricity = 0.0549, inclination = "5.145 deg"'
+MONTHS = 'node_rate = "-19.34 deg/yr", periapsis_rate = "60.0 deg/yr"'
+
+
+def scene(loads: str, initial: str = "angular_velocity = [0, 0, 1e-3]", moments: str = "1, 2, 2.5") -> str:
+    return (
+        f'name = "p"\nbody = {{principal_moments = [{moments}], mass = 100}}\n[initial]\n{initial}\n'
+        f"[time]\nend = 1000\nsamples = 3\n{loads}"
+    )
+
+
+def gradient(keys: str) -> str:
+    return f'[[loads]]\nkind = "gravity_gradient"\n{keys}'
+
+
+def orbit(keys: str, source: str = EARTH) -> str:
+    return gradient(f"{source}orbit = {{{keys}}}")
+
+
+def flight(place: str, velocity: str) -> str:
+    initial = f"angular_velocity = [0, 0, 1e-3]\nposition = {place}\nvelocity = {velocity}"
+    return scene(f'[[loads]]\nkind = "central_gravity"\n{EARTH}', initial)
+
+
+def gravity(acceleration: str) -> str:
+    start = "angular_velocity = [0, 0, 1]\nposition = [0, 0, 0]"
+    return scene(f'[[loads]]\nkind = "uniform_gravity"\nacceleration = {acceleration}', start)
+
+
+def torque(*components: str) -> str:
+    return scene(f'[[loads]]\nkind = "torque"\ncomponents = {list(components)}')
+
+
+def dipole(keys: str) -> str:
+    moments = "moment = [0, 0, 1]\nsource_moment = [0, 0, 8e22]"
+    return scene(f'[[loads]]\nkind = "magnetic_dipole"\n{moments}\norbit = {{{keys}}}')
+
+
+def month(pace: str, asymmetry: float, turn: float = 27.321661) -> str:
+    """The Moon, with an equator of any shape: a turn takes a sidereal month, or so many days."""
+    start = f'angular_velocity = [0, 0, "{2 * math.pi / turn!r} rad/day"]'
+    moments = f"1, {1 + asymmetry!r}, 1.0006"
+    return scene(orbit(f"{MOON}, {MONTHS}, {pace}"), start, moments)
+
+
+def warned(text: str) -> list[Caution]:
+    return cautions_of(build_scene(parse(text)))
+
+
+IMPLAUSIBLE = {
+    "km for m": (
+        scene(orbit("semi_major_axis = 6950")),
+        "length_without_unit",
+        "orbit.semi_major_axis: given 6950 without a unit, which is taken as m: 6950 m "
+        'from the centre of the Earth, below its surface at 6378 km; write "6950 km"',
+    ),
+    "km^3/s^2": (
+        scene(orbit('semi_major_axis = "6950 km"', "gravitational_parameter = 398600.4418\n")),
+        "length_without_unit",
+        'while the Earth\'s is 398600 km^3/s^2; write "398600.4418 km^3/s^2" if',
+    ),
+    "Mars in km^3/s^2": (
+        scene(orbit("semi_major_axis = 3.8e6", "gravitational_parameter = 42828\n")),
+        "length_without_unit",
+        "while Mars' is 42828.4 km^3/s^2",
+    ),
+    "au": (scene(orbit("semi_major_axis = 1.5237", SUN)), "length_without_unit", 'write "1.5237 au" if'),
+    "a planet's distance in km": (
+        scene(orbit("semi_major_axis = 384400", "gravitational_parameter = 4.0350e14\n")),
+        "length_without_unit",
+        'the orbit of the Moon has 384400 km: write "384400 km"',
+    ),
+    "a place in km": (
+        scene(gradient(f"{EARTH}position = [0, 7000, 0]")),
+        "length_without_unit",
+        'write "7000 km" if',
+    ),
+    "a start in km": (
+        flight("[7000, 0, 0]", "[0, 7.5, 0]"),
+        "length_without_unit",
+        "[initial] position: given 7000, 0, 0 without",
+    ),
+    "a velocity in km/s": (
+        flight('["7000 km", 0, 0]', "[0, 7.5, 0]"),
+        "length_without_unit",
+        'a circular orbit there has 7546 m/s; write "7.5 km/s" if',
+    ),
+    "a dipole's orbit in km": (
+        dipole('semi_major_axis = 6950, period = "96.1 min"'),
+        "length_without_unit",
+        'write "6950 km" if',
+    ),
+    "an altitude": (
+        scene(orbit('semi_major_axis = "550 km"')),
+        "below_surface",
+        "550 km from the centre of the Earth, below its surface at 6378 km; to an altitude, add the radius",
+    ),
+    "a low pericentre": (
+        scene(orbit('semi_major_axis = "8000 km", eccentricity = 0.3')),
+        "below_surface",
+        "5600 km from the centre",
+    ),
+    "a period": (
+        scene(orbit('semi_major_axis = "7000 km", period = "45 min"')),
+        "period_contradicts",
+        "orbit.period: a turn takes 45 min, while by Kepler's third law with this "
+        "gravitational_parameter an orbit of 7000 km takes 97.14 min",
+    ),
+    "a synodic month": (
+        scene(orbit(f'{MOON}, period = "29.53 day"')),
+        "period_contradicts",
+        "a turn takes 29.53 d, while",
+    ),
+    "a longitude's rate": (
+        scene(orbit('semi_major_axis = "7000 km", longitude_rate = "1 deg/s"')),
+        "period_contradicts",
+        "longitude_rate",
+    ),
+    "gravity upwards": (
+        gravity("[0, 0, 9.81]"),
+        "gravity_upwards",
+        "write [0, 0, -9.81] for a fall down along -Z",
+    ),
+    "rounded gravity upwards": (
+        gravity("[0, 0, 10]"),
+        "gravity_upwards",
+        "acceleration: given [0, 0, 10], which",
+    ),
+    "sine of degrees": (
+        torque("sin(30)", "0", "2*cos(t)"),
+        "angle_without_unit",
+        "components[0]: given sin(30), whose argument is taken as radians: 1718.87 "
+        "deg; write sin(30 deg) if degrees are meant, sin(30 rad) if not",
+    ),
+    "an event in degrees": (
+        scene('[[events]]\nname = "e"\nexpression = "wx - cos(-45)"'),
+        "angle_without_unit",
+        "expression: given cos(-45)",
+    ),
+    "a tilt in degrees": (
+        scene("", "angular_velocity = [0, 5, 0]\neuler_angles = [0, 5, 0]"),
+        "angle_without_unit",
+        "euler_angles: given 5 without a unit, which is taken as radians: 286.479 deg",
+    ),
+    "a right angle": (
+        scene("", "angular_velocity = [0, 5, 0]\neuler_angles = [0, 90, 0]"),
+        "angle_without_unit",
+        "given 90 without",
+    ),
+    "an inclination in degrees": (
+        scene(orbit('semi_major_axis = "7000 km", inclination = 5')),
+        "angle_without_unit",
+        "orbit.inclination: given 5",
+    ),
+    "a spin in deg/s": (
+        scene(orbit('semi_major_axis = "7000 km"'), "angular_velocity = [0, 0, 0.0618]"),
+        "angle_without_unit",
+        '0.0617653 deg/s; write "0.0618 deg/s" if',
+    ),
+    "a node's rate in degrees": (
+        scene(orbit('semi_major_axis = "7000 km", inclination = "98 deg", node_rate = 0.9856')),
+        "angle_without_unit",
+        "orbit.node_rate: given 0.9856 without a unit",
+    ),
+    "a sidereal month as the anomalistic one": (
+        month('period = "27.321661 day"', 5e-6),
+        "near_resonance",
+        "a turn takes 27.321661 d, 0.84 % slower than the 1:1 resonance with the orbit of "
+        "[[loads]] number 1 (27.092767 d), which holds 0.38 %; the mean anomaly returns after 27.321661 d, "
+        "the mean longitude after 27.092767 d: period is anomalistic; give sidereal_period if a sidereal",
+    ),
+    "the same within the libration": (
+        month('period = "27.321661 day"', 2.28e-4),
+        "near_resonance",
+        "0.84 % slower than the 1:1 resonance",
+    ),
+    "an anomalistic month as the spin": (
+        month('period = "27.55455 day"', 5e-6, 27.55455),
+        "near_resonance",
+        "0.84 % slower than the 1:1",
+    ),
+    "in the units of nobody": (
+        scene(
+            orbit(
+                "semi_major_axis = 1, eccentricity = 0.1, inclination = 0.1, period = 6.25, "
+                "periapsis_rate = 5e-3",
+                "gravitational_parameter = 1\n",
+            ),
+            "angular_velocity = [0, 0, 1.0053096491487339]",
+            "1, 1.000002, 1.1",
+        ),
+        "near_resonance",
+        "0.49 % slower than the 1:1",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "code", "words"), IMPLAUSIBLE.values(), ids=IMPLAUSIBLE)
+def test_it_is_warned_of_once_in_the_right_words(text: str, code: str, words: str) -> None:
+    (caution,) = warned(text)
+    assert caution.code.value == code
+    assert words in caution.text
+
+
+PLAUSIBLE = {
+    "km said": scene(orbit('semi_major_axis = "6950 km"', 'gravitational_parameter = "398600 km^3/s^2"\n')),
+    "m said": scene(orbit('semi_major_axis = "384400 m"', "gravitational_parameter = 5e10\n")),
+    "a small body": scene(orbit("semi_major_axis = 6950", 'gravitational_parameter = "398600 m^3/s^2"\n')),
+    "numbers": scene(orbit("semi_major_axis = 1, period = 5", "gravitational_parameter = 1\n")),
+    "numbers that are a planet's": scene(orbit("semi_major_axis = 2", "gravitational_parameter = 4900\n")),
+    "numbers near a planet's": scene(
+        orbit("semi_major_axis = 6950", "gravitational_parameter = 4.0017364826e14\n")
+    ),
+    "a month": scene(orbit(f'{MOON}, {MONTHS}, sidereal_period = "27.321661 day"')),
+    "an anomalistic month": scene(orbit(f'{MOON}, {MONTHS}, period = "27.55455 day"')),
+    "the Moon about the Earth": scene(
+        orbit(f'{MOON}, period = "27.321661 day"', "gravitational_parameter = 4.9028e12\n")
+    ).replace("mass = 100", "mass = 5.9722e24"),
+    "the same without a mass": scene(
+        orbit(f'{MOON}, period = "27.321661 day"', "gravitational_parameter = 4.9028e12\n")
+    ).replace(", mass = 100", ""),
+    "a year": scene(orbit('semi_major_axis = "1 au", period = "365.2596 day"', SUN)),
+    "a flight": flight('["7000 km", 0, 0]', '[0, "7.5 km/s", 0]'),
+    "a fall": flight('["7000 km", 0, 0]', "[0, 0, 0]"),
+    "a slow start": flight('["7000 km", 0, 0]', '[0, "7.5 m/s", 0]'),
+    "gravity down": gravity("[0, 0, -9.81]"),
+    "gravity along X": gravity("[9.81, 0, 0]"),
+    "gravity upwards elsewhere": gravity("[0, 0, 3.71]"),
+    "radians": torque("sin(3)", "cos(t + 30)", "sin(30*t)"),
+    "radians said": torque("1 N m * sin(30 rad)", "1 N m * cos(30 deg)", "0"),
+    "locked": month('sidereal_period = "27.321661 day"', 5e-6),
+    "locked by its rate": month('longitude_rate = "13.1763582 deg/day"', 5e-6),
+    "no resonance to hold it": month('period = "27.321661 day"', 0.0),
+    "a tumbling moon": month('period = "27.321661 day"', 5e-6).replace(
+        "[0, 0, ", '["0.1 rad/day", "0.2 rad/day", '
+    ),
+    "far from it": month('period = "27.321661 day"', 5e-6, 25.0),
+}
+
+
+@pytest.mark.parametrize("text", PLAUSIBLE.values(), ids=PLAUSIBLE)
+def test_no_false_alarm(text: str) -> None:
+    assert warned(text) == []
+
+
+def ready() -> Iterator[tuple[str, rigidsim.Experiment]]:
+    """Every ready config and template, and every whole config in the documentation."""
+    folders = ROOT / "configs", ROOT / "rigidsim" / "workflows" / "templates"
+    for path in (path for folder in folders for path in sorted(folder.rglob("*.toml"))):
+        yield path.name, rigidsim.load(path)
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        for block in blocks_of(page):
+            if block.language == "toml" and block.mark.startswith("file: ") and "table =" not in block.text:
+                yield f"{page.name}:{block.line}", parse(block.text)
+
+
+def test_what_is_ready_to_run_raises_no_alarm() -> None:
+    count = 0
+    for name, experiment in ready():
+        whole = experiment if experiment.config.sweep is None else Sweep.of(experiment).worked_out(0)
+        assert cautions_of(build_scene(whole)) == [], name
+        count += 1
+    assert count > 40
+
+
+def alarms(numbers: range) -> list[str]:
+    found = []
+    for number in numbers:
+        for text in (random_scene(number, seed=25).text, coverage_scene(number, seed=25).text):
+            found += [f"{number}: {caution.text}" for caution in warned(text)]
+    return found
+
+
+def test_random_scenes_raise_no_alarm() -> None:
+    assert alarms(range(50)) == []
+
+
+@pytest.mark.slow(15)
+def test_many_random_scenes_raise_no_alarm() -> None:
+    assert alarms(range(50, 1050)) == []
+
+
+# --- where resonances end ------------------------------------------------------------------------------
+
+ORBITS, STEPS = 1500, 48  # of integration, and of a step of Runge and Kutta in each orbit
+
+
+def anomalies(e: float) -> tuple[np.ndarray, np.ndarray]:
+    """True anomaly and (a/r)^3 at equal steps of half a time step over one orbit, from periapsis."""
+    mean = np.arange(2 * STEPS) * math.pi / STEPS
+    eccentric = np.array(
+        [brentq(lambda E, m=m: E - e * math.sin(E) - m, m - e - 1e-9, m + e + 1e-9) for m in mean]
+    )
+    true = 2 * np.arctan2(math.sqrt(1 + e) * np.sin(eccentric / 2), math.sqrt(1 - e) * np.cos(eccentric / 2))
+    return true, (1 - e * np.cos(eccentric)) ** -3.0
+
+
+def librates(p: np.ndarray, e: np.ndarray, asymmetry: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """Whether theta - p M stays near where it starts, by Runge's and Kutta's method for the planar motion
+    theta'' = -(3/2) (B - A)/C (a/r)^3 sin 2(theta - f), with n = 1 and the periapsis fixed.
+    """
+    true, cubes = (np.array(x) for x in zip(*map(anomalies, e), strict=True))
+    angle = np.where(p == 0.5, math.pi / 2, 0.0)  # H < 0 turns the stable attitude
+    rate, step, start = spin.copy(), 2 * math.pi / STEPS, angle.copy()
+    far = np.zeros(len(p))
+
+    def pull(theta: np.ndarray, half: int) -> np.ndarray:
+        at = half % (2 * STEPS)
+        return -1.5 * asymmetry * cubes[:, at] * np.sin(2 * (theta - true[:, at]))
+
+    for k in range(ORBITS * STEPS):
+        a1 = pull(angle, 2 * k)
+        a2 = pull(angle + step / 2 * rate, 2 * k + 1)
+        a3 = pull(angle + step / 2 * (rate + step / 2 * a1), 2 * k + 1)
+        a4 = pull(angle + step * (rate + step / 2 * a2), 2 * k + 2)
+        angle = angle + step * (rate + step / 6 * (a1 + a2 + a3))
+        rate = rate + step / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        far = np.maximum(far, np.abs(angle - p * step * (k + 1) - start))
+    return far < math.pi / 2
+
+
+@pytest.mark.slow(30)
+def test_it_is_told_exactly_where_a_spin_is_outside_its_resonance() -> None:
+    """64 random spins inside and outside of their resonances, against the motion itself."""
+    generator = np.random.default_rng(2025)
+    count, names = 64, {1.0: "1:1", 1.5: "3:2", 0.5: "1:2", 2.0: "2:1"}
+    p = np.tile(list(names), count // 4)
+    e = generator.uniform(0.1, 0.25, count)
+    strength = np.select(
+        [p == 1, p == 1.5, p == 0.5], [1 - 2.5 * e**2, 3.5 * e - 7.7 * e**3, 0.5 * e], 8.5 * e**2
+    )
+    width = generator.uniform(2e-3, 4e-3, count)
+    asymmetry = width**2 / (3 * strength)
+    sign = generator.choice([-1, 1], count)
+    factor = np.where(
+        generator.random(count) < 0.5, generator.uniform(0.7, 0.85, count), generator.uniform(1.2, 1.5, count)
+    )
+    spin = p + sign * factor * width
+    held = librates(p, e, asymmetry, spin)
+    assert (held == (factor < 1)).all()
+    motion = math.sqrt(3.986004418e14 / 8e6**3)
+    for i in range(count):
+        text = scene(
+            orbit(f'semi_major_axis = "{8e3 / (1 - e[i]):.17g} km", eccentricity = {e[i]:.17g}'),
+            f"angular_velocity = [0, 0, {spin[i] * motion * (1 - e[i]) ** 1.5:.17g}]",
+            f"1, {1 + asymmetry[i] * 1.2:.17g}, 1.2",
+        )
+        found = warned(text)
+        assert [caution.code.value for caution in found] == ["near_resonance"] * (not held[i]), i
+        assert all(f"{names[p[i]]} resonance" in caution.text for caution in found)
