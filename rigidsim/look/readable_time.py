@@ -56,7 +56,7 @@ def unit_for(span: float) -> TimeUnit:
         for seconds, symbol in units:
             if size >= factor * seconds:
                 return TimeUnit(symbol, seconds)
-    exponent = 3 * math.floor(math.log10(size) / 3)
+    exponent = max(3 * math.floor(math.log10(size) / 3), -300)  # whose power isn't zero
     return TimeUnit(f"1e{exponent} s", 10.0**exponent)
 
 

@@ -62,9 +62,11 @@ def meant_body(given: ExactNumber) -> KnownBody | None:
     """
     value = float(given)
     body = known_body(value)
-    digits = f"{value:.16e}".partition("e")[0].rstrip("0")
+    if body is None:
+        return None
+    digits = f"{value:.14e}".partition("e")[0].rstrip("0")
     last = 10.0 ** -(len(digits) - 2) / float(digits)  # the last digit, relative
-    close = body is not None and abs(value / body.gravitational_parameter - 1) < max(_AS_PUBLISHED, last / 2)
+    close = abs(value / body.gravitational_parameter - 1) < max(_AS_PUBLISHED, last / 2)
     return body if close else None
 
 
@@ -102,9 +104,8 @@ def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: V
     if body is None or given.position is None:
         return
     distance, speed = float(norm(scene.context, place)), float(norm(scene.context, velocity))
-    found = list(about_distance(body, distance, given.position, "[initial] position"))
-    yield from found
-    if found or given.velocity is None or not _bare(given.velocity):
+    yield from about_distance(body, distance, given.position, "[initial] position")
+    if distance < _SURFACE * body.radius or given.velocity is None or not _bare(given.velocity):
         return
     circular = math.sqrt(body.gravitational_parameter / distance)
     if 0 < speed < _SLOW * circular and _SLOW * circular < 1e3 * speed < _UNBOUND * circular:

@@ -268,6 +268,24 @@ def test_no_false_alarm(text: str) -> None:
     assert warned(text) == []
 
 
+@pytest.mark.parametrize("size", ["1e-4000", "1e-321", "1e-200", "1e200", "1e4000"])
+def test_no_number_is_too_small_or_too_large_to_be_told_of(size: str) -> None:
+    """Scenes in quadruple precision may have numbers that no double holds."""
+    strength = f"gravitational_parameter = {size}\n"
+    for text in (
+        scene(orbit(f"semi_major_axis = {size}, period = 5")),
+        scene(orbit("semi_major_axis = 1, inclination = 0.1, node_rate = 1e-3", strength)),
+        scene(gradient(f"{strength}position = [0, 0, {size}]")),
+        gravity(f"[0, {size}, -{size}]"),
+        torque(size, "0", f"sin({size})"),
+        dipole(f"semi_major_axis = {size}, longitude_rate = {size}"),
+        flight(f"[{size}, 0, 0]", f"[0, {size}, 0]"),
+    ):
+        found = build_scene(parse(text))
+        assert all(load.told(found) for load in found.given_loads if load.acts())  # type: ignore[attr-defined]
+        assert all(caution.text for caution in cautions_of(found))
+
+
 def ready() -> Iterator[tuple[str, rigidsim.Experiment]]:
     """Every ready config and template, and every whole config in the documentation."""
     folders = ROOT / "configs", ROOT / "rigidsim" / "workflows" / "templates"
