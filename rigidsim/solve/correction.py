@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import heyoka as hy
 import mpmath
 
+from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.solve.least_correction import least_correction
@@ -16,12 +17,17 @@ from rigidsim.solve.precision import Scalar
 
 
 def correction(
-    states: Sequence[Symbolic], residuals: Sequence[Symbolic], lacking: Sequence[Symbolic], damping: Scalar
+    states: Sequence[Symbolic],
+    freedoms: Sequence[Symbolic],
+    residuals: Sequence[Symbolic],
+    lacking: Sequence[Symbolic],
+    damping: Scalar,
 ) -> tuple[list[Symbolic], list[Symbolic]]:
     """What a correction is worked out from, and what comes of it.
 
     Args:
         states: n of them, the variables.
+        freedoms: of each state (``freedoms_of``).
         residuals: (value - initial) / scale of each of the m projected scalars.
         lacking: of each state's derivative (``lacking_rates``); empty where nothing is.
         damping: see ``damping_between``.
@@ -49,11 +55,32 @@ def correction(
     if lacking:  # along the invariants' level sets: what it would change of them is taken off at once
         across = [hy.sum([g * f for g, f in zip(row, lacking, strict=True)]) for row in gradients]
         wanted = [r + elapsed * a for r, a in zip(wanted, across, strict=True)]
-    change = least_correction(gradients, wanted, damping)
+    change = least_correction(
+        [[free * g for free, g in zip(freedoms, row, strict=True)] for row in gradients], wanted, damping
+    )
     size = hy.sum([c * c for c in change])
+    change = [free * c for free, c in zip(freedoms, change, strict=True)]
     if lacking:
         change = [hy.sum([c, -(elapsed * f)]) for c, f in zip(change, lacking, strict=True)]
     return [*x, elapsed, pace, *integrals, *put_back, *then], [*change, *new_integrals, *new_put_back, size]
+
+
+def freedoms_of(system: System, number: Rounder) -> list[Symbolic]:
+    """How far a correction of order one moves each state: as far as 1 rad for an angle in a larger unit, in
+    which the same change would look smaller than one of the spin. Not at all where the state stands exactly
+    where it began: it has no drift to be put back, and a rate or a direction that is exactly zero for good
+    would leave it, to grow about an unstable axis.
+
+    Args:
+        number: rounds an mpf once to the precision of the correction.
+    """
+    units = [0] * len(system.states)
+    for i in system.angle_states:
+        units[i] = system.angle_unit
+    return [
+        hy.select(hy.eq(x, hy.expression(number(start))), hy.expression(0.0), hy.expression(2.0**-unit))
+        for x, start, unit in zip(system.variables, system.initial, units, strict=True)
+    ]
 
 
 def lacking_rates(exact: System, integrated: System) -> list[Symbolic]:

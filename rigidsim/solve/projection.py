@@ -16,7 +16,8 @@ remains. Three measures make this work to the last bit:
   the time since the last. It is taken at places all over the motion, so that its mean is right.
 
 Where gradients are nearly parallel (spin about a principal axis) the ill-determined direction is left to
-itself, by a damping as large as the effect of the residuals' own rounding there.
+itself, by a damping as large as the effect of the residuals' own rounding there. A state that stands
+exactly where it began is left alone: what is zero for good stays zero.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System
 from rigidsim.model.two_part import in_two_parts
 from rigidsim.solve.compiled import compiled_function
-from rigidsim.solve.correction import correction, damping_between, lacking_rates
+from rigidsim.solve.correction import correction, damping_between, freedoms_of, lacking_rates
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
@@ -326,7 +327,8 @@ class Projection:
             lacking = lacking_rates(wide, self._in_use(as_integrated))
         context = wide.scene.context
         damping = high.number(damping_between(low.bits, high.bits, context))
-        inputs, outputs = correction(wide.variables, residuals, lacking, damping)
+        freedoms = freedoms_of(wide, high.number)
+        inputs, outputs = correction(wide.variables, freedoms, residuals, lacking, damping)
         return (
             compiled_function(residuals, wide.variables, **self._options),
             compiled_function(outputs, inputs, **self._options),
