@@ -162,10 +162,12 @@ class Diagnostics:
         else:
             code = WarningCode.ATTITUDE_UNCERTAIN
             what = f"the attitude is uncertain by about {found.attitude:.2g} rad"
+        loose = self.prepared.law_tolerance > float(self.prepared.precision.epsilon)
+        given = loose and self.prepared.scene.config.integrator.tolerance != "auto"
+        remedy = 'tolerance = "auto"' if given else "a higher precision"
         yield Caution(
             code,
-            f"{what} at the end, so its digits are gone{self._since(found)}; choose a higher precision or a "
-            "nearer end",
+            f"{what} at the end, so its digits are gone{self._since(found)}; choose {remedy} or a nearer end",
         )
 
     def _modelling(self) -> Iterator[Caution]:

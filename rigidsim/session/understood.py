@@ -7,7 +7,7 @@ from typing import Any
 from rigidsim.look.readable_time import TimeWords
 from rigidsim.model.load import Load
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.arithmetic import Vector, working_bits
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.suspicions import (
@@ -98,6 +98,9 @@ def cautions_of(scene: Scene) -> list[Caution]:
                 "reference or center_of_mass for a top, or [initial] position for free flight",
             )
         )
+    wasted = _wasted_tolerance(scene)
+    if wasted:
+        found.append(Caution(WarningCode.NO_EFFECT, wasted))
     preset = scene.config.body.preset
     if preset not in (None, "earth") and any(getattr(load, "ephemeris", None) for load in scene.config.loads):
         found.append(
@@ -108,6 +111,27 @@ def cautions_of(scene: Scene) -> list[Caution]:
             )
         )
     return found
+
+
+def _wasted_tolerance(scene: Scene) -> str:
+    """What to say of a tolerance that is of no use; empty for any other.
+
+    Below an eighth of epsilon, which "auto" is in most precisions, a step's own rounding is all that counts.
+    """
+    integrator, context = scene.config.integrator, scene.context
+    if isinstance(integrator.tolerance, str):
+        return ""
+    if integrator.method == "closed_form":
+        return "[integrator] tolerance has no effect, since a closed form takes no steps; leave it out"
+    given, epsilon = integrator.tolerance.at(context), 2.0 ** (1 - working_bits(integrator.precision))
+    if given >= epsilon / 8:
+        return ""
+    name = integrator.precision if isinstance(integrator.precision, str) else f"{integrator.precision} digits"
+    return (
+        f"[integrator] tolerance: given {context.nstr(given, 3)}, but in a precision of {name} each step "
+        f"rounds by about {epsilon:.3g}, so that a tolerance below {epsilon / 8:.3g} makes steps dearer and "
+        'no error smaller; choose "auto", or a higher precision for more digits'
+    )
 
 
 def _three(vector: Vector) -> Three:

@@ -138,11 +138,12 @@ def prepare_scene(
     try:
         precision = precision_of(scene.config.integrator.precision)
         asked = scene.config.integrator.tolerance
-        step_control = None if isinstance(asked, str) else precision.number(asked.at(scene.context))
+        given = None if isinstance(asked, str) else asked.at(scene.context)
         if tolerance is not None:
-            step_control = precision.number(scene.context.mpf(tolerance))
-        _check_tolerance(step_control, precision)
-        step_control = _auto(precision) if step_control is None else step_control
+            given = scene.context.mpf(tolerance)
+        if given is not None:
+            _check_tolerance(given, precision)
+        step_control = _auto(precision) if given is None else precision.number(given)
         check_start(scene)
         if scene.config.model.level == AUTO:
             what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'
@@ -222,17 +223,15 @@ def _auto_of_averages(precision: Precision) -> Scalar | None:
     return precision.number(mpmath.ldexp(precision.epsilon, _BITS_OF_AVERAGES[1]))
 
 
-def _check_tolerance(tolerance: Scalar | None, precision: Precision) -> None:
+def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:
     """Refuse a tolerance that would cost ever higher orders and gain nothing.
 
     Raises:
         ConfigError: a tolerance further below the precision's epsilon than that is below 1.
     """
     least = precision.epsilon**2
-    if tolerance is not None and precision.exact(tolerance) < least:
-        given, shortest, epsilon = (
-            mpmath.nstr(x, 3) for x in (precision.exact(tolerance), least, precision.epsilon)
-        )
+    if tolerance < least:
+        given, shortest, epsilon = (mpmath.nstr(x, 3) for x in (tolerance, least, precision.epsilon))
         raise ConfigError(
             Problem(
                 "[integrator] tolerance",
@@ -252,6 +251,13 @@ def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | 
     integrator = scene.config.integrator
     if integrator.method != "closed_form":
         return None
+    from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
+
+    try:
+        closed = closed_form_of(scene, driven=driven)
+    except NoClosedForm as none:
+        what = f'given "closed_form", but {none}; allowed here: "taylor"'
+        raise ConfigError(Problem("[integrator] method", what)) from None
     why = None
     if integrator.hold_invariants is True:
         why = "holds its invariants by itself; set hold_invariants = false"
@@ -261,13 +267,7 @@ def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | 
         why = 'takes no steps in which events could be found; remove [[events]], or choose method = "taylor"'
     if why is not None:
         raise ConfigError(Problem("[integrator] method", f'given "closed_form", which {why}'))
-    from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
-
-    try:
-        return closed_form_of(scene, driven=driven)
-    except NoClosedForm as none:
-        what = f'given "closed_form", but {none}; allowed here: "taylor"'
-        raise ConfigError(Problem("[integrator] method", what)) from None
+    return closed
 
 
 def _refuse_spectrum(system: System) -> None:

@@ -1,0 +1,104 @@
+"""A tolerance that means nothing is refused or warned of, with what would: the smallest that does is an
+eighth of the precision's epsilon, below which orders rise and errors don't fall.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import EPSILON, angle_between, config, run_text
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.scene.scene import build_scene
+from rigidsim.session.understood import cautions_of
+from rigidsim.solve.problem import prepare
+
+GRADIENT = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}'
+
+
+def told(integrator: str) -> list[str]:
+    """Texts of the cautions of a config with this ``[integrator]``."""
+    experiment = rigidsim.parse(config(integrator=integrator))
+    prepare(experiment)
+    cautions = cautions_of(build_scene(experiment))
+    assert {caution.code.value for caution in cautions} <= {"no_effect"}
+    return [caution.text for caution in cautions]
+
+
+@pytest.mark.parametrize("precision", EPSILON)
+def test_a_tolerance_below_an_eighth_of_epsilon_is_warned_of(precision: str) -> None:
+    name = f'precision = "{precision}"\n'
+    for factor in (0.13, 0.5, 1, 10, 1e3):
+        assert not told(f"{name}tolerance = {min(factor * EPSILON[precision], 1)!r}")
+    for factor in (0.12, 1e-3, 1e-5):
+        (text,) = told(f"{name}tolerance = {factor * EPSILON[precision]!r}")
+        assert (
+            f"a tolerance below {EPSILON[precision] / 8:.3g} makes steps dearer and no error smaller" in text
+        )
+        assert 'choose "auto", or a higher precision' in text
+    assert not told(name + 'tolerance = "auto"')
+
+
+def test_the_precision_in_digits_has_its_own_smallest_tolerance() -> None:
+    assert not told("precision = 50\ntolerance = 1e-50")
+    assert "50 digits" in told("precision = 50\ntolerance = 1e-55")[0]
+
+
+def test_a_smaller_tolerance_gains_nothing() -> None:
+    """What the warning claims, against 80 bits: a tolerance of 1e-30 takes more orders, and errs as much,
+    within what rounding scatters by.
+    """
+    time = "end = 20\nsamples = 21"
+    exact = run_text(config(time=time, integrator='precision = "extended"')).dataset.quaternion.values
+    errors, orders = [], []
+    for tolerance in ('"auto"', "1e-30"):
+        found = run_text(config(time=time, integrator=f"tolerance = {tolerance}")).dataset
+        errors.append(float(np.max(angle_between(found.quaternion.values, exact))))
+        orders.append(found.attrs["taylor_order"])
+    assert orders == [20, 36]
+    assert errors[1] > errors[0] / 10
+
+
+@pytest.mark.parametrize(
+    ("precision", "tolerance"), [("double", "1e-33"), ("double", '"1e-400"'), ("single", "1e-60")]
+)
+def test_one_far_below_is_refused_as_a_tolerance(precision: str, tolerance: str) -> None:
+    """Also where the precision can't hold it: the scene's own numbers aren't at fault."""
+    with pytest.raises(ConfigError, match=r"\[integrator\] tolerance: given .* gain nothing"):
+        prepare(rigidsim.parse(config(integrator=f'precision = "{precision}"\ntolerance = {tolerance}')))
+
+
+@pytest.mark.parametrize("tolerance", ["0", "-1e-9", "nan", "inf", "2", '"1 m"', "true"])
+def test_what_is_no_tolerance_is_refused(tolerance: str) -> None:
+    with pytest.raises(ConfigError, match=r"\[integrator\] tolerance: given "):
+        rigidsim.parse(config(integrator=f"tolerance = {tolerance}"))
+
+
+def test_lost_digits_are_blamed_on_the_loose_tolerance() -> None:
+    text = config(time="end = 20\nsamples = 9", integrator="tolerance = 0.1", estimate=True)
+    (warning,) = run_text(text, estimate=True).summary["warnings"]
+    assert "digits are gone" in warning
+    assert 'choose tolerance = "auto"' in warning
+    assert "higher precision" not in warning
+
+
+def test_a_closed_form_has_no_use_for_a_tolerance() -> None:
+    assert "takes no steps" in told('method = "closed_form"\ntolerance = 1e-9')[0]
+    assert not told('method = "closed_form"')
+
+
+@pytest.mark.parametrize("formulation", ["auto", "planar", "quaternion", "euler_angles"])
+def test_a_scene_without_a_closed_form_is_told_so_first(formulation: str) -> None:
+    """A planar gradient among them, whose equations are planar though the config says auto."""
+    text = config("principal_moments = [1, 1.75, 2]", "angular_velocity = [0, 0, 1]", GRADIENT,
+                  integrator=f'method = "closed_form"\nformulation = "{formulation}"')  # fmt: skip
+    with pytest.raises(ConfigError, match="a gravity-gradient load has no closed form here") as refused:
+        prepare(rigidsim.parse(text))
+    assert "formulation" not in str(refused.value)
+
+
+def test_a_free_body_in_other_variables_is_told_of_auto() -> None:
+    text = config(integrator='method = "closed_form"\nformulation = "euler_angles"')
+    with pytest.raises(ConfigError, match='not euler_angles; set formulation = "auto"'):
+        prepare(rigidsim.parse(text))
