@@ -11,7 +11,9 @@ from flights import MU, Flight, Flights, by_scipy, direction, in_orbit, turned_b
 from support import run_estimated, run_text, unoptimised_code
 
 import rigidsim
+from rigidsim.errors import ConfigError
 from rigidsim.session.verdict import Soundness, verdict_on
+from rigidsim.solve.problem import prepare
 
 FAULT = Path(__file__).parents[1] / "data" / "faults" / "drag_in_orbit.toml"
 IN_ORBIT = Flight(
@@ -52,6 +54,9 @@ def test_a_source_among_the_bodies_leaves_the_quaternion_its_norm() -> None:
     without_drag = text[: text.index('[[loads]]\nkind = "force"')] + "[time]\nend = 3600\nsamples = 2\n"
     run = run_text(without_drag + bodies)
     assert run.summary["warnings"] == []
+    gradient = '[[loads]]\nkind = "gravity_gradient"\norbit = {body = "earth"}\n'
+    with pytest.raises(ConfigError, match="which has its torque; remove it"):
+        prepare(rigidsim.parse(without_drag + gradient + bodies))
 
 
 def quadratic(random: np.random.Generator) -> Flight:

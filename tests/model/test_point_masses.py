@@ -255,6 +255,18 @@ REFUSED = {
         planet("full").replace('{body = "sun"}', '{body = "sun", eccentricity = 0.1}'),
         "orbit.eccentricity: given beside body, whose motion is integrated",
     ),
+    "an orbit of its own": (
+        planet("one_way").replace(
+            'orbit = {body = "sun"}',
+            f'orbit = {{semi_major_axis = "1 au"}}\ngravitational_parameter = {SUN!r}',
+        ),
+        'give orbit = {body = "..."}, which is where that body is',
+    ),
+    "a magnet on an orbit of its own": (
+        planet("one_way") + '[[loads]]\nkind = "magnetic_dipole"\nmoment = [0, 0, 1]\n'
+        'source_moment = [0, 0, 1]\norbit = {semi_major_axis = "1 au", period = "365 day"}\n',
+        "orbit: given for a body that is one of [[bodies]]",
+    ),
     "recorded": (
         planet("one_way") + '[output]\nrecord = ["system_energy"]\n',
         'set [body] coupling = "full"',
