@@ -30,6 +30,7 @@ from rigidsim.analysis.refinement import (
     remainder,
     settled,
 )  # fmt: skip
+from rigidsim.analysis.secular import hidden_rate
 from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
 from rigidsim.scene.records import dataclass
 
@@ -253,7 +254,11 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
         frequency_errors.append(math.hypot(own, finest * abs(float(frequency))))
         amplitude_errors.append(math.hypot(level, finest * strength))
     level = beside(0.0)
+    noise = float(np.median(found.sizes))
     polynomial_errors = [level * growth[m] * spread**m / second**m for m in range(powers)]
+    if samples.real and powers > 1:
+        white = noise / math.sqrt(math.log(2) * float(np.mean(weights**2)))  # the median is a Rayleigh one
+        polynomial_errors[1] = max(polynomial_errors[1], hidden_rate(total, left, white))
     return Decomposition(
         total,
         order,
@@ -261,7 +266,7 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
         tuple(amplitude_errors),
         tuple(polynomial_errors),
         math.sqrt(float(np.mean(np.abs(left) ** 2))),
-        float(np.median(found.sizes)),
+        noise,
         tuple(search.close),
         search.exhausted,
     )

@@ -1,0 +1,58 @@
+"""Announced errors of secular rates beside what is neither a line nor a polynomial of degree one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray
+
+import rigidsim
+
+KINDS = ("decay", "growth", "slow", "quadratic", "cubic", "noise", "decay in noise")
+
+
+def _share(seed: int, kind: str) -> float:
+    """True error of a random signal's secular rate over the announced one."""
+    rng = np.random.default_rng([25, 3, seed])
+    count = int(rng.integers(200, 1200))
+    x = (2 * np.arange(count) - (count - 1)) / count
+    rate, size = rng.uniform(-1, 1), 10 ** rng.uniform(-4, 0)
+    values = rate * x
+    for _ in range(rng.integers(0, 3)):
+        bins = rng.uniform(8, 0.3 * count)
+        values = values + 10 ** rng.uniform(-2, 0) * np.cos(np.pi * bins * x + rng.uniform(0, 6))
+    scale = 10 ** rng.uniform(-1, 1)  # half lengths in which an exponential changes by e
+    if kind.startswith(("decay", "growth")):
+        values = values + size * np.exp(-(x + 1) / scale if kind != "growth" else (x - 1) / scale)
+    if kind == "slow":  # 1.05 to 6 times as long as the samples
+        values = values + size * np.cos(np.pi * x / rng.uniform(1.05, 6) + rng.uniform(0, 6))
+    if kind == "quadratic":
+        values = values + size * x**2
+    if kind == "cubic":
+        values = values + size * x**3
+    if kind == "noise":
+        values = values + size * rng.standard_normal(count)
+    if kind == "decay in noise":  # which mustn't hide its curvature: of its slope nothing would be known
+        curvature = size / scale**2 / 2 * np.exp(-1 / scale)
+        values = values + curvature * np.sqrt(count) / 50 * rng.standard_normal(count)
+    dataset = xarray.Dataset(
+        {"x": ("time", values, {"units": "rad"})}, coords={"time": np.arange(float(count))}
+    )
+    signal = rigidsim.analyse(dataset, lines=8)["x"]
+    true = rate * 2 / count
+    off = abs(float(signal.rate.real) - true)
+    return off / (signal.rate_error + 1e-16 * abs(true))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_error_of_a_secular_rate_is_announced(kind: str) -> None:
+    assert _share(0, kind) <= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_errors_of_secular_rates_are_announced(kind: str) -> None:
+    shares = [_share(seed, kind) for seed in range(1, 21)]
+    assert max(shares) <= 3, sorted(shares)[-5:]
+    if kind in ("decay", "growth", "slow"):  # no more than a multiple is announced, either
+        assert np.median(shares) > 0.3
