@@ -16,8 +16,8 @@ from rigidsim.analysis.exponentials import Complexes, Reals, Sum
 from rigidsim.analysis.windows import hann, positions
 
 _DEGREE = 9  # of the polynomial in the slow part: a line of one turn in the samples to some 1e-4
-_NEAR = 6.0  # bins from zero within which lines may be pieces of the slow part
-_FARTHER = 30.0  # the same of lines that are less than what is left
+_NEAR = 30.0  # bins from zero within which lines may be pieces of the slow part
+_PIECE = 0.1  # of what is left, above which a line is one of its own; pieces were 1e-4 to 3e-2
 _SURE = 4.0  # standard deviations above which something is there
 _CELLS = 4096
 _STRAIGHT = 1e-3  # k, in half lengths, below which exponentials can't be told from polynomials by rounding
@@ -35,23 +35,25 @@ def hidden_rate(total: Sum, left: Complexes, noise: float) -> float:
     c, s = _polynomial(left.real, noise, 3)
     if not np.any(np.abs(c[2:]) > _SURE * s[2:]):
         return 0.0
-    return _absorbed(*_polynomial(_slow_part(total, left), noise, _DEGREE))
+    bent = float(np.max(np.abs(c[2:])))
+    higher, spread = _polynomial(_with_pieces(total, left, bent), noise, _DEGREE)
+    if np.any(np.abs(higher[2:4] - c[2:]) > bent + _SURE * spread[2:4]):  # what lines have left, nothing slow
+        return abs(float(c[1]))
+    return _absorbed(higher, spread)
 
 
-def _slow_part(total: Sum, left: Complexes) -> Reals:
-    """What is left together with lines next to frequency zero, which may be pieces of the same; (n,)."""
-    largest = float(np.max(np.abs(left)))
-    near = []
-    for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
-        reach = _FARTHER if 2 * abs(complex(amplitude)) < largest else _NEAR
-        if abs(float(frequency)) * total.count < reach:
-            near.append(n)
-    pieces = Sum(
-        total.context, total.count, (),
-        tuple(total.frequencies[n] for n in near), tuple(total.amplitudes[n] for n in near),
-    )  # fmt: skip
-    values = pieces.values() if near else np.zeros(total.count, dtype=np.complex128)
-    return np.asarray(2 * values.real + left.real)
+def _with_pieces(total: Sum, left: Complexes, bent: float) -> Reals:
+    """What is left together with lines that are pieces of the same: far less than it bends, (n,)."""
+    lines = [
+        (f, a)
+        for f, a in zip(total.frequencies, total.amplitudes, strict=True)
+        if abs(float(f)) * total.count < _NEAR and 2 * abs(complex(a)) < _PIECE * bent
+    ]
+    values = left.real
+    if lines:
+        frequencies, amplitudes = zip(*lines, strict=True)
+        values = values + 2 * Sum(total.context, total.count, (), frequencies, amplitudes).values().real
+    return np.asarray(values)
 
 
 def _polynomial(values: Reals, noise: float, degree: int) -> tuple[Reals, Reals]:

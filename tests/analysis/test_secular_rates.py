@@ -56,3 +56,15 @@ def test_errors_of_secular_rates_are_announced(kind: str) -> None:
     assert max(shares) <= 3, sorted(shares)[-5:]
     if kind in ("decay", "growth", "slow"):  # no more than a multiple is announced, either
         assert np.median(shares) > 0.3
+
+
+def test_resolved_slow_lines_are_no_part_of_the_error() -> None:
+    """Whatever else is left, from lines that weren't asked for."""
+    count = 2000
+    x = (2 * np.arange(count) - (count - 1)) / count
+    faint = sum(1e-9 * np.cos(np.pi * k * x) for k in range(40, 80, 4))
+    data = {"x": ("time", 0.7 * x + np.cos(2.3 * np.pi * x + 0.4) + faint, {"units": "rad"})}
+    dataset = xarray.Dataset(data, coords={"time": np.arange(float(count))})
+    signal = rigidsim.analyse(dataset, lines=3)["x"]
+    off = abs(float(signal.rate.real) * count / 2 - 0.7)
+    assert off < 3 * signal.rate_error * count / 2 < 1e-8
