@@ -269,6 +269,7 @@ def _modelling(found: Diagnostics) -> Modelling | None:
     known, output = found.modelling, found.prepared.scene.config.output
     asked = found.prepared.scene.config.integrator.accuracy_axis
     requested = None if asked is None else float(asked)
+    resonance = "" if average.resonance is None else average.resonance.name
     if known is None:
         code, why = UnmeasuredCode.NOT_ENDED, "the run has not reached its end"
         if not output.estimate:
@@ -278,6 +279,7 @@ def _modelling(found: Diagnostics) -> Modelling | None:
         return Modelling(
             level=average.level,
             short_period=average.short_period,
+            resonance=resonance,
             requested=requested,
             how=f"not measured: {why}",
             unmeasured=code.value,
@@ -285,6 +287,7 @@ def _modelling(found: Diagnostics) -> Modelling | None:
     return Modelling(
         level=average.level,
         short_period=average.short_period,
+        resonance=resonance,
         momentum_axis=known.momentum,
         figure_axis=known.figure,
         angular_momentum_norm=known.changes.get("angular_momentum_norm"),

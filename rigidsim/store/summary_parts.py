@@ -203,6 +203,7 @@ class Modelling(SummaryPart):
     Attributes:
         level: level of the model.
         short_period: whether what averaging removed is added back in what is recorded.
+        resonance: spin-orbit resonance whose angle is kept, such as "3:2"; empty for none.
         momentum_axis, figure_axis: largest distances of the directions recorded from the full model's, until
             the end of the run, rad; None if not measured, or if the figure axis has no mean direction.
         angular_momentum_norm, energy: largest errors of the momentum's size and the energy of rotation,
@@ -216,6 +217,7 @@ class Modelling(SummaryPart):
 
     level: Annotated[Text, Claim()]
     short_period: Annotated[StrictBool, Claim()]
+    resonance: Text = ""
     momentum_axis: FiniteNumber | None = None
     figure_axis: FiniteNumber | None = None
     angular_momentum_norm: FiniteNumber | None = None

@@ -25,9 +25,10 @@ from rigidsim.solve.batch.neighbours import Spreads, Starts, follow, note
 from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.neighbours.pushed import Pushes
 
-LOOSE = 1e-8
-"""Tolerance of the lanes. At 1e-6, whose steps cost half, errors beside a separatrix were announced ten times
-larger; single runs use it, since they can compare with states of their own.
+LOOSE, FINER = 1e-6, 1e-8
+"""Tolerances of the lanes: the first for all members; the second, whose steps cost 1.5 times as much, where
+errors grow so much that the motion followed becomes another one: beside a separatrix errors were announced
+ten times larger at the first.
 """
 _DRIFTED = 1e-2
 """Tolerance times growth from which a motion followed so loosely becomes a different one."""
@@ -170,12 +171,14 @@ class MemberEstimates:
         own = Pushes().own * max(self._prepared.effective_tolerance / epsilon, 1.0)
         pushes = replace(Pushes(), own=own)
         spreads = follow(lanes, starts, pushes, lost)
-        lead = spreads.attitude if lanes.carried else spreads.rates
-        with np.errstate(divide="ignore", invalid="ignore"):
-            power = np.log(lead / spreads.early) / math.log(4.0)
-        far = spreads.whole & (lead > _DRIFTED / LOOSE) & (lead < margins.gone * lost)
-        far &= (power > margins.most_power) & (starts.steps < margins.tight_steps)
-        again = np.flatnonzero(far)
-        if len(again):
-            spreads.put(again, follow(self._through(None), starts.of(again), pushes, lost))
+        for tolerance, tighter in ((LOOSE, FINER), (FINER, None)):
+            lead = spreads.attitude if lanes.carried else spreads.rates
+            with np.errstate(divide="ignore", invalid="ignore"):
+                power = np.log(lead / spreads.early) / math.log(4.0)
+            far = (lead > _DRIFTED / tolerance) & (power > margins.most_power)
+            if tighter is None:
+                far &= spreads.whole & (lead < margins.gone * lost) & (starts.steps < margins.tight_steps)
+            again = np.flatnonzero(far | (~spreads.whole & (tolerance == LOOSE)))
+            if len(again):
+                spreads.put(again, follow(self._through(tighter), starts.of(again), pushes, lost))
         return spreads

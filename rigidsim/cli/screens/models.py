@@ -30,7 +30,7 @@ def print_modelling(found: Modelling | None, on: Page) -> None:
         text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
         text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * _YEAR:.1e} rad/yr"
         on.line("", text)
-    if not found.short_period and found.energy is None:
+    if not (found.short_period or found.resonance or found.energy is not None):
         on.line("", "[model] short_period = true adds the nutation back that averaging removed")
 
 

@@ -203,15 +203,36 @@ class BatchEngine:
         longest: np.ndarray,
         most_steps: int,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """States (states, width) and times (width,) of fully used lanes, at most so many steps later.
+        """States (states, n) and times (n,) of motions at most so many steps later.
 
         Args:
-            states, parameters: (.., width); begin, end: (width,), internal units.
-            longest: bounds of steps, (width,).
+            states, parameters: (.., n); begin, end: (n,), internal units.
+            longest: bounds of steps, (n,).
         """
-        self._set(states, parameters, begin)
-        self._integrator.propagate_until(end, max_steps=most_steps, max_delta_t=longest)
-        return self._integrator.state, self._integrator.time
+        integrator, count = self._integrator, states.shape[1]
+        state, numbers = integrator.state, integrator.pars
+        there, then = self._grouped(states), self._grouped(begin)
+        read = self._grouped(parameters[: self._used])
+        ends, bounds = self._grouped(end), self._grouped(longest)
+        for group in range(len(there)):
+            integrator.set_time(then[group])
+            state[:] = there[group]
+            if self._used:
+                numbers[:] = read[group]
+            self._stack(
+                integrator.propagate_until, ends[group], max_steps=most_steps, max_delta_t=bounds[group]
+            )
+            there[group], then[group] = state, integrator.time
+        return np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count]
+
+    def _grouped(self, values: np.ndarray) -> np.ndarray:
+        """Values (.., n) as (groups, .., width), the last group filled with the last motion."""
+        count = values.shape[-1]
+        groups = -(-count // self.width)
+        if groups * self.width > count:
+            values = values[..., np.minimum(np.arange(groups * self.width), count - 1)]
+        split = values.reshape(*values.shape[:-1], groups, self.width)
+        return np.array(np.moveaxis(split, -2, 0), order="C")
 
     def _set(self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray) -> None:
         self._integrator.set_time(begin)

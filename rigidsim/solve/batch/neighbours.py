@@ -16,7 +16,7 @@ from rigidsim.solve.batch.neighbour_lanes import NeighbourLanes
 from rigidsim.solve.neighbours.lanes import NEIGHBOURS
 from rigidsim.solve.neighbours.pushed import Pushes
 
-_STRETCHES, _SHORTEST = 12, 4
+_STRETCHES, _SHORTEST = 6, 4
 """Approximate number of stretches of a run, and least number of steps of one. Half of a stretch's pushes come
 before it and half after, so that few stretches suffice for errors that grow as time makes them; where they
 grow faster, stretches become shorter.
