@@ -80,6 +80,16 @@ class LaneResults:
         return others
 
 
+def grouped(values: np.ndarray, width: int) -> np.ndarray:
+    """Values (.., n) of motions as (groups, .., width), the last group filled with the last motion."""
+    count = values.shape[-1]
+    groups = -(-count // width)
+    if groups * width > count:
+        values = values[..., np.minimum(np.arange(groups * width), count - 1)]
+    split = values.reshape(*values.shape[:-1], groups, width)
+    return np.array(np.moveaxis(split, -2, 0), order="C")
+
+
 def put_in_place(bundle: np.ndarray, states: np.ndarray) -> None:
     """Groups (groups, samples, states, width) as members side by side, (samples, states, members)."""
     groups, samples, count, width = bundle.shape

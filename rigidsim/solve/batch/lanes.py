@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
-from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, put_in_place, until_next
+from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, grouped, put_in_place, until_next
 from rigidsim.solve.batch.stack_places import StackPlaces
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
@@ -22,7 +23,6 @@ from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, always at the same places."""
-
 _GROUPS = 8
 """Groups put in place together, since the samples of one are scattered over all of a block's memory."""
 _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
@@ -209,30 +209,14 @@ class BatchEngine:
             states, parameters: (.., n); begin, end: (n,), internal units.
             longest: bounds of steps, (n,).
         """
-        integrator, count = self._integrator, states.shape[1]
-        state, numbers = integrator.state, integrator.pars
-        there, then = self._grouped(states), self._grouped(begin)
-        read = self._grouped(parameters[: self._used])
-        ends, bounds = self._grouped(end), self._grouped(longest)
+        integrator, given = self._integrator, (states, parameters, begin, end, longest)
+        there, read, then, ends, bounds = (grouped(x, self.width) for x in given)
+        advance = partial(self._stack, integrator.propagate_until, max_steps=most_steps)
         for group in range(len(there)):
-            integrator.set_time(then[group])
-            state[:] = there[group]
-            if self._used:
-                numbers[:] = read[group]
-            self._stack(
-                integrator.propagate_until, ends[group], max_steps=most_steps, max_delta_t=bounds[group]
-            )
-            there[group], then[group] = state, integrator.time
-        return np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count]
-
-    def _grouped(self, values: np.ndarray) -> np.ndarray:
-        """Values (.., n) as (groups, .., width), the last group filled with the last motion."""
-        count = values.shape[-1]
-        groups = -(-count // self.width)
-        if groups * self.width > count:
-            values = values[..., np.minimum(np.arange(groups * self.width), count - 1)]
-        split = values.reshape(*values.shape[:-1], groups, self.width)
-        return np.array(np.moveaxis(split, -2, 0), order="C")
+            self._set(there[group], read[group], then[group])
+            advance(ends[group], max_delta_t=bounds[group])
+            there[group], then[group] = integrator.state, integrator.time
+        return np.concatenate(list(there), axis=1)[:, : len(begin)], then.ravel()[: len(begin)]
 
     def _set(self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray) -> None:
         self._integrator.set_time(begin)
