@@ -12,6 +12,7 @@ import heyoka as hy
 
 import rigidsim.model.partial_invariants  # noqa: F401  (enters what it defines into the registry)
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables import Observable, Steady
@@ -30,7 +31,8 @@ class Recorded:
         continuity: how samples are joined: "" (as they are), "wrapped" (angles that are states),
             "unwrap" (angles that are functions of the state), "parity" and "nearest" (quaternion signs).
         squared_sizes: for angles that are functions of the state, a value that vanishes where each is
-            undefined; none for Euler angles, whose middle angle tells it.
+            undefined; none for Euler angles.
+        poles: for Euler angles that are functions of the state, where the outer ones are undefined.
         steady: how these angles advance between samples, if known.
         attributes: attributes besides units, long name and frame.
     """
@@ -46,6 +48,7 @@ class Recorded:
     invariant: bool
     continuity: str = ""
     squared_sizes: list[Symbolic] = field(default_factory=list)
+    poles: Poles | None = None
     steady: Steady | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)
 
@@ -108,6 +111,7 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
                 observable.conserved(m) is not None,
                 observable.continuity(m),
                 [] if observable.angles is None else [x.squared_size for x in observable.angles(m)],
+                observable.poles(m),
                 observable.steady(m),
                 observable.attributes(m),
             )

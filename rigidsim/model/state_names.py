@@ -7,6 +7,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.euler_poles import angles_of_matrix, starts_near_pole
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
 from rigidsim.model.two_part_time import TwoPartTime
@@ -21,6 +22,8 @@ def plain_angles(m: Kinematics) -> list[Symbolic]:
     sequence = m.scene.config.integrator.euler_sequence
     if m.attitude is not None and m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
         return list(hy.make_vars(*m.attitude.names))
+    if starts_near_pole(m.scene):
+        return angles_of_matrix(m, differentiable=True)
     return euler_from_matrix(sequence, m.matrix)
 
 

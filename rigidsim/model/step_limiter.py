@@ -13,6 +13,9 @@ With B = 4 a function of u is seen on its own account by then, so a wide one cos
 
 To a root of v, which has a kink where v touches zero, belongs the term log(v) / 64: where v does vanish, its
 series end there, and so does the run, with steps that collapse, instead of going on along the wrong branch.
+
+Euler angles have no series in a pole of their sequence. Where a motion starts in one and an event reads them,
+the first step leaves it by a millionth of a turn, and those that follow grow with the distance.
 """
 
 from __future__ import annotations
@@ -21,21 +24,27 @@ from collections.abc import Mapping, Sequence
 
 import heyoka as hy
 
+from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_names import state_names
+from rigidsim.scene.expressions.tree import ATTITUDE_NAMES
 from rigidsim.scene.transitions import WIDE, narrow_parts
 
 PACE = "pace"
+_POLE = 2.0**20  # over the factor that vanishes in a pole of the Euler angles
 _CLOCK = "t_of_pace"  # stands in for the time, by which heyoka doesn't differentiate
 
 
 def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, argument) for all loads and events."""
     found = [(load.title, u) for load in m.loads for u in load.narrow(m)]
+    angles = frozenset(ATTITUDE_NAMES[4:])
     for event in m.scene.events:
         names = state_names(m, event.reads, clocked=False)
+        if event.reads & angles and starts_in_pole(m.scene):
+            found += [(f"event {event.name}", _POLE * x) for x in components_of_factor(m)]
         found += [
             (f"event {event.name}", to_heyoka(part, names, m.number, m.scene.context, m.sides))
             for part in narrow_parts(event.expression)

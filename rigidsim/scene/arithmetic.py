@@ -49,6 +49,11 @@ def context_for(precision: str | int) -> Any:
     return context
 
 
+def working_epsilon(context: Any) -> Any:
+    """Spacing of the working precision's numbers just above 1, for a scene's context."""
+    return context.mpf(2) ** (1 + GUARD_BITS - context.prec)
+
+
 def negligible(context: Any) -> Any:
     """Relative size below which a difference of a quantity is just rounding."""
     return context.mpf(2) ** (_LOST_BITS - context.prec)

@@ -17,6 +17,7 @@ from rigidsim.scene.records import dataclass
 
 AXES = "xyz"
 Scalar: TypeAlias = Any  # whatever has +, -, * and /
+Pair: TypeAlias = tuple[Scalar, Scalar]
 Sum = Callable[[Sequence[Scalar]], Scalar]
 
 
@@ -67,6 +68,39 @@ def shepperd(r: Matrix) -> tuple[Vector, dict[tuple[int, int], Scalar]]:
         pairs[0, n + 1] = r[k][j] - r[j][k]
         pairs[min(n, j) + 1, max(n, j) + 1] = r[n][j] + r[j][n]
     return squares, pairs
+
+
+def outer_angles(sequence: str, r: Matrix) -> tuple[Pair, Pair]:
+    """Sine and cosine of the first and of the last Euler angle of R, times the factor that vanishes in the
+    singularity.
+    """
+    i, j, k = map(AXES.index, sequence)
+    m, e = 3 - i - j, parity(i, j)
+    if i == k:
+        return (r[j][i], -e * r[m][i]), (r[i][j], e * r[i][m])
+    return (-e * r[j][k], r[k][k]), (-e * r[i][j], r[i][i])
+
+
+def shared_turn(sequence: str, r: Matrix, side: Scalar) -> Pair:
+    """Sine and cosine of a + side c, times 1 + abs(cosine) (proper sequences) or 1 + abs(sine) of the middle
+    angle, for the outer Euler angles a and c of R: what is left of them in the singularity.
+
+    Args:
+        side: sign of ``pole_side``.
+    """
+    i, j, k = map(AXES.index, sequence)
+    m, e = 3 - i - j, parity(i, j)
+    if i == k:
+        return e * (r[m][j] - side * r[j][m]), r[j][j] + side * r[m][m]
+    return e * (r[k][j] + side * r[j][i]), r[j][j] - side * r[k][i]
+
+
+def pole_side(sequence: str, r: Matrix) -> Scalar:
+    """Element of R that is +1 in the singularity where the sum of the outer angles is defined, and -1 where
+    their difference is.
+    """
+    i, _, k = map(AXES.index, sequence)
+    return r[i][k]
 
 
 @dataclass(frozen=True)
@@ -139,18 +173,17 @@ class Rotations:
         """
         i, j, k = map(AXES.index, sequence)
         m, e = 3 - i - j, parity(i, j)
-        atan2 = self.atan2
+        atan2, hypot = self.atan2, self.hypot
         if i == k:
-            sine = self.hypot(r[i][j], r[i][m])
-            middle = atan2(sine, r[i][i])
-            if self.negligible(sine):
-                return [atan2(e * r[m][j], r[j][j]), middle, self.constant(0.0)]
-            return [atan2(r[j][i], -e * r[m][i]), middle, atan2(r[i][j], e * r[i][m])]
-        cosine = self.hypot(r[i][i], r[i][j])
-        middle = atan2(e * r[i][k], cosine)
-        if self.negligible(cosine):
-            return [atan2(e * r[k][j], r[j][j]), middle, self.constant(0.0)]
-        return [atan2(-e * r[j][k], r[k][k]), middle, atan2(-e * r[i][j], r[i][i])]
+            factor = hypot(r[i][j], r[i][m])
+            middle, beside = atan2(factor, r[i][i]), r[m][j]
+        else:
+            factor = hypot(r[i][i], r[i][j])
+            middle, beside = atan2(e * r[i][k], factor), r[k][j]
+        if self.negligible(factor):
+            return [atan2(e * beside, r[j][j]), middle, self.constant(0.0)]
+        first, last = outer_angles(sequence, r)
+        return [atan2(*first), middle, atan2(*last)]
 
     def quaternion_from_euler(self, sequence: str, angles: Vector) -> Vector:
         """Unit quaternion of intrinsic Euler angles; it changes sign with each full turn of an angle."""

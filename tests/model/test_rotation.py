@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from rigidsim.errors import ConfigError
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 
+FAULTS = Path(__file__).parents[1] / "data" / "faults"
 MOMENTS = (1.0, 1.0, 1.5)
 NAMES = (
     "quaternion", "rotation_angle", "rotation_rate", "rotation_period", "andoyer_momenta", "andoyer_angles",
@@ -155,3 +157,42 @@ def test_turns_go_on_where_a_run_is_resumed(runs: Path) -> None:
     assert evaluator.sparse  # g and l are followed
     dense = loaded(run_text(text, 'name="dense"', "time.samples=6001", out=runs))
     np.testing.assert_array_equal(dense["rotation_angle"].values[::200], whole["rotation_angle"].values)
+
+
+def recorded_less_labelled(found: xr.Dataset) -> np.ndarray:
+    """Turns by which the rotation angle differs from the sum of Andoyer's angles that its label gives."""
+    told = re.match(r"(h \+ g \+ l|g [+-] h [+-] l) of andoyer_angles", found["rotation_angle"].convention)
+    assert told is not None
+    l, g, h = found["andoyer_angles"].values.T  # noqa: E741
+    labelled = eval(told[1], {"g": g, "h": h, "l": l})
+    return np.asarray((found["rotation_angle"].values - labelled) / (2 * np.pi))
+
+
+def test_the_label_of_the_rotation_angle_is_the_sum_that_is_recorded() -> None:
+    found = run_text((FAULTS / "rotation_angle_label.toml").read_text()).dataset
+    assert found["rotation_angle"].convention.startswith("g + h - l of andoyer_angles")
+    off = recorded_less_labelled(found)
+    np.testing.assert_allclose(off, round(off[0]), rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_the_label_is_what_is_recorded_in_all_hemispheres() -> None:
+    """Starts with the momentum above and below the reference plane and the figure's equator."""
+    random = np.random.default_rng(3)
+    labels = set()
+    for n in range(64):
+        moments = [*random.uniform(0.9, 1.1, 2).tolist(), 1.6]  # turns about z or opposite to it
+        rates = [*random.uniform(-0.4, 0.4, 2).tolist(), float(random.choice([-1.0, 1.0]))]
+        q, normal = random.normal(size=4), random.normal(size=3)
+        text = config(
+            f"principal_moments = {moments}",
+            f"angular_velocity = {rates}\nquaternion = {q.tolist()}",
+            time="end = 30\nsamples = 61",
+            output='record = ["rotation_angle", "andoyer_angles"]',
+            more=f'[frame]\nfigure_axis = "z"\nreference = {normal.tolist()}',
+        )
+        found = run_text(text, f'name="h{n}"').dataset
+        off = recorded_less_labelled(found)
+        np.testing.assert_allclose(off, round(off[0]), rtol=0, atol=1e-10)
+        labels.add(found["rotation_angle"].convention.split(" of ")[0])
+    assert labels == {"h + g + l", "g - h + l", "g + h - l", "g - h - l"}

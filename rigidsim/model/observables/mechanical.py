@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import heyoka as hy
 
-from rigidsim.model import central_forces, first_integrals, fixed_axes, rotations
+from rigidsim.model import central_forces, first_integrals, fixed_axes
 from rigidsim.model.drift_scales import (
     attracting_point,
     energy_scale,
@@ -15,6 +15,7 @@ from rigidsim.model.drift_scales import (
     rotational_scale,
     total_momentum_scale,
 )
+from rigidsim.model.euler_poles import Poles, angles_of_matrix, squared_factor
 from rigidsim.model.frames.rotating import jacobi_constant
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
@@ -111,11 +112,16 @@ def _along_vertical(m: Mechanics) -> list[Symbolic]:
 
 
 def _euler(m: Mechanics) -> list[Symbolic]:
-    assert m.attitude is not None
-    sequence = m.scene.config.integrator.euler_sequence
-    if m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
-        return list(hy.make_vars(*m.attitude.names))
-    return rotations.euler_from_matrix(sequence, m.matrix)
+    attitude = m.carried(m.attitude)
+    if attitude.kind == "euler_angles":  # in the partner's chart ``System`` replaces them
+        return list(hy.make_vars(*attitude.names))
+    return angles_of_matrix(m)
+
+
+def _euler_poles(m: Mechanics) -> Poles | None:
+    if m.carried(m.attitude).kind == "euler_angles":
+        return None
+    return Poles(m.scene.config.integrator.euler_sequence, squared_factor(m))
 
 
 def _energy_balance(m: Mechanics) -> list[Symbolic]:
@@ -155,7 +161,7 @@ _BUILT_IN: tuple[Observable, ...] = (
     Observable(
         "euler_angles", ("euler_angle",), "rad", "intrinsic Euler angles, body to space",
         _euler, same_unit(NO_UNIT, 3), "body to space", ("attitude",), by_default=_carried_as("euler_angles"),
-        continuity=lambda m: "wrapped" if _carried_as("euler_angles")(m) else "unwrap",
+        continuity=lambda m: "wrapped" if _carried_as("euler_angles")(m) else "unwrap", poles=_euler_poles,
     ),
     Observable(
         "rotation_matrix", ("space_axis", "body_axis"), "1", "rotation matrix, body to space",

@@ -12,6 +12,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import NEEDS
 from rigidsim.model.rotations import Symbolic
@@ -34,6 +35,10 @@ def _nothing(_: Mechanics) -> Mapping[str, str]:
     return {}
 
 
+def _without(_: Mechanics) -> None:
+    return None
+
+
 def always(_: Mechanics) -> bool:
     """Record wherever a scene has the quantity, unless the config names what to record."""
     return True
@@ -50,7 +55,7 @@ class Angle:
 
     Attributes:
         across, along: sine and cosine times a common size, of order 1 where the angle is well
-            defined; NaN is recorded if it is below ``rigidsim.solve.turns.UNDEFINED`` rounding errors.
+            defined; NaN is recorded if it is below ``rigidsim.model.euler_poles.UNDEFINED`` rounding errors.
     """
 
     across: Symbolic
@@ -105,6 +110,7 @@ class Observable:
         by_default: whether it is recorded if the config names nothing.
         continuity: how samples are joined, see ``rigidsim.model.outputs.Recorded``.
         angles: the angles whose full turns are counted (``continuous_angles``), if it consists of such.
+        poles: for Euler angles that are functions of the state, where only one of the outer ones is defined.
         steady: how its angles advance between samples; None if the motion has to be followed.
         attributes: further attributes of the variable: convention, reference plane, ...
         absent: why this scene can't have it although it meets all needs; None if it can.
@@ -123,6 +129,7 @@ class Observable:
     by_default: Callable[[Mechanics], bool] = always
     continuity: Callable[[Mechanics], str] = _as_it_is
     angles: Callable[[Mechanics], list[Angle]] | None = None
+    poles: Callable[[Mechanics], Poles | None] = _without
     steady: Callable[[Mechanics], Steady | None] = _unsteady
     attributes: Callable[[Mechanics], Mapping[str, str]] = _nothing
     absent: Callable[[Mechanics], str | None] = _never

@@ -5,7 +5,8 @@ With the reference plane (X', Y', n), the unit vector k of the angular momentum 
 (Andoyer 1923; Deprit 1967, Am. J. Phys. 35, 424). Each angle is the arc tangent of two products that vanish
 only where it is undefined: h with sin I, l with sin J, g with sin I sin J.
 
-The rotation angle is their sum h + g + l, which is defined where they aren't: the turn about k from X',
+The rotation angle is their sum h + g + l, which is defined where they aren't (with -h if the momentum starts
+opposite to n, with -l if it starts opposite to e3, each axis then reversed below): the turn about k from X',
 carried there by the smallest rotation that takes n to k, to e1, carried there by the smallest that takes e3
 to k. For a free body that turns nearly about its figure axis it grows uniformly.
 """
@@ -82,6 +83,16 @@ def _rotation_angle(m: Mechanics) -> list[Angle]:
     return [Angle(along(y, first) - along(x, second), along(x, first) + along(y, second))]
 
 
+def _rotation_sum(m: Mechanics) -> str:
+    """The rotation angle as a sum of Andoyer's: seen from the side on which the momentum is, h and l count
+    backwards if that isn't the normal's, or the figure axis'.
+    """
+    north, upright = _senses(m)
+    if north > 0 and upright > 0:
+        return "h + g + l"
+    return f"g {'+' if north > 0 else '-'} h {'+' if upright > 0 else '-'} l"
+
+
 def _rotation_period(m: Mechanics) -> list[Symbolic]:
     return [m.number(2 * m.scene.context.pi) / length(m.rates)]
 
@@ -95,8 +106,9 @@ _OBSERVABLES = (
         "rotation_angle", (), "angle of rotation about the angular momentum", _rotation_angle,
         frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial, steady=steady_rotation,
         attributes=lambda m: _told(
-            "h + g + l of andoyer_angles: from X, carried to the momentum's equator by the smallest "
-            "rotations, to the figure's first axis; in the direct sense about the momentum; turns counted"
+            f"{_rotation_sum(m)} of andoyer_angles: from X, carried to the momentum's equator by the "
+            "smallest rotations, to the figure's first axis; in the direct sense about the momentum; turns "
+            "counted"
         ) | figure_told(m) | plane_told(m),
     ),
     Observable(

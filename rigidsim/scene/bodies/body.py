@@ -20,6 +20,7 @@ from rigidsim.scene.arithmetic import (
     transpose,
 )
 from rigidsim.scene.bodies import table as body_table
+from rigidsim.scene.bodies.equal_moments import merged, rounding_of
 from rigidsim.scene.bodies.pieces import (
     drawn,
     parallel_axis,
@@ -123,7 +124,7 @@ def _from_tensor(table: body_table.Body, source: str, context: Any) -> RigidBody
         assert table.inertia_tensor is not None
         _check_symmetric(table.inertia_tensor)
         inertia = [[x.at(context) for x in row] for row in table.inertia_tensor]
-    return _finish(context, source, described, mass, center, inertia, drawing)
+    return _finish(context, table, source, described, mass, center, inertia, drawing)
 
 
 def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
@@ -152,11 +153,12 @@ def _from_pieces(table: body_table.Body, source: str, context: Any, sequence: st
         if piece.drawing["solid"] == "point":
             drawing[-1]["dimensions"] = {"mass_fraction": float(plain(piece.mass / total))}
     center = [c - r for c, r in zip(center, reference, strict=True)]
-    return _finish(context, source, source, total, center, inertia, drawing)
+    return _finish(context, table, source, source, total, center, inertia, drawing)
 
 
 def _finish(
     context: Any,
+    table: body_table.Body,
     source: str,
     described: str,
     mass: Any,
@@ -165,6 +167,8 @@ def _finish(
     drawing: list[dict[str, Any]],
 ) -> RigidBody:
     moments, axes = eigen(context, inertia)
+    if any(inertia[i][j] != 0 for i in range(3) for j in range(i)):  # axes that follow from the numbers
+        inertia, moments, axes = merged(context, inertia, moments, axes, rounding_of(table))
     largest = max(abs(m) for m in moments)
     if largest == 0:
         raise refusal(source, "all moments are zero; a body that turns needs inertia about some axis")

@@ -34,6 +34,7 @@ from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.turns.shared import AngleSteps
 
 DENSE = 1.0
 """Largest angle (rad) by which a body turns between samples whose angles are joined to the nearest."""
@@ -52,7 +53,6 @@ _TOLERANCE = 1e-11
 _SPARE = 1.25  # over the fastest rate of a chunk, for the next
 _SLOWER = 64.0  # than its bound, at most: the next chunk is not to be an age
 _WORTH_BUILDING = 2e5  # rad: code that builds in a tenth of the time runs half as fast
-_TURN = 2 * math.pi
 MOST_OF_A_CLOSED_FORM = 1e6
 """Angle between samples of a closed form up to which turns are counted: about a second's work."""
 
@@ -160,7 +160,7 @@ class TurnCounter:
     """
 
     def __init__(self, system: System, angles: Sequence[Recorded]) -> None:
-        self._exact, self._angles = system, angles
+        self._exact, self._angles, self._steps = system, angles, AngleSteps(angles)
         self._place: Place | None = None
         self._built = False
 
@@ -197,7 +197,7 @@ class TurnCounter:
             off = min(off, np.abs(self._state[watched] + place.state[watched]).max())
         if self._lost or not off < _FAR:
             return None
-        return np.rint((self._followed - place.angles) / _TURN).astype(np.int64)
+        return self._steps.turns(self._followed, place.angles)
 
     # --- the motion once more ---------------------------------------------------------------------------
 
@@ -267,7 +267,7 @@ class TurnCounter:
             self._rate = 2 * float(fastest)
             return
         self._rate = max(_SPARE * float(fastest), self._bound / _SLOWER)
-        jumps = nearest(np.diff(angles, axis=0))
+        jumps = self._steps.jumps(angles)
         doubtful: set[int] = set()
         for group in self._groups:
             rows = np.flatnonzero(np.abs(jumps[:, group]).max(axis=1) > _DOUBTFUL)
@@ -285,12 +285,7 @@ class TurnCounter:
         if found is None:
             return jump
         times, states, angles, _ = found
-        jumps = nearest(np.diff(angles, axis=0))
+        jumps = self._steps.jumps(angles)
         for i in np.flatnonzero(np.abs(jumps).max(axis=1) > _DOUBTFUL):
             jumps[i] = self._looked_at(times[i], states[i], times[i + 1], jumps[i], depth - 1)
         return jumps.sum(axis=0)
-
-
-def nearest(jumps: np.ndarray) -> np.ndarray:
-    """Changes of angles reduced to half a turn."""
-    return jumps - _TURN * np.rint(jumps / _TURN)

@@ -5,24 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
+from functools import cached_property
 
 import heyoka as hy
 import mpmath
 import numpy as np
 
+from rigidsim.model.euler_poles import UNDEFINED
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
 from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleWrapping
+from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
+from rigidsim.solve.rows import evaluate_rows
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join, doubtful_rows, is_sparse, nearest
+from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join, doubtful_rows, is_sparse
 from rigidsim.solve.turns.followed import FollowedSystem
+from rigidsim.solve.turns.shared import AngleSteps, at_poles
 from rigidsim.solve.turns.steady import SteadyAngles, advances_steadily
 
-UNDEFINED = 16.0
-"""Rounding errors of an angle's sine and cosine below which both are pure rounding and the angle is NaN."""
+_LOOKED_AT = 2.0**-16  # singular factor, in double precision, below which it is worked out in the run's own
 _DOUBTFUL = 2.0  # rad, as in ``turn_count``
 _POLE = 1e-6  # size of an angle's sine and cosine below which dense samples aren't looked at in parts
 
@@ -52,7 +56,9 @@ class JoinedAngles:
     """The angles of a system that are joined from sample to sample.
 
     Between dense samples they take the nearest way. Between sparse ones they advance steadily, if that is
-    known (``rigidsim.model.observables.steadiness``), and are followed along the motion elsewhere.
+    known (``rigidsim.model.observables.steadiness``), and are followed along the motion elsewhere. An angle
+    that is undefined is NaN; only of Euler angles in their pole the first keeps the value it had, and the
+    last is what it leaves of the turn that both share.
 
     Attributes:
         dense: whether the samples tell all turns.
@@ -77,8 +83,10 @@ class JoinedAngles:
         self.variables = angles_to_join(system)
         self.columns = [r.first + i for r in self.variables for i in range(r.count)]
         self._system, self._wrapping = system, wrapping
+        self._compiled, self._precision, self._steps = compiled, precision, AngleSteps(self.variables)
         self.dense = not self.variables or not is_sparse(system)
         steady = [] if self.dense else [r for r in self.variables if advances_steadily(system, r)]
+        self._with_poles = [(r, r.poles) for r in self.variables if r.poles is not None]
         self._others = [r for r in self.variables if r not in steady]
         self.sparse = bool(self._others) and not self.dense
         self._followed = FollowedSystem(system)
@@ -125,6 +133,7 @@ class JoinedAngles:
         if lost.any():
             angles = angles.copy()
             angles[lost] = self._zero  # undefined: no direction
+        angles = self._kept_in_poles(known, angles, samples)
         plain, size = angles.astype(np.float64), np.sqrt(squared)
         times, states = samples.times.astype(np.float64), self._followed.states(samples)
         block = _DoubleSamples(times, states, plain, size)
@@ -167,6 +176,35 @@ class JoinedAngles:
                 place += variable.count
         return found
 
+    def _kept_in_poles(self, known: Continuity, angles: np.ndarray, samples: SampleBlock) -> np.ndarray:
+        """Euler angles (n, angles) whose first one keeps its value where it is undefined."""
+        if known.wrapped_from == -math.inf:  # apart from the samples
+            return angles
+        for number, (variable, poles) in enumerate(self._with_poles):
+            first = int(self._columns_of([variable])[0])
+            plain = angles[:, first : first + 3].astype(np.float64)
+            side, factor = at_poles(poles.sequence, plain[:, 1])
+            if not (factor < _LOOKED_AT).any():
+                continue
+            squares = evaluate_rows(self._squared_factors, samples.states, times=samples.times)
+            lost = np.asarray(squares[number].astype(np.float64) < self._least)
+            latest = np.maximum.accumulate(np.where(lost, -1, np.arange(len(lost))))
+            begun = math.nan if known.last_angles is None else known.last_angles[first]
+            kept = np.where(latest < 0, begun, plain[latest, 0])
+            angles = angles.copy()
+            for row in np.flatnonzero(lost & np.isfinite(kept) & (kept != plain[:, 0])):
+                value = self._precision.of_double(kept[row])
+                moved = value - angles[row, first]
+                angles[row, first] = value
+                angles[row, first + 2] = angles[row, first + 2] - side[row] * moved
+        return angles
+
+    @cached_property
+    def _squared_factors(self) -> CompiledFunction:
+        """Squared factors that vanish in the poles, compiled once a sample comes near one."""
+        squares = [poles.squared_factor for _, poles in self._with_poles]
+        return interruptible(lambda: self._compiled(squares))
+
     def _columns_of(self, variables: Sequence[Recorded]) -> np.ndarray:
         """Columns of the variables' angles among the joined ones."""
         all_of = np.arange(len(self.columns))
@@ -191,10 +229,10 @@ class JoinedAngles:
         """
         before = block.angles[0] if known.last_angles is None else known.last_angles
         angles = np.vstack([before, block.angles])
-        made = -np.rint(np.diff(angles, axis=0) / (2 * np.pi)).astype(np.int64)
+        jumps = self._steps.jumps(angles)
+        made = np.rint((jumps - np.diff(angles, axis=0)) / (2 * np.pi)).astype(np.int64)
         if self._counter is None:
             return made
-        jumps = nearest(np.diff(angles, axis=0))
         for row in self._doubtful(jumps, angles, block.sizes):
             latest = block.place(row - 1) if row else _latest(known)
             if latest is not None:
