@@ -104,7 +104,7 @@ def plan_model(
         scaling = choose_scaling(scene, like.scaling.drive)
     elif scaling is None:
         unknown = [load for load in loads if load.amplitude(scene) is None]
-        refuse_undefined_angles(scene)
+        refuse_undefined_angles(scene, loads)
         refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if requirements.canonical or plane is not None:

@@ -21,8 +21,9 @@ from rigidsim.model.load import Load, force_terms, torque_terms
 from rigidsim.model.load_estimate import probe, start_of
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.outputs import Invariant, Recorded
+from rigidsim.model.planar import NotPlanar, plane_of
 from rigidsim.model.state_selection import Requirements
-from rigidsim.scene.attitude import rotation_matrix
+from rigidsim.scene.attitude import AXES, rotation_matrix
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
 from rigidsim.scene.rotations import pole_side
 from rigidsim.scene.scene import Scene
@@ -80,15 +81,19 @@ def refuse_out_of_range(
                 raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")
 
 
-def refuse_undefined_angles(scene: Scene) -> None:
-    """Refuse loads that read Euler angles where these are undefined at the start, or have a kink.
+def refuse_undefined_angles(scene: Scene, loads: Sequence[Load]) -> None:
+    """Refuse loads that read Euler angles where these are undefined at the start, or have a kink, unless the
+    body stays there: then the first one keeps its value.
+
+    Args:
+        loads: all of them.
 
     Raises:
         ConfigError: an expression reads the middle angle, or more than what the outer ones share.
     """
     expressions = [(where, e) for load in scene.loads for where, e in load.formulas()]
     expressions = [(where, e) for where, e in expressions if names_used(e) & set(_EULER)]
-    if not expressions or not starts_in_pole(scene):
+    if not expressions or not starts_in_pole(scene) or _stays_in_pole(scene, loads):
         return
     sequence = scene.config.integrator.euler_sequence
     states, side = random_states(scene), pole_side(sequence, rotation_matrix(scene.quaternion))
@@ -106,6 +111,16 @@ def refuse_undefined_angles(scene: Scene) -> None:
     ]
     if problems:
         raise ConfigError(problems)
+
+
+def _stays_in_pole(scene: Scene, loads: Sequence[Load]) -> bool:
+    """Whether a motion that starts in a pole only turns about the axis that the outer angles share."""
+    try:
+        axis = plane_of(scene, loads).axis
+    except NotPlanar:
+        return False
+    last = scene.config.integrator.euler_sequence[2]
+    return all(x == 0 for name, x in zip(AXES, axis, strict=True) if name != last)
 
 
 def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> None:

@@ -72,6 +72,8 @@ def bounds_of_sparse_series(sizes: np.ndarray) -> np.ndarray:
 
 
 def _bound(sizes: list[float]) -> float:
+    if not all(map(math.isfinite, sizes)):  # next to a pole of Euler angles: this chart is left
+        return math.inf
     order, base = len(sizes) - 1, max(sizes[0], 1.0)  # the engine's errors are absolute below 1
 
     def radius(term: int) -> float:
