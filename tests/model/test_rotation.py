@@ -180,7 +180,7 @@ def test_the_label_is_what_is_recorded_in_all_hemispheres() -> None:
     """Starts with the momentum above and below the reference plane and the figure's equator."""
     random = np.random.default_rng(3)
     labels = set()
-    for n in range(64):
+    for n in range(50):
         moments = [*random.uniform(0.9, 1.1, 2).tolist(), 1.6]  # turns about z or opposite to it
         rates = [*random.uniform(-0.4, 0.4, 2).tolist(), float(random.choice([-1.0, 1.0]))]
         q, normal = random.normal(size=4), random.normal(size=3)

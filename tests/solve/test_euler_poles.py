@@ -153,9 +153,13 @@ def test_loads_of_an_angle_that_is_undefined_at_the_start_are_refused() -> None:
 TILTS = ["0", "0", "1e-30", "1e-18", "1e-16", "1e-15", "1e-14", "1e-12", "1e-9", "1e-6", "1e-3", "0.01"]
 
 
+CHEAP = ["single", "double", "quadruple", "40"]  # to compile
+
+
 def relative(n: int, chance: random.Random) -> tuple[str, str, str]:
     """A scene that starts at or near a pole: its text, sequence and precision."""
-    sequence, precision = EULER_SEQUENCES[n % 12], list(BITS)[n % 5]
+    sequence = EULER_SEQUENCES[n % 12]
+    precision = "extended" if n % 13 == 4 else chance.choice(CHEAP)
     carried = ("quaternion", "rotation_matrix", "euler_angles", "planar", "closed_form", "canonical")[
         (n + n // 12) % 6
     ]
@@ -183,7 +187,7 @@ def relative(n: int, chance: random.Random) -> tuple[str, str, str]:
 @pytest.mark.slow
 def test_angles_mean_the_quaternion_in_every_sequence_formulation_and_precision() -> None:
     chance = random.Random(25)
-    for n in range(60):
+    for n in range(52):
         text, sequence, precision = relative(n, chance)
         found = run_text(text, f'name="p{n}"').dataset
         assert worst_error(found, sequence, BITS[precision]) <= 1, text
