@@ -16,7 +16,7 @@ from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.paired_products import pairs_products
 from rigidsim.model.planar import PlaneOfMotion, asked_plane, gradient_plane
-from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits, refuse_undefined_angles
+from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
 from rigidsim.scene.moments import happens_at_a_moment
@@ -104,7 +104,6 @@ def plan_model(
         scaling = choose_scaling(scene, like.scaling.drive)
     elif scaling is None:
         unknown = [load for load in loads if load.amplitude(scene) is None]
-        refuse_undefined_angles(scene, loads)
         refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if requirements.canonical or plane is not None:

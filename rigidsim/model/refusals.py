@@ -15,20 +15,13 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.euler_poles import starts_in_pole
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load, force_terms, torque_terms
 from rigidsim.model.load_estimate import probe, start_of
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.outputs import Invariant, Recorded
-from rigidsim.model.planar import NotPlanar, plane_of
 from rigidsim.model.state_selection import Requirements
-from rigidsim.scene.attitude import AXES, rotation_matrix
-from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
-from rigidsim.scene.rotations import pole_side
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.surfaces import changes, random_states
-from rigidsim.scene.validation_messages import shown
 
 _LARGEST_EXPONENT = 1000
 """Largest binary exponent of a recorded variable in SI: float64 ends at 2^1024, and sizes are known only
@@ -38,7 +31,7 @@ _SAME_BODY = 1e-3
 """Relative difference of gravitational parameters below which two sources are taken to be one."""
 _STATES = 16
 _NOISE = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
-_QUATERNION, _EULER = ATTITUDE_NAMES[:4], ATTITUDE_NAMES[4:]
+_QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 def refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
@@ -79,48 +72,6 @@ def refuse_out_of_range(
         for exponent in variable.exponents:
             if abs(exponent) > _LARGEST_EXPONENT:
                 raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")
-
-
-def refuse_undefined_angles(scene: Scene, loads: Sequence[Load]) -> None:
-    """Refuse loads that read Euler angles where these are undefined at the start, or have a kink, unless the
-    body stays there: then the first one keeps its value.
-
-    Args:
-        loads: all of them.
-
-    Raises:
-        ConfigError: an expression reads the middle angle, or more than what the outer ones share.
-    """
-    expressions = [(where, e) for load in scene.loads for where, e in load.formulas()]
-    expressions = [(where, e) for where, e in expressions if names_used(e) & set(_EULER)]
-    if not expressions or not starts_in_pole(scene) or _stays_in_pole(scene, loads):
-        return
-    sequence = scene.config.integrator.euler_sequence
-    states, side = random_states(scene), pole_side(sequence, rotation_matrix(scene.quaternion))
-    shared = "phi + psi" if side > 0 else "phi - psi"
-    moved = {"phi": lambda x: x + 1, "psi": lambda x: x - 1 if side > 0 else x + 1}
-    what = (
-        f"the motion starts in the singularity of {sequence}, where the middle angle theta has a kink and of "
-        f"the outer ones only {shared} is defined; write it with qw, qx, qy, qz, or choose another "
-        "euler_sequence or start"
-    )
-    problems = [
-        Problem(where, f"given {shown(expression.text)}, but {what}")
-        for where, expression in expressions
-        if "theta" in names_used(expression) or changes(expression, states, moved, scene.context)
-    ]
-    if problems:
-        raise ConfigError(problems)
-
-
-def _stays_in_pole(scene: Scene, loads: Sequence[Load]) -> bool:
-    """Whether a motion that starts in a pole only turns about the axis that the outer angles share."""
-    try:
-        axis = plane_of(scene, loads).axis
-    except NotPlanar:
-        return False
-    last = scene.config.integrator.euler_sequence[2]
-    return all(x == 0 for name, x in zip(AXES, axis, strict=True) if name != last)
 
 
 def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> None:

@@ -537,7 +537,7 @@ READERS = {
     "torque": [
         'kind = "torque"\ncomponents = ["1", "0", "0"]\nframe = "space"',
         'kind = "torque"\ncomponents = ["qw*qx", "0", "0"]',
-        'kind = "torque"\ncomponents = ["cos(phi + psi)", "0", "0"]',
+        'kind = "torque"\ncomponents = ["cos(psi)", "0", "0"]',
     ],
     "force": ['kind = "force"\ncomponents = ["1", "0", "0"]\npoint = [1, 0, 0]'],
     "gravity_gradient": [gradient(1.0, {"semi_major_axis": 1.0}), fixed_source(1.0, [1, 2, 3])],

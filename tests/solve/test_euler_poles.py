@@ -15,7 +15,6 @@ import pytest
 import xarray
 from support import config, run_text
 
-from rigidsim.errors import ConfigError
 from rigidsim.scene import attitude
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.store.variables import parts_in
@@ -123,31 +122,6 @@ def test_events_see_a_motion_leave_the_pole(expression: str) -> None:
     found = crossings(TUMBLE, expression, "quaternion")
     assert len(found) == 1
     assert np.abs(truth - found[0]).min() < 1e-12
-
-
-def test_loads_of_an_angle_that_is_undefined_at_the_start_are_refused() -> None:
-    load = 'kind = "torque"\ncomponents = [0, "0.1*sin({})", 0]'
-    for read in ("psi", "theta"):
-        with pytest.raises(ConfigError, match=r"only phi \+ psi is defined; write it with qw, qx, qy, qz"):
-            run_text(config(initial=SPIN, loads=load.format(read)))
-    held = config(
-        initial=SPIN, loads='kind = "torque"\ncomponents = [0, 0, "-0.4*psi"]', time="end = 3\nsamples = 7"
-    )  # about z alone, with I_zz = 2.5: psi'' = -0.16 psi, and phi keeps its value
-    turned = run_text(held, 'output.record=["euler_angles"]').dataset
-    np.testing.assert_allclose(
-        turned["euler_angles"].values,
-        np.outer(np.sin(0.4 * turned["time"].values) / 0.4, [0, 0, 1]),
-        rtol=0,
-        atol=1e-14,
-    )
-    text = config(initial=TUMBLE, loads=load.format("phi + psi"), output=RECORD)
-    plain = config(
-        initial=TUMBLE, loads=load.format("2*atan2(qz, qw)"), output=RECORD
-    )  # the same: half the sum is the angle of (qw, qz)
-    sums, halves = (
-        run_text(x, f'name="{n}"').dataset["quaternion"].values for n, x in enumerate((text, plain))
-    )
-    np.testing.assert_allclose(sums, halves, rtol=0, atol=1e-13)
 
 
 TILTS = ["0", "0", "1e-30", "1e-18", "1e-16", "1e-15", "1e-14", "1e-12", "1e-9", "1e-6", "1e-3", "0.01"]
