@@ -78,6 +78,9 @@ def to_heyoka(
             operands = _with_lines(node, operands)
             if len(operands) == 1 and node.operator in _LINEAR:
                 return operands[0]
+            if node.operator == "tanh":  # its own series loses digits on the way from -1, as e^2u
+                twice = LineInTime(2 * operands[0].slope, 2 * operands[0].offset)
+                return 2.0 * hy.sigmoid(literal(node, twice)) - 1.0
             operands = [literal(node, x) if isinstance(x, LineInTime) else x for x in operands]
         if not any(isinstance(operand, hy.expression) for operand in operands):
             return expressions.operate(expression, node, operands, context)

@@ -54,6 +54,7 @@ class Load(SceneLoad):
             where that body is, if this one is at a known place.
         attracting_point: centre (mpf, m, space axes) to which its force always points, or None.
         without_plane: why its source has an orbit, but no known ``plane``.
+        seconds_ahead: by how much the time that it counts in is ahead of the scene's, which rounds it more.
     """
 
     title = "load"
@@ -70,6 +71,7 @@ class Load(SceneLoad):
     gradient_source: GradientSource | None = None
     attracting_point: Vector | None = None
     without_plane: str = ""
+    seconds_ahead: float = 0.0
 
     @property
     def plane(self) -> OrbitPlane | None:

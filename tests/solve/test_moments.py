@@ -85,6 +85,14 @@ def test_pulses_of_a_square_wave_don_t_wander() -> None:
     assert abs(run_text(text).dataset["angular_velocity"].values[-1, 2] - 1) <= 1e-14
 
 
+def test_soft_switches_keep_their_digits() -> None:
+    """tanh near -1, whose own series would amplify a rounding by e^2u within a step."""
+    torque = "(1 - tanh((t - 449)/0.041)^2)/0.041"
+    text = LATE.format(spin=0, torque=torque, end=500, precision="double")
+    gained = run_text(text).dataset["angular_velocity"].values[-1, 2]
+    assert abs(gained - 2) <= 2 * math.sqrt(100) * EPSILON["double"]  # of some hundred steps
+
+
 def test_times_that_matter_to_no_digit_move_no_bit() -> None:
     """An early or wide change needs no second number of the time."""
     for torque, states in (("exp(-((t - 5)/2)^2)", False), ("tanh((t - 500)/0.1)", True)):
@@ -110,3 +118,15 @@ def test_announced_errors_of_late_pulses_and_spikes(family: str) -> None:
         assert found.true <= 10 * found.announced or found.warned or found.gone, found.line
     assert judged >= 50
     assert beyond <= 1
+
+
+@pytest.mark.slow
+def test_announced_errors_of_long_ephemerides() -> None:
+    """Against more digits: the series count from J2000, whatever the scene's epoch, and round that time."""
+    place, beyond = list(FAMILIES).index("long ephemeris"), 0
+    for n in range(12):
+        found = judge(coverage_scene(place + n * len(FAMILIES), seed=1126))
+        assert found.ended in ("finished", "refused")
+        beyond += found.ended == "finished" and found.true > 3 * found.announced
+        assert not found.true > 10 * found.announced or found.warned or found.gone, found.line
+    assert beyond == 0

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidsim.accuracy.estimates.course import Course
 from rigidsim.accuracy.estimates.margins import Margins
+from rigidsim.model.system import System
 from rigidsim.scene.moments import acts_at_moments_alone
 from rigidsim.solve.neighbours.lanes import (
     TIGHT,
@@ -92,6 +93,12 @@ def loose(prepared: InitialValueProblem) -> bool:
     return prepared.effective_tolerance > 2 * float(prepared.precision.epsilon)
 
 
+def plain_pushes(system: System) -> Pushes:
+    """Errors of a step in quaternions or rates at the precision's own tolerance."""
+    ahead = max((load.seconds_ahead for load in system.plan.loads), key=abs, default=0.0)
+    return Pushes(ahead=math.ldexp(ahead, -system.scaling.time))
+
+
 def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
     """Errors of a step.
 
@@ -99,7 +106,7 @@ def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
         stand_in: whether quaternions take the place of the run's states.
     """
     prepared = course.prepared
-    plain, formulation = Pushes(), prepared.system.requirements.formulation
+    plain, formulation = plain_pushes(prepared.system), prepared.system.requirements.formulation
     if prepared.system.stepwise and loose(prepared):
         plain = replace(
             plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)

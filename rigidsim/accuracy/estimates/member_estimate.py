@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigidsim.accuracy.estimates.carriers import plain_pushes
 from rigidsim.accuracy.estimates.growth import UNCERTAIN
 from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
 from rigidsim.scene.records import dataclass
@@ -23,7 +24,6 @@ from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.neighbour_lanes import NeighbourLanes
 from rigidsim.solve.batch.neighbours import Spreads, Starts, follow, note
 from rigidsim.solve.batch.run import BatchBlock
-from rigidsim.solve.neighbours.pushed import Pushes
 
 LOOSE, FINER = 1e-6, 1e-8
 """Tolerances of the lanes: the first for all members; the second, whose steps cost 1.5 times as much, where
@@ -168,8 +168,8 @@ class MemberEstimates:
         margins, lanes = self._margins, self._through(LOOSE)
         lost = math.pi / float(self._prepared.precision.epsilon)
         epsilon = float(self._prepared.precision.epsilon)
-        own = Pushes().own * max(self._prepared.effective_tolerance / epsilon, 1.0)
-        pushes = replace(Pushes(), own=own)
+        plain = plain_pushes(self._prepared.system)
+        pushes = replace(plain, own=plain.own * max(self._prepared.effective_tolerance / epsilon, 1.0))
         spreads = follow(lanes, starts, pushes, lost)
         for tolerance, tighter in ((LOOSE, FINER), (FINER, None)):
             lead = spreads.attitude if lanes.carried else spreads.rates

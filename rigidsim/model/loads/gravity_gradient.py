@@ -160,6 +160,13 @@ class GravityGradient(Load):
         """See ``Load``."""
         return "the series of the Moon alone names none" if self.ephemeris == "moon" else ""
 
+    @property
+    def seconds_ahead(self) -> float:  # type: ignore[override]
+        """Time of the scene's epoch since J2000, in which the series count."""
+        if self.ephemeris is None or self.epoch is None:
+            return 0.0
+        return float(ExactNumber(self.epoch.since_j2000()))
+
     def _source(self, m: Kinematics) -> SourcePosition:
         assert self.ephemeris is not None
         context = m.scene.context

@@ -152,7 +152,8 @@ class _Following:
         begun = self._apart[:, going].copy()
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # neighbours' lasts for the stretch
-        wrong = self._pushes.clock * np.abs(self._time[going]) * self._factor[going] / np.sqrt(expected)
+        late = np.abs(self._time[going] + self._pushes.ahead)
+        wrong = self._pushes.clock * late * self._factor[going] / np.sqrt(expected)
         shifts = np.concatenate([np.zeros((len(going), 1)), wrong[:, None] * clock[0]], axis=1)
         nearby = np.concatenate([np.zeros((states, len(going), 1)), begun], axis=2)
         there, times = self._lanes.onward(

@@ -68,6 +68,7 @@ class Pushes:
         series: truncation error of the series, over its value in these states.
         first: error at the start relative to the state's own size.
         clock: error of the time, for loads that depend on it.
+        ahead: internal time by which the time in which such a load counts is ahead of the scene's.
     """
 
     own: float = 0.4
@@ -75,6 +76,7 @@ class Pushes:
     series: float = 1.0
     first: float = 0.5
     clock: float = 0.3
+    ahead: float = 0.0
 
 
 def _length(vector: np.ndarray) -> float:
@@ -262,7 +264,8 @@ class Neighbours:
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # neighbours' lasts for the stretch
         steps = min(most, self._steps_at_once * _LONGER * (time - self._time) / self._longest)
-        wrong = self._pushes.clock * abs(self._time) * self._factor / math.sqrt(max(steps, 1.0))
+        late = abs(self._time + self._pushes.ahead)
+        wrong = self._pushes.clock * late * self._factor / math.sqrt(max(steps, 1.0))
         shifts = np.concatenate([[0.0], wrong * self._random.standard_normal(NEIGHBOURS)])
         found = self._lanes.advance(states, self._time + shifts, time + shifts, most)
         if found is None or not np.isfinite(found[0]).all() or self.steps > self._most_steps:
