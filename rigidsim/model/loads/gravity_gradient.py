@@ -21,7 +21,6 @@ from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.orbits.ephemeris import SourcePosition, source_position
 from rigidsim.model.plausibility import about_distance, about_orbit, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.spin_plausibility import about_spin
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
@@ -276,6 +275,8 @@ class GravityGradient(Load):
         given = fields.gravitational_parameter
         assert given is not None
         if fields.orbit is not None and self.orbit is not None:
+            from rigidsim.model.spin_plausibility import about_spin  # which other scenes don't need
+
             yield from about_orbit(fields.orbit, self.orbit, given, where, scene)
             yield from about_spin(fields.orbit, self.orbit, given, where, scene)
         elif fields.position is not None:
