@@ -25,6 +25,9 @@ from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.stepper import Stepper
 
+_OF_SERIES = 2.0
+"""Roundings of a series' arguments, which are products with time and sums of several of these, over one."""
+
 
 def same_states(prepared: InitialValueProblem) -> bool:
     """Whether neighbours have the run's states, which they do unless a loose tolerance would run into
@@ -96,7 +99,10 @@ def loose(prepared: InitialValueProblem) -> bool:
 def plain_pushes(system: System) -> Pushes:
     """Errors of a step in quaternions or rates at the precision's own tolerance."""
     ahead = max((load.seconds_ahead for load in system.plan.loads), key=abs, default=0.0)
-    return Pushes(ahead=math.ldexp(ahead, -system.scaling.time))
+    plain = Pushes(ahead=math.ldexp(ahead, -system.scaling.time))
+    if not any(load.wide for load in system.plan.loads):
+        return plain
+    return replace(plain, clock=_OF_SERIES * plain.clock)
 
 
 def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
