@@ -11,7 +11,6 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import span_words, value_text
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.state_names import state_names
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
@@ -152,6 +151,8 @@ class Applied(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``."""
+        from rigidsim.model.load_words import value_text
+
         context, values = scene.context, start_values(scene)
         found = [evaluate(component, values, context) for component in self.components]
         texts = ", ".join(_brief(component.text) for component in self.components)
@@ -163,6 +164,8 @@ class Applied(Load):
 
     def _effect(self, scene: Scene, found: Vector) -> str:
         """What a torque or force of this size at the start would do, in words."""
+        from rigidsim.model.load_words import span_words, value_text
+
         context = scene.context
         turning = found if self.title == "torque" else self._moment(scene, found)
         size, momentum = (

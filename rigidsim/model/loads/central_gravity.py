@@ -11,11 +11,9 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
 from rigidsim.model.loads.gravity_gradient import positive_strength
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.numbers import unit_vectors
-from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ZERO
@@ -203,6 +201,8 @@ class CentralGravity(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``."""
+        from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
+
         context, strength = scene.context, self.gravitational_parameter
         offset, speed = self._relative(scene)
         distance = norm(context, offset)
@@ -217,6 +217,8 @@ class CentralGravity(Load):
 
     def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
         """See ``Load``."""
+        from rigidsim.model.plausibility import about_start, about_strength, attracting
+
         given = fields.gravitational_parameter
         assert given is not None
         assert scene.velocity is not None

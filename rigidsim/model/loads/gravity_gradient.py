@@ -15,11 +15,9 @@ from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
 from rigidsim.model.loads.moving_source import MovingSource
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.orbits.ephemeris import SourcePosition, source_position
-from rigidsim.model.plausibility import about_distance, about_orbit, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
@@ -257,6 +255,8 @@ class GravityGradient(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``."""
+        from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
+
         strength, context = self.gravitational_parameter, scene.context
         if self.orbit is not None:
             where = orbit_text(self.orbit, strength)
@@ -272,6 +272,8 @@ class GravityGradient(Load):
 
     def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
         """See ``Load``."""
+        from rigidsim.model.plausibility import about_distance, about_orbit, about_strength, attracting
+
         given = fields.gravitational_parameter
         assert given is not None
         if fields.orbit is not None and self.orbit is not None:

@@ -13,9 +13,7 @@ from pydantic import Field
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
-from rigidsim.model.load_words import length_text, orbit_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
-from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, dot, negligible, norm
@@ -247,6 +245,9 @@ class MagneticDipole(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``."""
+        from rigidsim.model.load_words import length_text, orbit_text, value_text
+        from rigidsim.model.plausibility import implied_strength
+
         moment = f"magnetic dipole of {value_text(norm(scene.context, self.moment), 'A m^2')}"
         largest = f"torque up to {value_text(self.amplitude(scene) / 2, 'N m')}"
         if self.uniform:
@@ -261,6 +262,8 @@ class MagneticDipole(Load):
 
     def cautions(self, fields: MagneticDipoleFields, where: str, scene: Scene) -> Iterator[Caution]:
         """See ``Load``."""
+        from rigidsim.model.plausibility import about_orbit
+
         if self.orbit is not None and fields.orbit is not None:
             yield from about_orbit(fields.orbit, self.orbit, fields.gravitational_parameter, where, scene)
 

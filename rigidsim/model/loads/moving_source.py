@@ -20,11 +20,9 @@ from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_pair import PointMassPair
-from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
@@ -221,6 +219,8 @@ class MovingSource(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``."""
+        from rigidsim.model.load_words import reach_text, source_text, value_text
+
         name, distance = self.masses.names[self.number], norm(scene.context, self.start(scene)[0])
         kind = "central gravity" if self.pulls else "gravity gradient"
         back = ""
@@ -234,6 +234,8 @@ class MovingSource(Load):
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
         """See ``Load``."""
+        from rigidsim.model.plausibility import about_start, about_strength, attracting
+
         place, moving = self.start(scene)
         given, distance = (
             scene.config.bodies[self.number].gravitational_parameter,

@@ -11,7 +11,6 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import direction_text, value_text
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
@@ -138,6 +137,8 @@ class UniformGravity(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``."""
+        from rigidsim.model.load_words import direction_text, value_text
+
         if all(g == 0 for g in self.acceleration):
             return "uniform gravity of zero"
         size = value_text(norm(scene.context, self.acceleration), "m/s^2", 6)

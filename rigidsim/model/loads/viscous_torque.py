@@ -9,7 +9,6 @@ from pydantic import Field
 from rigidsim.look.readable_time import number_text
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import span_words
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, Triple
 from rigidsim.scene.records import dataclass
@@ -76,6 +75,8 @@ class ViscousTorque(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``; the times are those of the rates about the body axes, moment over coefficient."""
+        from rigidsim.model.load_words import span_words
+
         sizes = ", ".join(number_text(float(c), 4) for c in self.coefficients)
         inertia = scene.body.inertia
         spans = [
