@@ -25,8 +25,8 @@ from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.stepper import Stepper
 
-_OF_SERIES = 2.0
-"""Roundings of a series' arguments, which are products with time and sums of several of these, over one."""
+_OF_SERIES = 4.0
+"""Rounding of the arguments over that of time: multiples, by up to four, of angles that grow with it."""
 
 
 def same_states(prepared: InitialValueProblem) -> bool:
