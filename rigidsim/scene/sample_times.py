@@ -71,7 +71,7 @@ def sample_times(table: schema.Time, context: Any) -> tuple[Any, Any, SampleTime
     """
     ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
     if len(ways) > 1:
-        less = either(f"--set time.{ways[0]}= removes it", f'replace({{"time.{ways[0]}": None}}) removes it')
+        less = either(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")
         allowed = "only one of samples, every, times is allowed: leave the other out"
         raise _fail(ways[1], f"given beside {ways[0]}; {allowed} ({less})")
 
