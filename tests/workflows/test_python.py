@@ -72,7 +72,7 @@ def test_tables_and_experiment_are_the_same_thing() -> None:
 def test_one_way_of_giving_times_takes_the_place_of_another() -> None:
     experiment = Experiment.from_dict(TOP)
     both = experiment.replace(time={"times": [0, 1, 10]})
-    with pytest.raises(rigidsim.ConfigError, match="leave the other out .Experiment.replace removes keys"):
+    with pytest.raises(rigidsim.ConfigError, match=r"leave the other out \(Experiment.replace removes keys"):
         rigidsim.run(both, out=None)
     other = experiment.replace(time={"samples": None, "times": [0, "0.1 s", 1], "end": None})
     assert rigidsim.run(other, out=None).dataset.time.values.tolist() == [0, 0.1, 1]
