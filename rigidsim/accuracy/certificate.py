@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import mpmath
@@ -34,7 +35,6 @@ from rigidsim.accuracy.setting import Setting, setting_of
 from rigidsim.accuracy.trial import Told, Trial, Trials, try_setting
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rigidsim.accuracy.asked import asked_of_attitude, leaves_choice, wanted
 from rigidsim.accuracy.cost import MEASURED, cost
@@ -25,7 +25,6 @@ from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.integrator_table import LARGEST_DIGITS
-from rigidsim.scene.records import dataclass
 
 _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
 """Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from rigidsim.accuracy.setting import Setting
-from rigidsim.scene.records import dataclass
 
 _STEPS: Mapping[str | int, float] = MappingProxyType(
     {"single": 1.25, "double": 1.0, "extended": 9.0, "quadruple": 135.0}

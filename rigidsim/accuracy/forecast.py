@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rigidsim.accuracy.comparison import angles_between, spread_times
 from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
@@ -18,7 +18,6 @@ from rigidsim.accuracy.trial import Told, Trial, Trials
 from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import build_scene
 
 _BASE_TOLERANCE = 1e-8  # of the trial that all other tolerances are first forecast from

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import compactly, trial_scene
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.error_growth import Growth, measure_growth
 from rigidsim.solve.problem import double_twin, prepare_scene
 from rigidsim.solve.sampling import SampleClock

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -19,7 +19,6 @@ import numpy as np
 from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.scene.arithmetic import working_bits
-from rigidsim.scene.records import dataclass
 
 INCOMPARABLE = 0.5
 """Difference (rad) past which all digits are gone."""

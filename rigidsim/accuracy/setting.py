@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from dataclasses import dataclass
 
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.problem import auto_tolerance
 
 

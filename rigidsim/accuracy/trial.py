@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import mpmath
 import numpy as np
@@ -14,7 +14,6 @@ from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import fraction_of
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.assembly import assemble, sampler

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, decompose
@@ -12,7 +13,6 @@ from rigidsim.analysis.refinement import at_nyquist
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from rigidsim.analysis.refinement import (
 )  # fmt: skip
 from rigidsim.analysis.secular import hidden_rate
 from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
-from rigidsim.scene.records import dataclass
 
 _FALSE_ALARM = 1e-5  # chance that noise alone shows a line
 _SEARCH_ORDERS = (3, 1)  # of the window while lines are looked for; the second where some are close

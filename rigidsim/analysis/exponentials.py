@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rigidsim.scene.records import dataclass
 
 Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rigidsim.scene.records import dataclass
 
 _ORDERS = {1: 60, 2: 40, 3: 16, 4: 10, 5: 8, 6: 7}
 """Largest sum of abs(multipliers), by the number of known frequencies; 6 beyond."""

@@ -6,14 +6,13 @@ The steps are computed in double precision, the remainder in the signal's own; s
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rigidsim.analysis.exponentials import Complexes, Grid, Reals, Sum, blocks
 from rigidsim.analysis.windows import hann, moments, positions
-from rigidsim.scene.records import dataclass
 
 _MOST_STEPS = 25
 CLOSEST = 0.6  # bins between lines below which Newton's method can't tell them apart

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.analysis.labels import Known, Label
-from rigidsim.scene.records import dataclass
 from rigidsim.store.variables import part_name
 
 if TYPE_CHECKING:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import mpmath
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from rigidsim.analysis.refinement import SignalSamples
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.records import dataclass
 from rigidsim.store.variables import parts_in
 
 if TYPE_CHECKING:

@@ -7,12 +7,11 @@ that is p + 1 bins wide on either side.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rigidsim.scene.records import dataclass
 
 Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -10,7 +10,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rigidsim.cli.commands import COMMANDS
-from rigidsim.cli.plain_run import plain
 
 if TYPE_CHECKING:
     import typer
@@ -26,25 +25,10 @@ def main() -> None:
     # pydantic would read the metadata of every installed package to find plugins that nothing here uses
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     named = sys.argv[1:2]
-    usual = plain(sys.argv[1:])
     try:
-        if usual is not None:
-            sys.exit(_run(usual))
         program(named if set(named) <= set(COMMANDS) and named else COMMANDS)(prog_name="rigidsim")
     finally:
         gc.freeze()  # the rest is freed with the process and needn't be searched for garbage
-
-
-def _run(arguments: dict[str, Any]) -> int:
-    """Execute a plain ``rigidsim run``; returns its exit code."""
-    from rigidsim.cli.ending import exit_code
-
-    def command() -> int:
-        from rigidsim.cli.running import run_all
-
-        return run_all(**arguments)
-
-    return exit_code(command)
 
 
 def program(names: Iterable[str] = COMMANDS) -> typer.Typer:

@@ -1,18 +1,10 @@
-"""End of a command and of its process: the exit code in every case, and no traceback for errors users are
-told.
-
-Python takes its modules apart before its process ends, and the libraries theirs: a twelfth of a short run's
-time, for memory that goes back with the process anyway. So the process is left at once, after what programs
-rely on: everything printed is written out, and what registered with ``atexit`` is called.
-"""
+"""End of a command: its exit code in every case, and no traceback for errors that users are told."""
 
 from __future__ import annotations
 
-import atexit
 import os
 import signal
 import sys
-import threading
 from collections.abc import Callable
 
 from rigidsim.errors import RigidsimError
@@ -49,41 +41,12 @@ def exit_code(command: Callable[[], int]) -> int:
 
 
 def _leave_builds(code: int) -> None:
-    """End the process at once if something is still being compiled, which can neither be waited for (it may
-    take seconds) nor go on while libraries are unloaded.
+    """End the process at once if something is still being compiled: it can't be waited for (it may take
+    seconds, and Ctrl-C promises half a second), and the usual way of ending would unload the compiler's own
+    library beneath it.
     """
     threads = sys.modules.get("rigidsim.solve.building")  # not loaded, nothing was compiled
     if threads is not None and threads.building():
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
-
-
-def left_at_once(program: Callable[[], None]) -> None:
-    """Run a program and end the process with its exit code; in the usual way if other threads are running.
-
-    Raises:
-        SystemExit: the usual way.
-    """
-    try:
-        program()
-    except SystemExit as ended:
-        code = 0 if ended.code is None else ended.code
-        if not isinstance(code, int) or threading.active_count() > 1:
-            raise
-        if not _written_out():
-            raise
-        atexit._run_exitfuncs()
-        _written_out()
-        os._exit(code)
-
-
-def _written_out() -> bool:
-    """Whether everything printed was written out; not to a pipe that nobody reads, which Python reports."""
-    try:
-        for stream in (sys.stdout, sys.stderr):
-            if stream is not None:
-                stream.flush()
-    except (OSError, ValueError):
-        return False
-    return True

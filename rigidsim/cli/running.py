@@ -1,4 +1,4 @@
-"""Execution of ``rigidsim run``, once its arguments are read."""
+"""Execution of ``rigidsim run``."""
 
 from __future__ import annotations
 

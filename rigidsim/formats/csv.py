@@ -8,6 +8,7 @@ reads it as float64 (which rounds numbers beyond double to the nearest one); ``d
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
@@ -18,7 +19,6 @@ from rigidsim.formats.naming import named_epoch
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.epochs import DIGITS, Epoch
-from rigidsim.scene.records import dataclass
 
 
 def write_csv(table: Table, path: Path, source: TableSource) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,6 @@ import xarray
 from rigidsim.formats.angles import converted
 from rigidsim.formats.tables import BLOCK_NUMBERS, Table, TableColumn, columns_of
 from rigidsim.look.angle_units import AngleUnit
-from rigidsim.scene.records import dataclass
 from rigidsim.store.sweeps.dataset import boxes
 
 MEMBER = "member"

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from decimal import Context, Decimal, localcontext
 from typing import Any, get_args
 
@@ -16,7 +17,6 @@ from rigidsim.errors import RigidsimError
 from rigidsim.scene.arithmetic import apply
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.rotations import AXES, Rotations, product
 from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
 from rigidsim.scene.validation_messages import nearest, shown

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,6 @@ from rigidsim.formats import FORMATS
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.tables import Table
 from rigidsim.look.angle_units import AngleUnit
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ beyond double.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -16,7 +17,6 @@ import xarray
 
 from rigidsim.formats.angles import RADIAN, converted
 from rigidsim.look.angle_units import AngleUnit
-from rigidsim.scene.records import dataclass
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.variables import LABELS, parts_in
 

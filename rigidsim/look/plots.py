@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from rigidsim.look.angle_units import angle_unit
 from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
 from rigidsim.look.si_prefixes import si_scale
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene.epochs import J2000, Epoch, parse_epoch
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.units import time_unit
 
 if TYPE_CHECKING:

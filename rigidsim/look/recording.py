@@ -6,11 +6,11 @@ import errno
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rigidsim.look.page import legible
-from rigidsim.scene.records import dataclass
 
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
 STRETCH = 16 * CHUNK  # rows that are made ready for rerun at once: what a call costs is shared by them

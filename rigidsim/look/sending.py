@@ -9,12 +9,12 @@ Imports rerun when it is loaded, so load it only where a timeline is written.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import pyarrow as pa
 import rerun as rr
 
 from rigidsim.look.recording import CHUNK
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

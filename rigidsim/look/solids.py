@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from rigidsim.scene import rotations
 from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Outline, Revolved, StraightPiece
 from rigidsim.scene.bodies.shapes import SHAPES
-from rigidsim.scene.records import dataclass
 
 Array = NDArray[np.float64]
 

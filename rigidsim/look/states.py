@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 from rigidsim.look import signals
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table

@@ -9,13 +9,13 @@ older versions have none.
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene.known_bodies import KNOWN, known_body
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table

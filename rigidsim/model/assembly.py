@@ -21,7 +21,6 @@ from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.needs import work_is_needed
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.paired_products import paired_rates, paired_states
 from rigidsim.model.planar import SPIN, PlanarStates, planar_states, spin_equation
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
@@ -123,10 +122,6 @@ def _attitude(
         return None
     if formulation == "euler_angles":
         return euler_states(scene, rates, sequence)
-    if plan.paired:
-        (load,) = plan.loads
-        assert load.gradient_source is not None
-        return paired_states(scene, rates, load.gradient_source, plan.scaling, number)
     if plan.frame_orbit is not None:
         unit = scene.context.ldexp(scene.context.one, plan.scaling.time)
         return orbital_states(scene, rates, plan.frame_orbit, plan.orbit_tags[plan.frame_orbit], unit, number)
@@ -165,14 +160,10 @@ def _rotation_blocks(m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
         for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
     ]
     exponents = [e - scaling.time for e in scaling.rates]
-    derivatives = paired_rates(m) if plan.paired else rate_equations(m, m.torque)
-    blocks = [StateBlock(RATES, derivatives, initial, exponents=exponents, why=why["rates"])]
+    blocks = [StateBlock(RATES, rate_equations(m, m.torque), initial, exponents=exponents, why=why["rates"])]
     if m.attitude is not None:
         reason = why["attitude"]
-        if plan.paired:
-            reason += "; as two axes of the frame that turns with the orbit, seen from the body: at a loose "
-            reason += "tolerance, since that takes half the products"
-        elif m.attitude.orbital is not None:
+        if m.attitude.orbital is not None:
             reason += "; relative to the frame that turns with the orbit, where the gradient takes a third "
             reason += "fewer products"
         blocks.append(StateBlock(m.attitude.names, m.attitude.derivatives, m.attitude.initial, why=reason))

@@ -7,6 +7,7 @@ It serves every load with a potential, one that moves with an orbit included.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -20,7 +21,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, dot, multiply, negligible
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 MOMENTA = ["p_phi", "p_theta", "p_psi"]

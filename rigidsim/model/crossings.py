@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_names import state_names
-from rigidsim.scene.records import dataclass
 
 _SIGNS = {"any": 0, "up": 1, "down": -1}
 

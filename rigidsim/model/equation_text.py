@@ -10,12 +10,11 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from decimal import Context, Decimal
 from typing import Any, TypeAlias
 
 import heyoka as hy
-
-from rigidsim.scene.records import dataclass
 
 Node: TypeAlias = "str | Decimal | Call"
 

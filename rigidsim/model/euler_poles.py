@@ -13,6 +13,7 @@ of the sample before (``rigidsim.solve.turns.joined``).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -23,7 +24,6 @@ from rigidsim.model.rotations import Symbolic, constant
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import working_epsilon
 from rigidsim.scene.attitude import AXES, parity
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.rotations import outer_angles, pole_side, shared_turn
 from rigidsim.scene.scene import Scene
 

@@ -10,6 +10,7 @@ symmetry and e2 = e3 x e1, with g the vertical seen from the body and k = M g l 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -18,7 +19,6 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm, transpose
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ and Euler angles as expressions of its states.
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import heyoka as hy
@@ -16,7 +16,6 @@ from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import dot
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 

@@ -1,7 +1,8 @@
-"""The source of a gravity gradient, as averages and paired-product equations use it."""
+"""The source of a gravity gradient, as averages use it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE
@@ -10,7 +11,6 @@ from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ One object serves all of them, in internal units; what a scene doesn't carry is 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -24,7 +24,6 @@ from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.expressions.tree import Node
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
 from rigidsim.scene.tracing.numbers import largest_of

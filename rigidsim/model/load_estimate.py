@@ -10,6 +10,7 @@ two, and never enters the equations.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import heyoka as hy
@@ -29,7 +30,6 @@ from rigidsim.model.state_selection import Requirements
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +14,6 @@ from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.scaling import exponent
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.tracing.numbers import largest_of
 
 

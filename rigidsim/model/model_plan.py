@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from rigidsim.errors import ConfigError, Problem
@@ -14,7 +14,6 @@ from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
-from rigidsim.model.paired_products import pairs_products
 from rigidsim.model.planar import PlaneOfMotion, asked_plane, gradient_plane
 from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, choose_scaling
@@ -22,7 +21,6 @@ from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirem
 from rigidsim.scene.moments import happens_at_a_moment
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces, surfaces_of
 
@@ -39,7 +37,6 @@ class ModelPlan:
         loads: all that act, with the uniform fields combined into one.
         orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
         frame_orbit: orbit in whose frame the attitude is carried; None if it is carried in space axes.
-        paired: whether the equations are those of ``rigidsim.model.paired_products``.
         surfaces: switching surfaces on which the equations change.
         plane: plane that the motion stays in, if the formulation is planar.
         tables: positions of the states and parameters of tabulated orbits.
@@ -54,7 +51,6 @@ class ModelPlan:
     numbers: ScaledNumbers
     orbit_tags: Mapping[KeplerOrbit, str]
     frame_orbit: KeplerOrbit | None
-    paired: bool
     surfaces: Surfaces
     plane: PlaneOfMotion | None = None
     tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
@@ -126,7 +122,6 @@ def plan_model(
         numbers,
         tags,
         orbit,
-        pairs_products(scene, loads, orbit, scaling, numbers),
         surfaces,
         plane,
         tables,
@@ -176,7 +171,6 @@ def _averaged(scene: Scene, loads: Sequence[Load], along: Average | None) -> Mod
         scaled_numbers(scene, scaling),
         _orbit_tags(scene),
         None,
-        False,
         surfaces_of(scene),
         tables=_tables(scene, average.longitude),
         average=average,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from rigidsim.model import central_forces, fixed_axes
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
@@ -12,7 +13,6 @@ from rigidsim.model.frames.rotating import rotating_orbit
 from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.scene.arithmetic import negligible
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 

@@ -6,11 +6,11 @@ Every coefficient is worked out in the scene's arithmetic (mpmath with guard bit
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene.arithmetic import Matrix, Vector, norm
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 Rounder = Callable[[Any], Any]

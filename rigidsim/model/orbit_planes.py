@@ -8,6 +8,7 @@ Wallace & Chapront 2003 (A&A 412, 567: the precession of the ecliptic of IAU 200
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -19,7 +20,6 @@ from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _CENTURY = 36525 * 86400

@@ -5,7 +5,7 @@ watched.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import heyoka as hy
@@ -17,7 +17,6 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables import Observable, Steady
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import OBSERVABLES
 
 

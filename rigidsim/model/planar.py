@@ -13,6 +13,7 @@ and the stability of a body that is pushed out of the plane isn't examined.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -26,7 +27,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 ANGLE, SPIN = "angle", "spin"

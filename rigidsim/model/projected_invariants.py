@@ -8,6 +8,7 @@ squared, since a root has no gradient where it vanishes.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -16,7 +17,6 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ are therefore measured in a unit of their own; results are multiplied back, exac
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
 from rigidsim.scene.arithmetic import dot, norm
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import Traced, largest_of, smallest_of
 from rigidsim.scene.tracing.whole import binary_exponent

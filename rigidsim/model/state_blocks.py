@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

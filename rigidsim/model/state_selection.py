@@ -6,14 +6,13 @@ It starts from what is recorded and what the loads read, and adds a state only i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load
 from rigidsim.model.needs import NEEDS
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 

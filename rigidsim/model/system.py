@@ -17,7 +17,6 @@ from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
-from rigidsim.model.paired_products import even_order
 from rigidsim.model.refusals import refuse_out_of_range, refuse_singular_start
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling, largest_rates
@@ -106,10 +105,6 @@ class System:
     def wide(self) -> bool:
         """Whether the equations are too long to be compiled unrolled."""
         return self.plan.wide
-
-    def series_tolerance(self, tolerance: float) -> float:
-        """Tolerance handed to the engine, which determines the order of the Taylor series."""
-        return even_order(tolerance)[0] if self.plan.paired else tolerance
 
     @cached_property
     def rate_bound(self) -> Any:

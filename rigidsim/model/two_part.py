@@ -11,12 +11,12 @@ as many digits again as the working precision has, and what is rounded is the pr
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.scene.arithmetic import negligible
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

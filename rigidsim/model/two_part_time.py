@@ -10,6 +10,7 @@ whose first difference is exact near c: the closer to the moment, the smaller is
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -18,7 +19,6 @@ from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.expressions.lines import LineInTime
-from rigidsim.scene.records import dataclass
 
 _MOST_PARTS = 64  # doubles in a number of any precision that is in use
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ from rigidsim.scene.bodies.table import POINT_OR_NAME
 from rigidsim.scene.frame_table import PLANE_OR_NORMAL
 from rigidsim.scene.overrides import FLAG, apply_overrides, written
 from rigidsim.scene.python_values import assignments_of, toml_text
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
 from rigidsim.scene.table_files import table_sections

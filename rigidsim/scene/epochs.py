@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_right
+from dataclasses import dataclass
 from datetime import date, datetime
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 from importlib.resources import files
-
-from rigidsim.scene.records import dataclass
 
 DIGITS = 14
 """Decimals of a second that an instant resolves."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
@@ -12,7 +14,6 @@ from rigidsim.scene.expressions.tree import (
     ExpressionError,
     names_used,
 )
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.schema import Config
 
 

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from functools import cache
 from typing import Any
 
 from rigidsim.scene import units
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.validation_messages import shown
 
 # Far past any physical quantity and any precision, and still quick to expand into integers.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 from pydantic import (
@@ -18,7 +19,6 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.units import UnitError, time_unit
 from rigidsim.scene.validation_messages import shown
 

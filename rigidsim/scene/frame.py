@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import schema
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.bodies.body import RigidBody
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.tracing.numbers import largest_of
 
 ORBIT = "orbit"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigidsim.scene.records import dataclass
+from dataclasses import dataclass
 
 _ALIKE = 0.01
 """Relative difference up to which a gravitational parameter is that of a known body: for what is written in

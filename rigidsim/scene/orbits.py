@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic import Field, StrictStr
@@ -9,7 +10,6 @@ from pydantic import Field, StrictStr
 from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
 from rigidsim.scene.kepler import eccentric_anomaly
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.validation_messages import nearest
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.point_mass_table import PointMassBody, StartingOrbit
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.validation_messages import nearest, shown
 
 GRAVITATIONAL_CONSTANT = "6.67430e-11"

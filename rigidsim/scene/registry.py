@@ -7,7 +7,7 @@ that a config, a schema or a message never needs a second list of names.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 from rigidsim.errors import ConfigError, Problem
@@ -17,7 +17,6 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.fields import ConfigTable
 from rigidsim.scene.point_masses import PointMasses
-from rigidsim.scene.records import dataclass
 
 
 class LoadFields(ConfigTable):

@@ -8,12 +8,12 @@ by hand. Every sum is taken in the order in which it stands here: results depend
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import reduce
 from operator import add
 from typing import Any, TypeAlias
 
 from rigidsim.scene.arithmetic import Matrix, Vector, transpose
-from rigidsim.scene.records import dataclass
 
 AXES = "xyz"
 Scalar: TypeAlias = Any  # whatever has +, -, * and /

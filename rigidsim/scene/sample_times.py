@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
@@ -11,7 +12,6 @@ from typing import Any
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene import schema
 from rigidsim.scene.exact import rounded
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.validation_messages import shown
 
 _MOST_SAMPLES = 10**12

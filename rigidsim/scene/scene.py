@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
@@ -14,7 +15,6 @@ from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 

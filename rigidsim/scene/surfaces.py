@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from rigidsim.scene.expressions.tree import (
@@ -22,7 +22,6 @@ from rigidsim.scene.expressions.tree import (
     names_used,
 )
 from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _STATES = 4  # states at which expressions are compared; two that agree at all of them count as equal

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.model_table import FULL, REDUCED
-from rigidsim.scene.records import dataclass
 from rigidsim.session.tuning import AdviceLimits
 from rigidsim.solve.problem import InitialValueProblem, prepare
 

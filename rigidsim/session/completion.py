@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rigidsim.errors import VIEW, StoppedWritingError
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.schema import Output
 from rigidsim.session.attributes import of_complete
 from rigidsim.session.guards import Observer

@@ -8,13 +8,13 @@ sample alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
 
 from rigidsim.scene.epochs import J2000, Epoch, leap_seconds, parse_epoch
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.store.variables import Variable
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rigidsim.accuracy.estimates.growth import UNCERTAIN
 from rigidsim.look.readable_time import TimeWords, span_text
-from rigidsim.scene.records import dataclass
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.tuning import AdviceLimits
 from rigidsim.session.understood import time_words

@@ -6,13 +6,12 @@ Everything here works on blocks of many members at once and on samples alone, wh
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from rigidsim.model.tangents import GROWTH
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.indicators import indicators
 from rigidsim.store.variables import Variable, part_name
 

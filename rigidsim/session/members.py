@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, RigidsimError
-from rigidsim.scene.records import dataclass
 from rigidsim.session.kept import (
     ALWAYS,
     Kept,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from rigidsim.scene.records import dataclass
 from rigidsim.session.attributes import of_complete, root_attributes
 from rigidsim.session.completion import Completion
 from rigidsim.session.diagnostics import Diagnostics

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import os
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigidsim.errors import RunFolderError
-from rigidsim.scene.records import dataclass
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.problem import InitialValueProblem
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from rigidsim.scene.records import dataclass
 from rigidsim.store.summary_parts import ENGINE
 
 NOT_KEPT = "attempts_not_kept"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
 
-from rigidsim.scene.records import dataclass
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import WarningCode
 

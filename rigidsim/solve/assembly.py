@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
-from rigidsim.solve.corrected_stepper import STRIDE, STRIDE_OF_PAIRED, CorrectedStepper
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import IntegrationLoop
@@ -43,12 +42,11 @@ class Assembly:
     evaluator: Evaluator
 
 
-def assemble(prepared: InitialValueProblem, *, stride: int | None = None) -> Assembly:
+def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
     """Compile everything that a prepared scene needs to run from its start; Ctrl-C is heeded meanwhile.
 
     Args:
-        stride: largest number of natural steps between corrections (``CorrectedStepper``); None for that of
-            the equations.
+        stride: largest number of natural steps between corrections (``CorrectedStepper``).
 
     Raises:
         ConfigError: invariants are to be projected but there are none.
@@ -56,9 +54,7 @@ def assemble(prepared: InitialValueProblem, *, stride: int | None = None) -> Ass
     return interruptible(lambda: _assembled(prepared, stride))
 
 
-def _assembled(prepared: InitialValueProblem, stride: int | None) -> Assembly:
-    if stride is None:
-        stride = STRIDE_OF_PAIRED if prepared.system.plan.paired else STRIDE
+def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context, system.angle_unit)
     log = EventLog([c.stop for c in system.crossings], wrapping)

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.turns.joined import Continuity
 

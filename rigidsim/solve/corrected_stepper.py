@@ -13,10 +13,10 @@ grid output, which starts at such a time only. The move back to it is a step of 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import STEPS_BETWEEN, AngleState, AngleWrapping
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.charts import Charts
@@ -29,11 +29,6 @@ from rigidsim.solve.trail import Waypoints
 STRIDE = 1024
 """Natural steps between corrections if only time is corrected: half a millisecond, so that the calls cost
 less than a hundredth of it.
-"""
-
-STRIDE_OF_PAIRED = 4096
-"""The same for paired products (``rigidsim.model.paired_products``), whose steps take a third of that. A stop
-takes 25 us there: so many steps drive Python's code out of the processor's first cache.
 """
 
 _NOTHING = np.zeros(0)

@@ -8,11 +8,11 @@ summary that knew only the law would promise digits that aren't there.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.steppers import stepper_of
 

@@ -8,14 +8,13 @@ too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import StoppedError
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleState, AngleWrapping
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import TaylorEngine

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import heyoka as hy
 import numpy as np
@@ -21,7 +21,6 @@ import numpy as np
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.model.tangents import moving_names, own_names
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth

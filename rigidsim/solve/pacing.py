@@ -22,9 +22,9 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
 from enum import Enum
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sampling import SampleClock

@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
 import heyoka as hy
@@ -21,7 +22,6 @@ from mpmath.libmp import mpf_pos, round_nearest
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import working_bits
-from rigidsim.scene.records import dataclass
 
 _CHUNK_BITS = 24  # exact in every type
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,6 @@ from rigidsim.model.system import System, build_system
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.model_table import AUTO
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
@@ -186,11 +185,11 @@ def prepare_scene(
 
 def _is_worth_holding(system: System) -> bool:
     """Whether ``hold_invariants = "auto"`` has any effect: not if nothing physical is conserved, nor if steps
-    end on switching surfaces, nor with equations made for loose tolerances.
+    end on switching surfaces.
     """
     if system.plan.average is not None:  # whose norm is no invariant that its rate would depend on
         return False
-    if system.switches or system.plan.paired:
+    if system.switches:
         return False
     return conserves(system)
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleState
 
 _NOTHING = np.zeros(0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.sample_block import SampleBlock

@@ -9,13 +9,13 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.engine import TaylorEngine
@@ -126,8 +126,7 @@ class Stepper:
         instance from rest. It must stand at its start.
         """
         engine, muted = self._integrator, self.log.muted
-        # steps taken one by one are seen to there; paired products have no gaps of more than one term
-        if self.single_steps or self.system.plan.paired:
+        if self.single_steps:  # which are seen to one by one
             return
         time, state = engine.dtime, np.array(engine.state)
         self.log.muted = True
@@ -147,9 +146,6 @@ class Stepper:
         options["compact_mode"] = self.precision.compact or system.wide
         if self._tolerance is not None:
             options["tol"] = self._tolerance
-            if system.plan.paired:
-                eased = system.series_tolerance(float(self._tolerance))
-                options["tol"] = self.precision.number(system.scene.context.mpf(eased))
         initial = self.precision.array(system.initial)
         if not self.has_events:
             return compiled_engine(system.equations, initial, **options)

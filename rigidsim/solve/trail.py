@@ -5,11 +5,10 @@ The run's errors are later estimated at the samples, and its neighbours start fr
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 

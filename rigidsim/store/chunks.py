@@ -13,12 +13,11 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import h5py
 import numpy as np
 from h5py import h5d, h5z
-
-from rigidsim.scene.records import dataclass
 
 Deflate = Callable[..., bytes]
 """Compresses bytes at a level."""

@@ -7,11 +7,11 @@ import fcntl
 import json
 import os
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigidsim.errors import FORCE, OUT, RunFolderError, once_mended
 from rigidsim.look.figure_names import FIGURES
-from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
 from rigidsim.store.work_folder import WorkFolder

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.store import viewing
 from rigidsim.store.collected import JoinedBlocks
 from rigidsim.store.netcdf import Block

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -17,7 +18,6 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5ds, h5g, h5p, h5s, h5t
 
-from rigidsim.scene.records import dataclass
 from rigidsim.store.variables import BARE_DIMENSION
 
 _LEAST_CHUNK_ROWS = 1024  # for variables along a dimension that can grow

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import sys
 from abc import abstractmethod
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
-from rigidsim.scene.records import dataclass
 from rigidsim.store import provenance, segments, viewing
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.joined_segments import join_segments

@@ -12,7 +12,7 @@ import shutil
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,6 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
-from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic, netcdf
 from rigidsim.store.chunks import ChunkedVariable, Compressor, chunked
 from rigidsim.store.collected import CollectedRows

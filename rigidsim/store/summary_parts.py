@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator, Field, StrictBool, StrictInt, StrictStr
 
-from rigidsim.scene.records import dataclass
 from rigidsim.store.summary_fields import Claim, FiniteNumber, SummaryPart, Text
 
 ENGINE = "engine"

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import count, takewhile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import h5py

@@ -6,11 +6,11 @@ import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 from rigidsim.errors import OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

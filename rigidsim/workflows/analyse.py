@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,6 @@ from rigidsim.analysis.analyse import analyse_dataset
 from rigidsim.analysis.labels import Known
 from rigidsim.analysis.result import Analysis
 from rigidsim.errors import ConfigError, RigidsimError
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import build_scene
 from rigidsim.store import atomic
 from rigidsim.store.run import Run, open_run

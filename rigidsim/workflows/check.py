@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rigidsim.accuracy.models.level import fully
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,6 @@ from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.model_table import FULL
-from rigidsim.scene.records import dataclass
 from rigidsim.workflows.plan_levels import compared_levels
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.config import Experiment, parse, parse_earlier
-from rigidsim.scene.records import dataclass
 from rigidsim.session.guards import Observer
 from rigidsim.solve.status import Status
 from rigidsim.store import netcdf, provenance

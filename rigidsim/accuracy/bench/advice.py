@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from rigidsim.accuracy.bench.dataset import trusted_error
 from rigidsim.accuracy.bench.measure import RowStatus
 from rigidsim.accuracy.setting import Setting, precision_titled
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

@@ -16,7 +16,7 @@ import random
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -28,7 +28,6 @@ from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 
 _LEAST_BUDGET = 5.0
 

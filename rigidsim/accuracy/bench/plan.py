@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from rigidsim.accuracy.motion import run_pilot
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import trial_scene
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import build_scene
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare_scene

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,7 +23,6 @@ from rigidsim.accuracy.reference import (
 from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 
 _WITHOUT_END = 1e6  # seconds: a reference is stopped only by the deadline
 

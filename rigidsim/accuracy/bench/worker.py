@@ -18,7 +18,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any, TextIO
 
 import mpmath
@@ -28,7 +28,6 @@ from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import trial_scene, try_setting
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.config import Experiment, parse
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import prepare_scene

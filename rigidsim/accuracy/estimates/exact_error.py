@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rigidsim.scene.records import dataclass
+from dataclasses import dataclass
 
 LAST_BITS = 0.5
 """Epsilons by which a recorded value is wrong at most because it is rounded."""

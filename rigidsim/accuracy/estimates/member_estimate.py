@@ -12,14 +12,13 @@ chance.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigidsim.accuracy.estimates.carriers import plain_pushes
 from rigidsim.accuracy.estimates.growth import UNCERTAIN
 from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.neighbour_lanes import NeighbourLanes
 from rigidsim.solve.batch.neighbours import Spreads, Starts, follow, note

@@ -5,6 +5,7 @@ it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
@@ -12,7 +13,6 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.model_table import AUTO, FULL, ORBIT_AVERAGED, SPIN_AVERAGED
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.problem import prepare
 
 CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,6 @@ from rigidsim.accuracy.models.side_by_side import (
 )
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.free_motion import FreeMotion
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.trail import SampleTrail
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -19,7 +19,6 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
 from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.model_table import FULL
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.assembly import assemble, sampler

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,6 @@ from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
 from rigidsim.look.figures import drift, flight, poles, polhode, timelines
 from rigidsim.look.figures.composing import Panel, compose, has, shown_rows
 from rigidsim.look.roles import drifts
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

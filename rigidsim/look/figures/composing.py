@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from rigidsim.look.page import largest_drift, read_config
 from rigidsim.look.readable_time import unit_for
 from rigidsim.look.roles import drifts, is_averaged
 from rigidsim.look.thinning import thin
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     import xarray

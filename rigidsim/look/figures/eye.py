@@ -5,12 +5,11 @@ A flat drawing knows where every text will be, which matplotlib's own 3D axes do
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

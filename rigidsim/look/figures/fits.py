@@ -5,10 +5,10 @@ Quick estimates for labels and for removing trends; `rigidsim analyse` has the d
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-
-from rigidsim.scene.records import dataclass
 
 Array = NDArray[np.float64]
 _TURN = 2 * np.pi

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +28,6 @@ from rigidsim.look.stages.parts import (
     trail,
     viewer_quaternion,
 )
-from rigidsim.scene.records import dataclass
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table

@@ -7,14 +7,13 @@ constant factor each.
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.solids import Mesh
 from rigidsim.look.thinning import thinned_indices
-from rigidsim.scene.records import dataclass
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]

@@ -23,13 +23,11 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-
-from rigidsim.scene.records import dataclass
 
 _POINTS = ((0.3, 64), (0.6, 256), (1.0, 8192))
 """Points per turn up to an eccentricity; harmonics beyond are below double precision up to 0.6."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,6 @@ from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm, working_bits
 from rigidsim.scene.model_table import ORBIT_AVERAGED
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _ROUNDS = 4  # iterations; each gains a factor of the nutation's size

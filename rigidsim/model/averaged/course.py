@@ -14,12 +14,12 @@ precession, g + j l = 0, the torque across the momentum stands still for a while
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from rigidsim.model.averaged.torques import DrivingTorques
-from rigidsim.scene.records import dataclass
 
 PARAMETER = 0.98
 """Largest k^2 over whose polhodes torques are averaged."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,6 @@ from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 EPSILON = 2.0**-60

@@ -6,6 +6,7 @@ direction as before, with the mean tensor of the present polhode.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +18,6 @@ from rigidsim.model.averaged.sources import Source
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross
-from rigidsim.scene.records import dataclass
 
 AMPLITUDES = ["axial", "transverse"]
 """States: the largest components P and Q of the momentum along the circled axis and the intermediate one."""

@@ -17,11 +17,11 @@ an axisymmetric one whose C - A is (3 <m . I m> - tr I) / 2 (Chernousko 1963; Co
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, dot, negligible
 from rigidsim.scene.bodies.body import RigidBody
-from rigidsim.scene.records import dataclass
 
 
 class Separatrix(Exception):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +18,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, dot
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

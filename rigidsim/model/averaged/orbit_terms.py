@@ -32,13 +32,13 @@ precession.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from rigidsim.scene.arithmetic import Vector, cross, dot
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 
 _POINTS = 4096
 

@@ -19,11 +19,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.scene.arithmetic import Matrix, Vector
-from rigidsim.scene.records import dataclass
 
 _MEANS = 40  # arithmetic-geometric means; each squares what is left
 _STRIPS = 64  # of complex amplitudes, over which the bound of a sum's error is made small

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -37,7 +37,6 @@ from rigidsim.model.averaged.sources import Source
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, multiply, norm, transpose
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _ROUNDS = 4  # iterations of the start; each gains a factor of the nutation's size

@@ -11,6 +11,7 @@ L_0 G x s, the average over rotation and orbits of all other sources.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -24,7 +25,6 @@ from rigidsim.model.formulations import quaternion_kinematics
 from rigidsim.model.rotations import Symbolic, apply, quaternion_matrix
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, dot, transpose
-from rigidsim.scene.records import dataclass
 
 SLOW = ["rw", "rx", "ry", "rz", "la", "lb", "excess"]
 """States: the quaternion of the axes a, b, c, and the momentum along them less p n C along c."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,6 @@ from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _DAY = 86400.0

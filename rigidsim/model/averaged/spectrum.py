@@ -12,12 +12,12 @@ is in double precision: it decides whether an average applies, and gives small c
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from rigidsim.model.averaged.free_motion import FreeMotion
-from rigidsim.scene.records import dataclass
 
 _POINTS = 256
 _LEAST = 1e-12  # of the largest harmonic

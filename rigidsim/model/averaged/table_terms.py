@@ -6,6 +6,7 @@ goes round, second-order terms that go round with it are periodic and left out.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +20,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import dot
 from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ with the coefficients d about the principal axes. Any other is summed over nodes
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -26,7 +27,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 RATE_STATES = ("wx", "wy", "wz")

@@ -14,6 +14,7 @@ ch. 9; Wertz, Spacecraft Attitude Determination and Control, 1978, ch. 2.)
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import heyoka as hy
 
@@ -21,7 +22,6 @@ from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import cross, norm
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 _SLOW = 2

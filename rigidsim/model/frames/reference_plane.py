@@ -11,6 +11,7 @@ equinox as X.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -23,7 +24,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross
 from rigidsim.scene.frame import ORBIT
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -30,7 +31,6 @@ from rigidsim.scene.expressions.tree import (
 )
 from rigidsim.scene.fields import Metre, Triple, refuse
 from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, root_parts

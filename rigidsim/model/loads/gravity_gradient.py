@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import heyoka as hy
@@ -27,7 +28,6 @@ from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.orbit_tables.orbit import resolve_tabulated_orbit
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC

@@ -10,7 +10,7 @@ without the first term if the body itself is one of the point masses, whose mutu
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import heyoka as hy
@@ -26,7 +26,6 @@ from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import heyoka as hy
@@ -16,7 +17,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution, WarningCode

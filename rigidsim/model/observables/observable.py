@@ -8,6 +8,7 @@ shows up in the dataset, the summary, the plots and the timeline.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -16,7 +17,6 @@ from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import NEEDS
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.records import dataclass
 
 Dims = tuple[str, ...]
 BODY: Dims = ("body_axis",)

@@ -14,6 +14,7 @@ Where these leave more than half a radian open the turns are counted along the m
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -26,7 +27,6 @@ from rigidsim.model.observables.vectors import along, in_body, length
 from rigidsim.model.rotations import constant
 from rigidsim.model.scaling import loads_amplitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
-from rigidsim.scene.records import dataclass
 
 _FORCED = 10
 _SPARE = 4

@@ -9,12 +9,12 @@ the Moon's to some 3e-6. The series are explicit functions of time in double pre
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.records import dataclass
 
 _THRESHOLD = 1e-6
 _DAY = 86400.0

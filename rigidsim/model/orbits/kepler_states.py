@@ -10,6 +10,7 @@ and so do a moving node and periapsis, each as a pair that turns uniformly. (Kep
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -19,7 +20,6 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ attraction.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import PointMasses
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
@@ -33,7 +34,6 @@ from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import GUARD_BITS
 from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
-from rigidsim.scene.records import dataclass
 
 _POWERS = 5  # of the polynomials; as many parameters for each element
 _LEAST = -5

@@ -6,7 +6,7 @@ another. Positions in the result are body axes, metres, from the reference point
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from rigidsim.scene import attitude
@@ -32,7 +32,6 @@ from rigidsim.scene.bodies.pieces import (
 )
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.exact import ExactNumber, parse_number
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.tracing.context import plain
 from rigidsim.scene.validation_messages import nearest, shown
 

@@ -5,10 +5,9 @@ Lengths are metres, in the solid's own axes, from its centre of mass.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeAlias
-
-from rigidsim.scene.records import dataclass
 
 THINNESS = 0.02
 """Thickness with which an ideally thin solid is drawn, relative to its largest dimension."""

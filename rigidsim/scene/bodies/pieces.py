@@ -5,6 +5,7 @@ Positions are in the coordinates in which the body is described (a shape's origi
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
@@ -13,7 +14,6 @@ from rigidsim.scene.arithmetic import Matrix, Vector, diagonal, dot, multiply, t
 from rigidsim.scene.bodies import table as body_table
 from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.tracing.context import plain
 from rigidsim.scene.validation_messages import shown
 

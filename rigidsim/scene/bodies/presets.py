@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

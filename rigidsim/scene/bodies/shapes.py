@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Outline, Revolved, polygon
-from rigidsim.scene.records import dataclass
 
 Dimensions = Mapping[str, list[Any]]
 Vector = list[Any]

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 from rigidsim.scene import units
 from rigidsim.scene.exact import ExactNumber, Quantity
 from rigidsim.scene.expressions.tree import FLIGHT_NAMES, RATE_NAMES
-from rigidsim.scene.records import dataclass
 
 _WORD_OF_UNIT = re.compile(
     r"[ \t]*(?P<join>[*/]?)[ \t]*(?P<name>[A-Za-z][A-Za-z0-9_]*)"

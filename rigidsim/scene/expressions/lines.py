@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.expressions.tree import Constant, Expression, Name, Node, Operation, fold, operate
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn, TypeVar
 
@@ -41,7 +42,6 @@ from rigidsim.scene.expressions.tree import (
     constant_value,
     operation,
 )
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.validation_messages import nearest
 
 T = TypeVar("T")

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.records import dataclass
 
 # Past any value that means something, and still quick to take the sine of: 5000 decimal digits fit.
 _LARGEST_BITS = 20_000

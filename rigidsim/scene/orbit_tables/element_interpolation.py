@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rigidsim.scene.orbit_tables.elements import TableError
 from rigidsim.scene.orbit_tables.interpolation import ORDER, left_out
-from rigidsim.scene.records import dataclass
 
 AXIS, LONGITUDE = "axis", "longitude"
 EXCENTRIC, TILTED = ("k", "h"), ("q", "p")

@@ -13,13 +13,13 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import mpmath
 
 from rigidsim.scene.exact import parse_number
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.validation_messages import nearest, shown
 
 TIME = "time"

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import math
+from dataclasses import dataclass
 from fractions import Fraction
 from statistics import NormalDist
 from typing import Protocol
 
 import numpy as np
-
-from rigidsim.scene.records import dataclass
 
 DRAWN = 10**14
 """Draws from the normal distribution are rounded to this fraction of the deviation: fewer digits than double

@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, grouped, put_in_place, until_next
-from rigidsim.solve.batch.stack_places import StackPlaces
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
@@ -83,7 +81,6 @@ class BatchEngine:
         else:
             self._integrator = _engines.get(described, self._compiled)
         self._longest = longest_step(self._integrator.order, np.float64)
-        self._stack = StackPlaces(self._integrator)
 
     def _compiled(self) -> Any:
         system, width = self._system, self.width
@@ -211,10 +208,9 @@ class BatchEngine:
         """
         integrator, given = self._integrator, (states, parameters, begin, end, longest)
         there, read, then, ends, bounds = (grouped(x, self.width) for x in given)
-        advance = partial(self._stack, integrator.propagate_until, max_steps=most_steps)
         for group in range(len(there)):
             self._set(there[group], read[group], then[group])
-            advance(ends[group], max_delta_t=bounds[group])
+            integrator.propagate_until(ends[group], max_steps=most_steps, max_delta_t=bounds[group])
             there[group], then[group] = integrator.state, integrator.time
         return np.concatenate(list(there), axis=1)[:, : len(begin)], then.ravel()[: len(begin)]
 
@@ -264,7 +260,7 @@ class BatchEngine:
         while inside.count(IDLE) < width:
             self._log.clear()
             most = until_next(moments, inside, targets, begun, taken, most_steps, pace)
-            self._stack(integrator.propagate_until, target, max_steps=most, max_delta_t=bounds)
+            integrator.propagate_until(target, max_steps=most, max_delta_t=bounds)
             outcomes = integrator.propagate_res
             high, low = map(np.array, integrator.dtime)
             moments = high.tolist()
@@ -328,7 +324,7 @@ class BatchEngine:
                 found = np.array(integrator.state)[None]
             else:
                 grid = part if known else np.vstack([begin, part])
-                _, found = self._stack(integrator.propagate_grid, grid, max_steps=left, max_delta_t=longest)
+                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=longest)
                 outcomes = integrator.propagate_res[:count]
                 taken += [now[3] for now in outcomes]
                 arrived[:] = [now[0] == _ARRIVED for now in outcomes]

@@ -15,10 +15,10 @@ period, theta_4(v - i omega | q^2), whose zeros stay away from the line of motio
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, dot
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
 from rigidsim.solve.closed_form.jacobi import Jacobi, jacobi
 from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot, right_handed

@@ -13,10 +13,10 @@ Applications, chapter 5), with no integral of the third kind left, and nothing s
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
 from rigidsim.solve.closed_form.motion import Motion
 from rigidsim.solve.closed_form.theta import Lattice, Theta, first_kind, lattice, theta

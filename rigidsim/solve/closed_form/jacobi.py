@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
 from rigidsim.solve.closed_form.theta import Lattice, theta
 from rigidsim.solve.closed_form.theta_quotients import Quotient

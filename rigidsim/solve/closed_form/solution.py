@@ -7,6 +7,7 @@ times the scene's digits and turns are counted exactly, so that a run is right t
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import mpmath
@@ -16,7 +17,6 @@ from rigidsim.model.scaling import Scaling, choose_scaling
 from rigidsim.model.system import System
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, dot, norm
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form.arithmetic import Arithmetic, Digits, Doubles, two_sum
 from rigidsim.solve.closed_form.classify import choose_motion

@@ -9,9 +9,9 @@ All numbers are made in mpmath; an ``Arithmetic`` (see ``arithmetic``) evaluates
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form.arithmetic import Arithmetic, Pair
 
 

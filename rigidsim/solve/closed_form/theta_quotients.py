@@ -7,10 +7,9 @@ not special for them. Per half period 2K of the elliptic functions the phase mak
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.closed_form.arithmetic import Arithmetic, Pair
 from rigidsim.solve.closed_form.theta import Lattice, Theta
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.compiled import compiled_function
 
 _AXES = "xyz"

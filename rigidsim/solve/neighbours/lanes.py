@@ -321,7 +321,7 @@ class SeriesErrors:
         self._integrator = hy.taylor_adaptive(
             system.equations,
             initial,
-            tol=number(system.series_tolerance(tried)),
+            tol=number(tried),
             compact_mode=True,
             opt_level=0,
             fp_type=number,

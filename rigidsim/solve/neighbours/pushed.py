@@ -15,12 +15,12 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.neighbours.chords import attitude_chords
 from rigidsim.solve.neighbours.lanes import NEIGHBOURS, Lanes, SeriesErrors
 from rigidsim.solve.neighbours.spread import Spread

@@ -7,13 +7,13 @@ shorter by a part in a thousand million. Here they are worked out from the expre
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.model.system import System
 from rigidsim.model.two_part_time import exactly, in_two_numbers
 from rigidsim.scene.expressions.lines import as_line
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Precision, Scalar
 
 _AROUND = 2.0**6  # roundings of a time, around which its zero is first looked for

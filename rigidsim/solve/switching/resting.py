@@ -13,11 +13,11 @@ has to be parallel.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe
 

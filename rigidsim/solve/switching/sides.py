@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -18,7 +19,6 @@ import numpy as np
 
 from rigidsim.model.step_limiter import slopes
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.switching.moments import moments_of
 

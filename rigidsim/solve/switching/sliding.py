@@ -8,6 +8,7 @@ several surfaces are resolved where their parts of the field add up: f = base + 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import permutations
 
 import heyoka as hy
@@ -15,7 +16,6 @@ import heyoka as hy
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.step_limiter import slopes
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 
 MOST_AT_ONCE = 3
 """Largest number of surfaces along which a motion slides at once."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import time as clock_time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
@@ -26,7 +26,6 @@ from rigidsim.model.frames.reference_plane import plane_drift
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.scene import SampleTimes
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine, compiled_function

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import heyoka as hy
@@ -14,7 +14,6 @@ import numpy as np
 from rigidsim.model.euler_poles import UNDEFINED
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.engine import CompiledFunction

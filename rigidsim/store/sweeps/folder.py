@@ -8,13 +8,13 @@ import os
 import re
 import secrets
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
-from rigidsim.scene.records import dataclass
 from rigidsim.store import atomic
 from rigidsim.store.sweeps.generation import Generation
 from rigidsim.store.sweeps.tile import Tile, read_tile

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
-from rigidsim.scene.records import dataclass
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation
 from rigidsim.store.sweeps.sources import ALWAYS, Sources, plain

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from rigidsim.errors import FORCE, RunFolderError
-from rigidsim.scene.records import dataclass
 
 
 @dataclass(frozen=True)

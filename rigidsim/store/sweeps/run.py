@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError
-from rigidsim.scene.records import dataclass
 from rigidsim.store.seal import check_seal, check_whole
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation

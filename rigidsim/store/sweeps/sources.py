@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation, Work, ranges_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RunFolderError
-from rigidsim.scene.records import dataclass
 from rigidsim.store.netcdf_file import writing
 from rigidsim.store.seal import check_seal, refuse_special, sealed
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -14,7 +14,6 @@ import numpy as np
 from rigidsim.accuracy.estimates.member_estimate import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.kept import Kept, KeptVariable, MemberSeries, Points, kept_events, kept_of_series
 from rigidsim.session.members import (

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rigidsim.scene.records import dataclass
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
 from rigidsim.store.sweeps.gathered import Gathered, TileReader

@@ -1,7 +1,5 @@
 """Members side by side: the motions of single runs, whoever is beside them and wherever they stand."""
 
-import sys
-
 import numpy as np
 import pytest
 from support import EPSILON, cases, config
@@ -12,7 +10,6 @@ from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.batch.family import Families
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
-from rigidsim.solve.batch.stack_places import StackPlaces
 from rigidsim.solve.status import Status
 
 FLIGHT = config(
@@ -211,35 +208,3 @@ def test_drift_bounds_and_turns_between_samples() -> None:
     assert np.allclose(block.drift_bound, 50 * EPSILON["double"] * np.sqrt(block.steps))
     rates = np.linalg.norm(block.values["angular_velocity"], axis=2).max(axis=0)
     assert (block.radians_between >= 0.5 * rates * 2.5).all()
-
-
-class Steps:
-    """An integrator that takes steps at a given pace each way, and notes the ways."""
-
-    def __init__(self, straight: float, shifted: float) -> None:
-        self.seconds = straight, shifted
-        self.ways: list[bool] = []
-        self.clock = 0.0
-        self.propagate_res = [(None, None, None, 100), (None, None, None, 90)]
-
-    def onward(self, value: int, *, twice: bool) -> int:
-        shifted = sys._getframe(1).f_code.co_name == "<lambda>"
-        self.ways.append(shifted)
-        self.clock += self.seconds[shifted] * self.propagate_res[0][3]
-        return 2 * value if twice else value
-
-
-@pytest.mark.parametrize("pace", [(1.8, 2.2), (2.2, 1.8)])
-def test_steps_are_called_from_the_faster_place(
-    pace: tuple[float, float], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    engine = Steps(*pace)
-    monkeypatch.setattr("rigidsim.solve.batch.stack_places.time.perf_counter", lambda: engine.clock)
-    places = StackPlaces(engine)
-    engine.propagate_res = [(None, None, None, 3)]  # too few to tell
-    assert places(engine.onward, 21, twice=True) == 42
-    engine.propagate_res = [(None, None, None, 100)]
-    for _ in range(40):
-        assert places(engine.onward, 7, twice=False) == 7
-    assert engine.ways[:9] == [False] + [False, True] * 4
-    assert engine.ways[9:] == [pace[1] < pace[0]] * 32
