@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING
 
 from rigidsim.errors import VIEW, StoppedWritingError
 from rigidsim.scene.schema import Output
+from rigidsim.session.active_run import ActiveRun
 from rigidsim.session.attributes import of_complete
 from rigidsim.session.guards import Observer
-from rigidsim.session.recorder import Recorder
-from rigidsim.session.summary import cost_so_far
-from rigidsim.session.timings import Effort, Phases
-from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.sampler import Sampler
+from rigidsim.session.session import Session
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.attributes import RootAttributes
@@ -33,21 +30,16 @@ class Completion:
     """Completes the files of a run that has ended.
 
     Attributes:
-        summary: without the files' digests at first; replaced as they become known.
         extras: variables with dimensions of their own.
         unused: names of variables along time that the dataset leaves out.
+        summary: without the files' digests at first; replaced as they become known.
     """
 
-    prepared: InitialValueProblem
+    session: Session
+    run: ActiveRun
     folder: RunFolder
     writer: SegmentWriter
-    recorder: Recorder
-    loop: Sampler
-    attributes: RootAttributes
     extras: Sequence[Extra]
-    phases: Phases
-    effort: Effort
-    observer: Observer
     unused: Collection[str]
     summary: Summary
 
@@ -64,7 +56,7 @@ class Completion:
         except KeyboardInterrupt:
             kept = "the dataset is complete, the timeline is missing"
             if self.folder.segments.exists():
-                self.recorder.save(self.loop.position())
+                self.run.save()
                 kept = "all samples are saved as segments"
             self.summary = self.summary.having(
                 status=Status.INTERRUPTED.value,
@@ -74,11 +66,11 @@ class Completion:
         return self.summary
 
     def _write_dataset(self) -> None:
-        self.observer.phase("dataset")
-        checkpoint = None
-        if self.loop.progress.status is Status.FINISHED:
-            position = self.loop.position()
-            arrays, events = self.recorder.packed(position), self.recorder.all_events(position)
+        self.session.observer.phase("dataset")
+        checkpoint, recorder = None, self.run.recorder
+        if self.run.progress.status is Status.FINISHED:
+            position = self.run.loop.position()
+            arrays, events = recorder.packed(position), recorder.all_events(position)
             checkpoint = self.folder.checkpoint, arrays, events
         self.writer.complete(
             self.folder.dataset,
@@ -88,15 +80,15 @@ class Completion:
             checkpoint=checkpoint,
             conclude=self._conclude,
         )
-        self.phases.next("dataset")
+        self.session.phases.next("dataset")
 
     def _attributes(self) -> RootAttributes:
-        wrapped_from = self.recorder.statistics.angles_wrapped_from
-        return of_complete(self.attributes, self.summary, self.effort, wrapped_from)
+        wrapped_from = self.run.recorder.statistics.angles_wrapped_from
+        return of_complete(self.run.attributes, self.summary, self.session.effort, wrapped_from)
 
     def _conclude(self) -> None:
         """Write what remains once the dataset is in place and the segments are still there."""
-        cost = cost_so_far(self.prepared, self.loop.progress, self.phases, self.effort)
+        cost = self.run.cost(self.session)
         self.summary = self.summary.having(cost=cost, dataset_sha256=self.writer.dataset_sha256)
         self.folder.write_summary(self.summary)
 
@@ -104,12 +96,12 @@ class Completion:
         self.summary = with_timeline(
             self.summary,
             self.folder,
-            self.prepared.scene.config.output,
-            self.observer,
-            self.recorder.kept,
+            self.run.prepared.scene.config.output,
+            self.session.observer,
+            self.run.recorder.kept,
         )
         if self.summary.timeline_sha256 is not None:
-            self.phases.next("timeline")
+            self.session.phases.next("timeline")
 
 
 def with_timeline(

@@ -16,6 +16,7 @@ from rigidsim.scene.overrides import assignments
 from rigidsim.scene.python_values import assignments_of
 from rigidsim.session.attributes import root_attributes as attributes_now
 from rigidsim.session.completion import with_timeline
+from rigidsim.session.execution import execute
 from rigidsim.session.guards import Observer
 from rigidsim.session.progress.progress import watched
 from rigidsim.session.session import Session
@@ -111,7 +112,7 @@ def resume(
         if not chain.paths:
             text = "nothing had been saved, so the run began anew"
             session.remarks.append(Caution(WarningCode.BEGUN_ANEW, text))
-        run = session.execute(prepared, folder, chain if chain.paths else None)
+        run = execute(session, prepared, folder, chain if chain.paths else None)
         assert isinstance(run, SavedRun)
         return certified(run, prepared.experiment, None, session, loads)[0]
 

@@ -11,6 +11,7 @@ from rigidsim.accuracy.asked import leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.scene.model_table import AUTO, FULL
 from rigidsim.session.event_variables import refuse_taken_names
+from rigidsim.session.execution import execute
 from rigidsim.session.guards import Observer
 from rigidsim.session.progress.progress import watched
 from rigidsim.session.session import Session
@@ -152,7 +153,7 @@ def _run(
         prepared = prepare(setting, loads=loads)
         refuse_taken_names(prepared)
         with _place(prepared, out, setting.text, force=force or beyond is not None) as folder:
-            result = session.execute(prepared, folder)
+            result = execute(session, prepared, folder)
             kept = True
             if wanted(setting) is not None:
                 from rigidsim.workflows.certify import certified

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +21,6 @@ from rigidsim.accuracy.trial import compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average
 from rigidsim.scene.model_table import ORBIT_AVERAGED
-from rigidsim.scene.records import dataclass
 from rigidsim.solve.neighbours.lanes import NEIGHBOURS, BatchLanes, Lanes, StepperLanes
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.store.summary_parts import UnmeasuredCode
