@@ -55,6 +55,11 @@ LEAST: dict[WarningCode, Soundness] = {
     WarningCode.EPHEMERIS_OF_EARTH: Soundness.SOUND,
     WarningCode.NEVER_HAPPENS: Soundness.SOUND,
     WarningCode.TIME_WITHOUT_UNIT: Soundness.SOUND,
+    WarningCode.LENGTH_WITHOUT_UNIT: Soundness.SOUND,
+    WarningCode.BELOW_SURFACE: Soundness.SOUND,
+    WarningCode.PERIOD_CONTRADICTS: Soundness.SOUND,
+    WarningCode.GRAVITY_UPWARDS: Soundness.SOUND,
+    WarningCode.NEAR_RESONANCE: Soundness.SOUND,
 }
 """The best that can be said of a run beside each warning; of a later version's warnings ``LIMITED``."""
 _DEGREES = list(Soundness)
