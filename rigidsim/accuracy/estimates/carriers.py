@@ -11,6 +11,7 @@ from rigidsim.accuracy.estimates.course import Course
 from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.model.system import System
 from rigidsim.scene.moments import acts_at_moments_alone
+from rigidsim.solve.angle_wrapping import STEPS_BETWEEN
 from rigidsim.solve.neighbours.lanes import (
     TIGHT,
     BatchLanes,
@@ -121,7 +122,13 @@ def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
         plain = replace(plain, clock=0.0)
     if formulation not in ("euler_angles", "canonical"):
         return plain
-    angles = replace(plain, own=plain.own * margins.angles, series=margins.angle_series)
+    series = margins.angle_series
+    if prepared.system.clocked:
+        # steps are relative to the largest state, which angles are until they are brought back into one turn;
+        # where the few steps through a spike decide, nothing averages that
+        turned = float(prepared.system.rate_bound) * (course.end - course.start) / max(course.steps, 1)
+        series *= 2 * math.pi + STEPS_BETWEEN * math.ldexp(turned, prepared.system.scaling.time)
+    angles = replace(plain, own=plain.own * margins.angles, series=series)
     if formulation == "euler_angles":
         return angles
     # momenta: the nearer the singularity, the more do they lose in passing it
