@@ -165,9 +165,9 @@ def measure(name: str, text: str) -> Measured:
     progress = loop.run()
     ended = time.process_time()
     diagnostics = Diagnostics(prepared, progress, SampleStatistics())
-    found = diagnostics.estimated(watched.trail, parts.stepper, parts.corrected.waypoints).estimate
+    found = diagnostics.estimated(watched.trail, parts.corrected).estimate
     estimated = time.process_time()
-    diagnostics.estimated(watched.trail, parts.stepper, parts.corrected.waypoints)
+    diagnostics.estimated(watched.trail, parts.corrected)
     again = time.process_time()
     assert found is not None
     return Measured(

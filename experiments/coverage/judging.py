@@ -119,9 +119,7 @@ def judge(scene: CoverageScene) -> Judged:
     if progress.status is not Status.FINISHED:
         return replace(begin, cpu_seconds=time.process_time() - started)
     before = time.process_time()
-    found = Diagnostics(prepared, progress, seen.statistics).estimated(
-        seen.trail, parts.stepper, parts.corrected.waypoints
-    )
+    found = Diagnostics(prepared, progress, seen.statistics).estimated(seen.trail, parts.corrected)
     estimated = time.process_time() - before
     assert found.estimate is not None
     codes = [c.code for c in found.cautions()]

@@ -80,7 +80,7 @@ def forecast_pace(prepared: InitialValueProblem, pilot: Pilot) -> float | None:
     """``mean_pace`` where it is wanted: 1 for motions that aren't braked, and where the pilot saw the end."""
     clock = prepared.clock
     whole = float(clock.at(clock.count - 1)) - float(clock.start)
-    if prepared.closed is not None or pilot.taken * pilot.step >= whole or not is_braked(prepared):
+    if not prepared.has_steps or pilot.taken * pilot.step >= whole or not is_braked(prepared):
         return 1.0
     return mean_pace(prepared)
 

@@ -88,7 +88,7 @@ def motion_growth(prepared: InitialValueProblem) -> Growth:
     Measured in quaternions, or in rates if no attitude is carried: a chart's own singularity is another
     matter. A closed form makes no errors on the way that could grow.
     """
-    if prepared.closed is not None:
+    if not prepared.has_steps:
         return Growth(factor=1.0, seconds=0.0, rate=0.0, window=0.0)
     system = double_twin(prepared)
     clock, last = prepared.clock, prepared.clock.count - 1

@@ -39,6 +39,7 @@ class Trial:
         places: float64 parts of the positions, m, each (samples, 3); empty if the body has none.
         drifts: largest relative drift of each invariant at the samples.
         cpu_seconds, compile_seconds: CPU time of the integration alone, and of compiling.
+        order: of the Taylor series; 0 for a closed form.
         work: steps times Taylor order squared times states: a count that doesn't jitter.
         rows: number of samples reached.
         histories: relative drift (samples,) of each invariant.
@@ -166,7 +167,7 @@ def try_setting(
     built = time.process_time()
     progress = loop.run()
     ended = time.process_time()
-    order = int(parts.stepper.integrator.order)
+    order = parts.order or 0
     attitudes = [np.concatenate(part)[early:] for part in zip(*receiver.pieces, strict=True)]
     return Trial(
         setting=setting,

@@ -61,9 +61,9 @@ class ActiveRun:
         parts = assemble(prepared)
         resumed = None
         if chain is not None:
-            resumed = restore(chain, prepared, parts.corrected, parts.evaluator, parts.log)
+            resumed = restore(chain, prepared, parts)
         run_id = os.urandom(8).hex() if chain is None else chain.run
-        attributes = root_attributes(prepared, parts.stepper, run_id, session.mixed)
+        attributes = root_attributes(prepared, parts, run_id, session.mixed)
         variables = dataset_variables(prepared)
         writer: SegmentWriter | MemoryWriter = MemoryWriter()
         if folder is not None:

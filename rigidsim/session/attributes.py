@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from rigidsim.session.timings import Effort
+from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import Stepper
 from rigidsim.store import provenance
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.summary import Summary
@@ -20,17 +20,18 @@ from rigidsim.store.variables import SCHEMA_VERSION
 
 
 def root_attributes(
-    prepared: InitialValueProblem, stepper: Stepper, run_id: str, mixed: str = ""
+    prepared: InitialValueProblem, parts: Assembly, run_id: str, mixed: str = ""
 ) -> RootAttributes:
     """Attributes of segments, and of a dataset before the end of its run is known.
 
     Args:
+        parts: what it was compiled to.
         run_id: identifies this run.
         mixed: what changed in versions or machine since the run began; empty if nothing did.
     """
     scene, system = prepared.scene, prepared.system
     platform: dict[str, Any] = {f"version_{k}": v for k, v in provenance.versions().items()}
-    platform |= {f"code_{k}": v for k, v in provenance.code_target(stepper.integrator).items()}
+    platform |= {f"code_{k}": v for k, v in provenance.code_target(parts.evaluator.code).items()}
     exponents = {
         "time": system.scaling.time,
         "inertia": system.scaling.inertia,
@@ -54,13 +55,11 @@ def root_attributes(
         precision=prepared.precision.name,
         precision_bits=prepared.precision.bits,
         tolerance=prepared.effective_tolerance,
-        integrator="heyoka Taylor, natural steps, dense output"
-        if prepared.closed is None
-        else prepared.closed.title,
+        integrator=prepared.solver,
         method=scene.config.integrator.method,
         hold_invariants=int(prepared.holds_invariants),
         hold_from_step=LATE if prepared.holds_late else None,
-        taylor_order=int(stepper.integrator.order),
+        taylor_order=parts.order,
         compact_mode=int(prepared.precision.compact or system.wide),
         high_accuracy=0,
         batch_size=1,

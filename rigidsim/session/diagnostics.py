@@ -12,10 +12,10 @@ from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.tuning import AdviceLimits
 from rigidsim.session.understood import time_words
+from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.trail import SampleTrail, Waypoints
+from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import Caution, WarningCode
 
 if TYPE_CHECKING:
@@ -56,16 +56,14 @@ class Diagnostics:
     def estimated(
         self,
         trail: SampleTrail | None = None,
-        stepper: Stepper | None = None,
-        waypoints: Waypoints | None = None,
+        corrected: CorrectedStepper | None = None,
         go_on: Callable[[], bool] = lambda: True,
     ) -> Diagnostics:
         """The diagnostics with an estimate of the errors.
 
         Args:
             trail: some of the run's samples.
-            stepper: the run's stepper; left as it was.
-            waypoints: some of its step boundaries.
+            corrected: what took the run's steps; left as it was.
             go_on: polled repeatedly; False ends the estimate without a result.
         """
         from rigidsim.accuracy.estimates.estimate import estimate_errors
@@ -76,8 +74,8 @@ class Diagnostics:
             progress.steps,
             min(progress.time, float(self.prepared.scene.samples.last)),
             trail=trail,
-            waypoints=waypoints,
-            stepper=stepper,
+            waypoints=None if corrected is None else corrected.waypoints,
+            stepper=None if corrected is None else corrected.stepper,
             nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
             uneven=progress.largest_step / max(progress.smallest_step, 1e-300),
             go_on=go_on,

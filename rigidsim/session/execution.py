@@ -88,7 +88,7 @@ def _diagnosed(session: Session, run: ActiveRun) -> Diagnostics:
     trail, parts = run.recorder.trail, run.parts
     session.observer.phase("estimate")
     with run.interruption.dispensable():
-        found = found.estimated(trail, parts.stepper, parts.corrected.waypoints, run.wanted)
+        found = found.estimated(trail, parts.corrected, run.wanted)
         found = found.compared(session.tuning.advice, run.wanted)
     session.phases.next("estimate")
     if run.prepared.system.plan.average is not None and run.progress.status is Status.FINISHED:
@@ -125,7 +125,7 @@ def _summarised(
         time_reached=time_reached(prepared, progress, log),
         events=event_counts(prepared, log, run.last_time),
         event_times=event_times(prepared, log, run.last_time),
-        chart_changes=chart_changes(prepared, run.parts.corrected),
+        chart_changes=chart_changes(prepared, run.parts),
     )
     extras = list(event_variables(prepared, log, evaluator, run.last_time))
     if spectrum is not None:

@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 from rigidsim.errors import RunFolderError
+from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.checkpoint import Checkpoint
 from rigidsim.solve.checkpoint_arrays import (
     refuse_other_late_projection,
     unpack_checkpoint,
     unpack_events,
 )
-from rigidsim.solve.corrected_stepper import CorrectedStepper
-from rigidsim.solve.evaluate import Evaluator
-from rigidsim.solve.events import EventLog
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.store import netcdf
 from rigidsim.store.segments import Chain, root_attributes
 
 
-def restore(
-    chain: Chain,
-    prepared: InitialValueProblem,
-    corrected: CorrectedStepper,
-    evaluator: Evaluator,
-    log: EventLog,
-) -> Checkpoint:
-    """Put a checkpoint into a fresh evaluator and event log; the integration and the recorder take their
-    state from the returned checkpoint.
+def restore(chain: Chain, prepared: InitialValueProblem, parts: Assembly) -> Checkpoint:
+    """Put a checkpoint into the evaluator and event log of fresh parts; the integration and the recorder take
+    their state from the returned checkpoint.
 
     Raises:
         RunFolderError: the checkpoint belongs to another system.
@@ -36,18 +28,17 @@ def restore(
         arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
         names = [invariant.name for invariant in prepared.system.invariants]
         recorded = [variable.name for variable in prepared.system.recorded]
-        start = corrected.boundary()
-        checkpoint = unpack_checkpoint(arrays, prepared.precision, names, recorded, start)
+        checkpoint = unpack_checkpoint(arrays, prepared.precision, names, recorded, parts.boundary())
         if prepared.holds_late and checkpoint.position.boundary.mark.steps > LATE:
             refuse_other_late_projection(arrays)
         for path in chain.paths:
             if "previous_seal" in root_attributes(path):
                 saved = netcdf.read_group(path, "events")
-                log.found += unpack_events(saved, prepared.precision, states)
+                parts.log.found += unpack_events(saved, prepared.precision, states)
         position = checkpoint.position
-        if position.boundary.mark.events != len(log.found) or position.next_sample != chain.rows:
+        if position.boundary.mark.events != len(parts.log.found) or position.next_sample != chain.rows:
             raise ValueError("its counts don't agree with what the segments hold")
     except (KeyError, ValueError) as error:
         raise RunFolderError(f"{chain.paths[-1]}: cannot be resumed from: {error}") from None
-    evaluator.continuity = checkpoint.continuity
+    parts.evaluator.continuity = checkpoint.continuity
     return checkpoint

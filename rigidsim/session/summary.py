@@ -13,7 +13,7 @@ from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words, told_loads
 from rigidsim.session.variables import unused_variables
-from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import Progress
@@ -189,13 +189,13 @@ def closing_words(
     return text
 
 
-def chart_changes(prepared: InitialValueProblem, corrected: CorrectedStepper) -> ChartChanges | None:
+def chart_changes(prepared: InitialValueProblem, parts: Assembly) -> ChartChanges | None:
     """How often a run in Euler angles changed charts; None for other formulations."""
     system = prepared.system
-    if corrected.charts is None or system.partner is None:
+    if system.partner is None:
         return None
     return ChartChanges(
-        count=corrected.charts.changes,
+        count=parts.boundary().chart_changes,
         sequence=system.sequence,
         partner=system.partner.sequence,
     )

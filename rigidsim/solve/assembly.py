@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
-from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import IntegrationLoop
@@ -18,7 +20,7 @@ from rigidsim.solve.projection import Projection, steps_between
 from rigidsim.solve.sampler import Check, Progress, Sampler, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.stepper import Mark, Stepper
 from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.turns.count import MOST_OF_A_CLOSED_FORM, radians_between
 
@@ -26,20 +28,50 @@ _RADIANS_AT_ONCE = 5e4
 _PATIENCE = 0.1  # seconds, in place of the usual patience
 
 
-@dataclass(frozen=True)
+@dataclass
 class Assembly:
     """The parts of an integration.
 
     Attributes:
-        projection: puts invariants back; None if not requested.
+        stride: largest number of natural steps between corrections.
+        corrected: what takes steps and corrects them; None for a closed form, which takes none.
     """
 
+    prepared: InitialValueProblem
+    stride: int
     wrapping: AngleWrapping
     log: EventLog
-    stepper: Stepper
-    projection: Projection | None
-    corrected: CorrectedStepper
+    corrected: CorrectedStepper | None
     evaluator: Evaluator
+
+    def steps(self) -> CorrectedStepper:
+        """What takes steps, compiled now if there is none: for whoever steps whatever the config says, as a
+        pilot does.
+        """
+        if self.corrected is None:
+            self.corrected = interruptible(
+                lambda: _stepping(self.prepared, self.wrapping, self.log, self.stride)
+            )
+        return self.corrected
+
+    @property
+    def stepper(self) -> Stepper:
+        """The stepper within ``steps()``."""
+        return self.steps().stepper
+
+    @property
+    def order(self) -> int | None:
+        """Order of the Taylor series; None without steps."""
+        return None if self.corrected is None else int(self.stepper.integrator.order)
+
+    def boundary(self) -> StepBoundary:
+        """The boundary where it stands: without steps, the start."""
+        if self.corrected is not None:
+            return self.corrected.boundary()
+        precision = self.prepared.precision
+        start = self.prepared.clock.start, precision.of_double(0.0)
+        mark = Mark(start, precision.array(self.prepared.system.initial))
+        return StepBoundary(mark, self.wrapping.angles, chart_changes=0, projection=np.zeros(0))
 
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
@@ -55,20 +87,28 @@ def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly
 
 
 def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
-    system, precision, start = prepared.system, prepared.precision, prepared.clock.start
+    system, precision = prepared.system, prepared.precision
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context, system.angle_unit)
     log = EventLog([c.stop for c in system.crossings], wrapping)
+    corrected, countable = None, not system.turning  # samples alone can't tell what such a load does
+    if prepared.has_steps:
+        corrected = _stepping(prepared, wrapping, log, stride)
+    else:
+        countable = radians_between_samples(prepared) <= MOST_OF_A_CLOSED_FORM
+    evaluator = Evaluator(system, precision, wrapping, countable=countable)
+    return Assembly(prepared, stride, wrapping, log, corrected, evaluator)
+
+
+def _stepping(
+    prepared: InitialValueProblem, wrapping: AngleWrapping, log: EventLog, stride: int
+) -> CorrectedStepper:
+    system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     stepper = stepper_of(system, precision, prepared.tolerance, start, log)
     projection = None
     if prepared.holds_invariants:
         projection = Projection(system, precision, start, late=prepared.holds_late)
     interval = steps_between(precision, late=prepared.holds_late)
-    corrected = CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
-    countable = not system.turning  # samples alone can't tell what such a load does
-    if prepared.closed is not None:
-        countable = radians_between_samples(prepared) <= MOST_OF_A_CLOSED_FORM
-    evaluator = Evaluator(system, precision, wrapping, countable=countable)
-    return Assembly(wrapping, log, stepper, projection, corrected, evaluator)
+    return CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
 
 
 def radians_between_samples(prepared: InitialValueProblem) -> float:
@@ -100,12 +140,11 @@ def sampler(
         check = _following(check, parts.evaluator, clock)
         pacing = _in_small_blocks(pacing, radians_between_samples(prepared))
     if prepared.closed is None:
-        return IntegrationLoop(parts.corrected, clock, precision, receiver, check, start, pacing, most_steps)
+        return IntegrationLoop(parts.steps(), clock, precision, receiver, check, start, pacing, most_steps)
     from rigidsim.solve.closed_form.sampler import ClosedFormSampler
 
-    begin = parts.corrected.boundary()
     return ClosedFormSampler(
-        prepared.closed, prepared.system, begin, clock, precision, receiver, check, start, pacing
+        prepared.closed, prepared.system, parts.boundary(), clock, precision, receiver, check, start, pacing
     )
 
 

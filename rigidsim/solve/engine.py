@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
 
 from rigidsim.solve.precision import Scalar
 
-CompiledFunction: TypeAlias = Callable[..., np.ndarray]
-"""Function returned by ``heyoka.cfunc``: from inputs (k,) or (k, n) to outputs, in its own precision."""
+
+class CompiledFunction(Protocol):
+    """Function returned by ``heyoka.cfunc``.
+
+    Attributes:
+        llvm_states: the compiled modules, which print what they were compiled for.
+    """
+
+    llvm_states: tuple[Any, ...]
+
+    def __call__(self, *inputs: Any, **options: Any) -> np.ndarray:
+        """From inputs (k,) or (k, n) to outputs, in its own precision."""
 
 
 class TaylorEngine(Protocol):

@@ -104,6 +104,7 @@ class Evaluator:
         continuity: what joins the next block to the last.
         sparse: whether angles are followed along the motion, since the samples are too sparse to tell turns.
         dense: whether the samples tell the turns of all angles.
+        code: one of the compiled functions, for provenance.
 
     Args:
         countable: whether the motion between sparse samples can be followed.
@@ -121,6 +122,7 @@ class Evaluator:
         initial = precision.array(system.initial)
         self.initial = evaluate_rows(self._invariants, initial[None, :])[:, 0] if components else initial[:0]
         self._parameters = len(components)
+        self.code = self._invariants
         self._angles = JoinedAngles(system, self._compile, wrapping, precision=precision, countable=countable)
         self.continuity = self._angles.first()
         self.sparse, self.dense = self._angles.sparse, self._angles.dense

@@ -71,6 +71,16 @@ class InitialValueProblem:
     holds_late: bool = False
 
     @property
+    def has_steps(self) -> bool:
+        """Whether the motion is integrated in steps; a closed form gives the samples without any."""
+        return self.closed is None
+
+    @property
+    def solver(self) -> str:
+        """What gives the states, in words."""
+        return "heyoka Taylor, natural steps, dense output" if self.closed is None else self.closed.title
+
+    @property
     def holds_invariants(self) -> bool:
         """Whether invariants are projected along the way."""
         return self.scene.config.integrator.hold_invariants is True or self.holds_late
@@ -155,7 +165,11 @@ def prepare_scene(
         _refuse_spectrum_by_table(system)
         if loads:
             _refuse_non_finite_start(system, precision)
-        closed = _closed_form(scene, system, driven=bool(loads))
+        closed = None
+        if scene.config.integrator.method == "closed_form":
+            from rigidsim.solve.closed_form.requested import requested_closed_form
+
+            closed = requested_closed_form(scene, system, driven=bool(loads))
         late = False
         if scene.config.integrator.hold_invariants is True:
             system = projected_system(system, precision)
@@ -239,34 +253,6 @@ def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:
                 "a higher precision for more digits",
             )
         )
-
-
-def _closed_form(scene: Scene, system: System, *, driven: bool) -> ClosedForm | None:
-    """The closed-form solution if ``method`` asks for it.
-
-    Raises:
-        ConfigError: the scene has none, or something requested needs steps.
-    """
-    integrator = scene.config.integrator
-    if integrator.method != "closed_form":
-        return None
-    from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
-
-    try:
-        closed = closed_form_of(scene, driven=driven)
-    except NoClosedForm as none:
-        what = f'given "closed_form", but {none}; allowed here: "taylor"'
-        raise ConfigError(Problem("[integrator] method", what)) from None
-    why = None
-    if integrator.hold_invariants is True:
-        why = "holds its invariants by itself; set hold_invariants = false"
-    elif system.requirements.formulation not in ("rates", "quaternion"):
-        why = f'gives rates and quaternions, not {integrator.formulation}; set formulation = "auto"'
-    elif scene.events:
-        why = 'takes no steps in which events could be found; remove [[events]], or choose method = "taylor"'
-    if why is not None:
-        raise ConfigError(Problem("[integrator] method", f'given "closed_form", which {why}'))
-    return closed
 
 
 def _refuse_spectrum(system: System) -> None:

@@ -20,6 +20,7 @@ class Use(Enum):
     SETTING = "must be the same when a dataset is verified"
     PLATFORM = "versions and machine features that bits can depend on"
     REPEATED = "stands in the summary, too"
+    STEPS = "belongs to steps; earlier versions wrote it for closed forms, too"
 
 
 class RootAttributes(BaseModel):
@@ -80,7 +81,7 @@ class RootAttributes(BaseModel):
     method: Annotated[str | None, Use.SYSTEM] = None
     hold_invariants: Annotated[int | None, Use.SYSTEM] = None
     hold_from_step: Annotated[int | None, Use.SYSTEM] = None
-    taylor_order: Annotated[int, Use.SYSTEM, Use.SETTING, Use.REPEATED]
+    taylor_order: Annotated[int | None, Use.SYSTEM, Use.SETTING, Use.REPEATED, Use.STEPS] = None
     compact_mode: Annotated[int, Use.SYSTEM, Use.SETTING, Use.REPEATED]
     high_accuracy: Annotated[int, Use.SETTING]
     batch_size: Annotated[int, Use.SETTING]
@@ -134,17 +135,18 @@ class RootAttributes(BaseModel):
         return self.model_dump(exclude_none=True)
 
     def of_use(self, use: Use) -> dict[str, Any]:
-        """The attributes that serve one use."""
-        return {name: getattr(self, name) for name in _names(use)}
+        """The attributes that serve one use, as far as they are known."""
+        found = {name: getattr(self, name) for name in _names(use)}
+        return {name: value for name, value in found.items() if value is not None}
 
     def changed(self, use: Use, now: RootAttributes) -> Iterator[tuple[str, Any, Any]]:
-        """Name, value here and value now of those that differ; what an older version didn't record counts as
-        unchanged.
+        """Name, value here and value now of those that differ; what an older version didn't record, or
+        recorded of steps that aren't taken, counts as unchanged.
         """
-        then, others = self.of_use(use), now.of_use(use)
-        for name, value in then.items():
-            if value is not None and value != others[name]:
-                yield name, value, others[name]
+        others, ignored = now.of_use(use), set(_names(Use.STEPS)) - now.of_use(Use.STEPS).keys()
+        for name, value in self.of_use(use).items():
+            if name not in ignored and value != others.get(name):
+                yield name, value, others.get(name)
 
 
 def _names(use: Use) -> list[str]:

@@ -33,11 +33,11 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version(), "rigidsim": sys.modules["rigidsim"].__version__, **found}
 
 
-def code_target(integrator: Any) -> dict[str, str]:
+def code_target(code: Any) -> dict[str, str]:
     """What LLVM compiled for, since bits depend on the CPU's features. The wheel's LLVM can't be asked for
     its version, which heyoka's version determines.
     """
-    lines = dict(line.split(":", 1) for line in str(integrator.llvm_state).splitlines() if ":" in line)
+    lines = dict(line.split(":", 1) for line in str(code.llvm_states[0]).splitlines() if ":" in line)
     lines = {key.strip(): value.strip() for key, value in lines.items()}
     features = lines.get("Target features", "")
     return {

@@ -77,7 +77,7 @@ def plan(
     started, began = time.perf_counter(), time.process_time()
     parts = assemble(prepared)
     compile_seconds, building = time.perf_counter() - started, preparing + time.process_time() - began
-    corrected = parts.corrected
+    corrected = parts.steps()
     pilot = timed_pilot(prepared, corrected, pilot_seconds)
     step = math.ldexp(pilot.step, prepared.system.scaling.time)
     duration = float(prepared.scene.samples.last - prepared.scene.start)
@@ -85,7 +85,7 @@ def plan(
     steps = max(1.0, duration / step * (pace or 1.0))
     samples = prepared.clock.count
     room = storage(prepared, Path(out) / prepared.scene.name)
-    seconds_per_sample = _seconds_per_sample(prepared, parts.corrected, parts.evaluator, room.row)
+    seconds_per_sample = _seconds_per_sample(prepared, corrected, parts.evaluator, room.row)
     integrate = steps * pilot.seconds_per_step
     modelling = _modelling_seconds(prepared, levels)
     record = samples * seconds_per_sample
@@ -130,7 +130,7 @@ def plan(
         "accuracy": None
         if choice is None
         else {"chosen": choice.setting.title, "why": choice.why, "forecast": choice.forecast},
-        "taylor_order": int(corrected.stepper.integrator.order),
+        "taylor_order": parts.order,
         "pilot": {
             "steps": float(pilot.taken),
             "step": step,

@@ -81,6 +81,6 @@ def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seco
 
 def _cost(prepared: InitialValueProblem) -> dict[str, float]:
     """Steps and seconds of the whole integration."""
-    pilot = timed_pilot(prepared, assemble(prepared).corrected, _PILOT_SECONDS)
+    pilot = timed_pilot(prepared, assemble(prepared).steps(), _PILOT_SECONDS)
     steps = math.ceil(pilot.whole * (forecast_pace(prepared, pilot) or 1.0))
     return {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}

@@ -21,9 +21,9 @@ from rigidsim.session.guards import Observer
 from rigidsim.session.progress.progress import watched
 from rigidsim.session.session import Session
 from rigidsim.session.tuning import Tuning
+from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
-from rigidsim.solve.steppers import stepper_of
 from rigidsim.store import atomic, netcdf
 from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
@@ -285,8 +285,7 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
             f"{last}: has schema version {version}; only runs of versions {oldest} to {SCHEMA_VERSION} can "
             "be resumed; begin a new run"
         )
-    stepper = stepper_of(prepared.system, prepared.precision, prepared.tolerance, prepared.clock.start)
-    now = attributes_now(prepared, stepper, chain.run)
+    now = attributes_now(prepared, assemble(prepared), chain.run)
     for name, then, value in saved.changed(Use.SYSTEM, now):
         raise RunFolderError(f"{last}: cannot be resumed from: its {name} is {then}, now {value}")
     if saved.python_loads != now.python_loads:

@@ -134,7 +134,7 @@ def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING)
     scene = build_scene(experiment)
     start, end = float(scene.start), float(scene.samples.last)
     prepared = prepare_scene(experiment, trial_scene(experiment, DEFAULT))
-    corrected = assemble(prepared).corrected
+    corrected = assemble(prepared).steps()
     pilot = run_pilot(
         corrected.stepper, prepared.clock, corrected.skip, steps=how.pilot_steps, warming=_WARMING
     )

@@ -127,7 +127,7 @@ def speed(experiment: Experiment, task: Task) -> dict[str, Any]:
             return True
 
         return {"seconds": _per_unit(one_pass, len(rows), len(rows), task.patience)}
-    corrected = assemble(prepared).corrected
+    corrected = assemble(prepared).steps()
     start = corrected.boundary()
 
     def steps(count: int) -> bool:

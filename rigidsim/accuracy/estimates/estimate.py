@@ -94,7 +94,7 @@ def estimate_errors(
     """
     scene, system = prepared.scene, prepared.system
     carried = system.requirements.formulation != "rates"
-    if prepared.closed is not None:
+    if not prepared.has_steps:
         error = CLOSED_FORM * float(prepared.precision.epsilon)
         return _everywhere(prepared, error, carried, "a few roundings of the closed form")
     start = float(prepared.clock.start)
