@@ -13,10 +13,11 @@ class CompiledFunction(Protocol):
     """Function returned by ``heyoka.cfunc``.
 
     Attributes:
-        llvm_states: the compiled modules, which print what they were compiled for.
+        llvm_states: the compiled modules (in compact mode one for all), which print what they were compiled
+            for.
     """
 
-    llvm_states: tuple[Any, ...]
+    llvm_states: Any
 
     def __call__(self, *inputs: Any, **options: Any) -> np.ndarray:
         """From inputs (k,) or (k, n) to outputs, in its own precision."""

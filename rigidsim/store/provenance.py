@@ -37,7 +37,9 @@ def code_target(code: Any) -> dict[str, str]:
     """What LLVM compiled for, since bits depend on the CPU's features. The wheel's LLVM can't be asked for
     its version, which heyoka's version determines.
     """
-    lines = dict(line.split(":", 1) for line in str(code.llvm_states[0]).splitlines() if ":" in line)
+    states = code.llvm_states  # one for all in compact mode
+    first = states[0] if isinstance(states, tuple) else states
+    lines = dict(line.split(":", 1) for line in str(first).splitlines() if ":" in line)
     lines = {key.strip(): value.strip() for key, value in lines.items()}
     features = lines.get("Target features", "")
     return {

@@ -1,0 +1,132 @@
+"""A run in closed form needs no Taylor engine, and goes on after a kill bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+import pytest
+from support import cases, config, same_bits
+
+import rigidsim
+from rigidsim.session.guards import Observer
+from rigidsim.session.tuning import Tuning
+from rigidsim.solve.assembly import assemble
+from rigidsim.solve.checkpoint_arrays import pack
+from rigidsim.solve.compiled import CodeStore, kept_in
+from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.sampler import Progress
+from rigidsim.store import netcdf
+from rigidsim.store.segments import SegmentLimits
+
+# blocks of a few samples, each followed by a segment
+EAGER = Tuning(
+    Pacing(chunk_seconds=0.0, patience=0.0, rows_at_once=8, wide_rows_at_once=8), SegmentLimits(seconds=0.0)
+)
+TOP = {
+    "body": 'principal_moments = [1, 1, "0.3 kg m^2"]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]',
+    "initial": "angular_velocity = [0.1, 0.2, 9]\neuler_angles = [0.2, 0.6, 0.7]",
+    "loads": 'kind = "uniform_gravity"',
+    "time": "start = 1\nend = 4\nsamples = 61",  # so dense that the samples tell the turns
+    "output": 'record = ["quaternion", "euler_angles"]',
+    "name": "top",
+}
+PRECISIONS = ("single", "double", "extended", "quadruple", "30")
+
+
+def top(precision: str, *, estimate: bool = False) -> rigidsim.Experiment:
+    given = precision if precision.isdigit() else f'"{precision}"'
+    integrator = f'method = "closed_form"\nprecision = {given}'
+    return rigidsim.parse(config(**TOP, integrator=integrator, estimate=estimate))
+
+
+class Killed(BaseException):
+    """As sudden as a kill: nothing is saved after it."""
+
+
+class KillsAt(Observer):
+    """Ends the process's part once some samples are taken."""
+
+    def progressed(self, progress: Progress) -> None:
+        if progress.next_sample >= 24:
+            raise Killed
+
+
+@contextmanager
+def engines_made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Names of heyoka's makers of engines, as often as they are called; none is kept from before."""
+    made: list[str] = []
+
+    def counted(name: str) -> Any:
+        make = getattr(hy, name)
+        return lambda *args, **options: made.append(name) or make(*args, **options)
+
+    with monkeypatch.context() as patch, kept_in(CodeStore()):
+        for name in ("taylor_adaptive", "taylor_adaptive_batch"):
+            patch.setattr(hy, name, counted(name))
+        yield made
+
+
+def killed(experiment: rigidsim.Experiment, out: Path) -> Path:
+    """The folder of a run that was killed after three of its eight blocks."""
+    with pytest.raises(Killed):
+        rigidsim.run(experiment, out=out, observer=KillsAt(), tuning=EAGER)
+    folder = out / "top"
+    assert (folder / "segments").is_dir()
+    assert not (folder / "dataset.h5").exists()
+    return folder
+
+
+def test_no_engine_is_compiled_from_the_start_to_the_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with engines_made(monkeypatch) as made:
+        run = rigidsim.resume(killed(top("double", estimate=True), tmp_path), tuning=EAGER)
+        assert rigidsim.verify(run.folder.path).identical
+        assert run.summary["accuracy"]["estimated_attitude_error"] > 0
+        assert made == []
+        with run.dataset as dataset:
+            assert "taylor_order" not in dataset.attrs
+            assert {"code_target_cpu", "code_fast_math", "compact_mode"} <= set(dataset.attrs)
+        # what steps does compile some, and is seen to; a plan's pilot steps whatever the method
+        rigidsim.plan(top("double"), out=tmp_path)
+        assert "taylor_adaptive" in made
+
+
+@pytest.mark.parametrize("precision", cases(PRECISIONS, ("double",)))
+def test_a_killed_run_resumes_bit_for_bit(precision: str, tmp_path: Path) -> None:
+    whole = rigidsim.run(top(precision), out=tmp_path / "whole")
+    folder = killed(top(precision), tmp_path / "cut")
+    done = rigidsim.resume(folder, tuning=EAGER)
+    assert done.status == "finished"
+    assert done.summary["cost"]["sessions"] == 2
+    same_bits(whole, done)
+    one, other = (netcdf.read_group(run.folder.checkpoint, "checkpoint") for run in (whole, done))
+    assert sorted(one) == sorted(other)
+    for name in set(one) - {"effort", "sessions"}:
+        np.testing.assert_array_equal(one[name], other[name], name)
+
+
+@pytest.mark.parametrize("precision", cases(PRECISIONS, ("double", "30")))
+def test_the_boundary_without_an_engine_is_the_engines_own(precision: str) -> None:
+    prepared = prepare(top(precision))
+    parts = assemble(prepared)
+    assert parts.corrected is None
+    without = parts.boundary()
+    parts.steps()
+    engines = parts.boundary()
+    for one, other in ((without.mark.time, engines.mark.time), (without.mark.state, engines.mark.state)):
+        arrays = [
+            pack(np.array(values, dtype=prepared.precision.scalar), prepared.precision, "found")
+            for values in (one, other)
+        ]
+        for name, values in arrays[0].items():
+            assert values.tobytes() == arrays[1][name].tobytes()
+    assert (without.mark.steps, without.mark.events) == (engines.mark.steps, engines.mark.events) == (0, 0)
+    assert without.angles == engines.angles
+    assert without.projection.shape == engines.projection.shape
