@@ -159,8 +159,8 @@ def _first(forecasts: Forecasts, candidates: list[Setting], most: float, hope: f
         error = forecasts.error(setting)
         if error <= most:
             return Choice(setting, error, steps, forecasts.why(setting), motion)
-        dearer = all(s.precision != setting.precision for s in candidates[n + 1 :] if s.method == "taylor")
-        if dearer and setting.method == "taylor" and error <= hope:
+        dearer = all(s.precision != setting.precision for s in candidates[n + 1 :] if s.has_steps)
+        if dearer and setting.has_steps and error <= hope:
             why = f"{forecasts.why(setting)}; the next precision costs ten times as much"
             return Choice(setting, error, steps, why, motion)
     return None

@@ -52,7 +52,7 @@ def cost(setting: Setting, steps: float, samples: int, *, units: UnitCosts = MEA
         samples: samples of the run; they cost next to nothing if steps are taken.
     """
     digits = max(1.0, setting.precision / 50) if isinstance(setting.precision, int) else None
-    if setting.method == "closed_form":
+    if not setting.has_steps:
         if setting.bits <= 53:
             return units.closed_start + samples * units.closed_sample
         if digits is not None:

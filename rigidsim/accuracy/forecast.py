@@ -111,7 +111,7 @@ class Forecasts:
 
     def error(self, setting: Setting) -> float:
         """Forecast error at the run's end, rad; measures what it needs."""
-        if setting.method == "closed_form":
+        if not setting.has_steps:
             return self._closed_error(setting)
         rounding = self._rounding(setting)
         if setting.tolerance is None:
@@ -120,7 +120,7 @@ class Forecasts:
 
     def measure(self, setting: Setting) -> bool:
         """Try a setting itself, if worthwhile; False if nothing new can be learnt."""
-        if setting.method == "closed_form" or setting.tolerance is None or setting in self._measured:
+        if not setting.has_steps or setting.tolerance is None or setting in self._measured:
             return False
         if setting.bits > 53:
             return False
@@ -129,7 +129,7 @@ class Forecasts:
 
     def why(self, setting: Setting) -> str:
         """Origin of the forecast, for the summary."""
-        if setting.method == "closed_form":
+        if not setting.has_steps:
             return "its solution in closed form costs less than its steps"
         if setting.tolerance is None and self._obvious(setting):
             return "by the law of rounding errors"

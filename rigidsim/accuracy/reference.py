@@ -118,14 +118,14 @@ def references(
         setting: setting of the run.
         accuracy: requested accuracy, rad, which decides how good those with many digits must be.
     """
-    loose = setting.method == "taylor" and setting.tolerance is not None
+    loose = setting.has_steps and setting.tolerance is not None
     stepped: list[str | int] = []
     if setting.bits <= 53 and loose and motion.steps > policy.extended_steps:
         stepped.append("double")
     if setting.bits <= 53 and (motion.steps <= policy.extended_steps or not motion.closed):
         stepped.append("extended")
     costly: list[Reference] = []
-    if motion.closed and setting.method == "taylor":
+    if motion.closed and setting.has_steps:
         costly.append(closed_form_beyond(setting.precision))
     elif motion.steps <= policy.wide_steps:
         stepped += ["quadruple"] * (setting.bits <= 64)
@@ -252,7 +252,7 @@ def own_error(
     own = reference.setting
     level = own.level * policy.scatter_of(own, motion.steps)
     estimate = math.inf
-    if setting.method == "taylor":
+    if setting.has_steps:
         estimate = difference * min(policy.as_bad, level / setting.level)
         if own.bits <= setting.bits:  # rounded coefficients and initial values are the same in both
             return max(estimate, motion.rounding(own.precision))

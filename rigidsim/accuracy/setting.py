@@ -29,9 +29,14 @@ class Setting:
     method: str = "taylor"
 
     @property
+    def has_steps(self) -> bool:
+        """Whether it integrates in steps; a closed form takes none."""
+        return self.method != "closed_form"
+
+    @property
     def title(self) -> str:
         """Title for tables."""
-        if self.method == "closed_form":
+        if not self.has_steps:
             return f"closed form, {self.precision}"
         tolerance = "" if self.tolerance is None else f", tolerance {self.tolerance:.0e}"
         held = ", held" if self.hold_invariants else ""

@@ -126,7 +126,7 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
 
 
 def _tolerance(setting: Setting) -> float:
-    return math.nan if setting.method == "closed_form" else setting.step_tolerance
+    return setting.step_tolerance if setting.has_steps else math.nan
 
 
 def trusted_error(dataset: xarray.Dataset) -> np.ndarray:

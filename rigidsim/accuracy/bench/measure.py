@@ -138,7 +138,7 @@ class Measurement:
 
     def _units(self, row: Row) -> float:
         """Number of units that cost time: steps, or samples of a closed form."""
-        return self.plan.samples * row.part if row.setting.method == "closed_form" else row.steps
+        return row.steps if row.setting.has_steps else self.plan.samples * row.part
 
 
 def measure(
@@ -201,7 +201,7 @@ def _explore(
     """Fill in attitudes, drifts and counts."""
     tasks = []
     for row in rows:
-        wide = row.setting.precision == "quadruple" and row.setting.method == "taylor"
+        wide = row.setting.precision == "quadruple" and row.setting.has_steps
         row.part = plan.short if wide else plan.part
         tasks.append(attitude_task(plan, row.setting, timing.single * budget, wide=wide))
         row.problem = f"left out: the budget of {budget:g} s was used up before its turn"
