@@ -69,7 +69,7 @@ class ActiveRun:
         if folder is not None:
             limits = session.tuning.segments
             writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
-        recorder = Recorder(prepared, parts.evaluator, writer, parts.log, session.effort)
+        recorder = Recorder(prepared, parts.evaluator, writer, parts.log, parts.effects, session.effort)
         interruption = Interruption()
         session.phases.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)

@@ -13,6 +13,7 @@ from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.tuning import AdviceLimits
 from rigidsim.session.understood import time_words
 from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.trail import SampleTrail
@@ -74,7 +75,7 @@ class Diagnostics:
             progress.steps,
             min(progress.time, float(self.prepared.scene.samples.last)),
             trail=trail,
-            waypoints=None if corrected is None else corrected.waypoints,
+            waypoints=None if corrected is None else corrected.effect(Waypoints),
             stepper=None if corrected is None else corrected.stepper,
             nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
             uneven=progress.largest_step / max(progress.smallest_step, 1e-300),

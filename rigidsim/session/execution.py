@@ -117,7 +117,7 @@ def _summarised(
     summary = summarise(
         found,
         spectrum,
-        message=closing_words(prepared, progress, evaluator, log),
+        message=closing_words(prepared, progress, run.parts),
         remarks=session.remarks,
         initial=evaluator.initial_invariants(),
         cost=run.cost(session),

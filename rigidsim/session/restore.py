@@ -5,13 +5,8 @@ from __future__ import annotations
 from rigidsim.errors import RunFolderError
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.checkpoint import Checkpoint
-from rigidsim.solve.checkpoint_arrays import (
-    refuse_other_late_projection,
-    unpack_checkpoint,
-    unpack_events,
-)
+from rigidsim.solve.checkpoint_arrays import unpack_checkpoint, unpack_events
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.projection import LATE
 from rigidsim.store import netcdf
 from rigidsim.store.segments import Chain, root_attributes
 
@@ -28,9 +23,8 @@ def restore(chain: Chain, prepared: InitialValueProblem, parts: Assembly) -> Che
         arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
         names = [invariant.name for invariant in prepared.system.invariants]
         recorded = [variable.name for variable in prepared.system.recorded]
-        checkpoint = unpack_checkpoint(arrays, prepared.precision, names, recorded, parts.boundary())
-        if prepared.holds_late and checkpoint.position.boundary.mark.steps > LATE:
-            refuse_other_late_projection(arrays)
+        effects, start = parts.effects, parts.boundary().mark
+        checkpoint = unpack_checkpoint(arrays, effects, prepared.precision, names, recorded, start)
         for path in chain.paths:
             if "previous_seal" in root_attributes(path):
                 saved = netcdf.read_group(path, "events")

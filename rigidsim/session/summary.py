@@ -14,7 +14,7 @@ from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words, told_loads
 from rigidsim.session.variables import unused_variables
 from rigidsim.solve.assembly import Assembly
-from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.effects.charts import Charts
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
@@ -150,10 +150,9 @@ def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLo
     return clock.label(progress.next_sample - 1) if progress.next_sample else clock.seconds(clock.start)
 
 
-def closing_words(
-    prepared: InitialValueProblem, progress: Progress, evaluator: Evaluator, log: EventLog
-) -> str:
+def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Assembly) -> str:
     """The status in words: which event ended the run and when, or where and why it broke down."""
+    log = parts.log
     text, words = progress.status.message, time_words(prepared.scene)
     if progress.status is Status.EVENT:
         ending = next(f for f in log.found if log.stops[f.index])
@@ -167,7 +166,7 @@ def closing_words(
     if progress.last_good is None:
         return text
     state = np.array([progress.last_good.mark.state], dtype=prepared.precision.scalar)
-    factors = evaluator.singular_factors(state, np.array([progress.last_good.angles.chart]))
+    factors = parts.evaluator.singular_factors(state, np.array([parts.stepper.chart]))  # where it stands
     if factors is not None and abs(float(factors[0])) < NEAR_SINGULAR:
         middle = float(state[0][prepared.system.states.index("theta")])
         text += (
@@ -194,8 +193,9 @@ def chart_changes(prepared: InitialValueProblem, parts: Assembly) -> ChartChange
     system = prepared.system
     if system.partner is None:
         return None
+    charts = None if parts.corrected is None else parts.corrected.effect(Charts)
     return ChartChanges(
-        count=parts.boundary().chart_changes,
+        count=0 if charts is None else charts.changes,
         sequence=system.sequence,
         partner=system.partner.sequence,
     )

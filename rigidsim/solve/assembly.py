@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
+from rigidsim.solve.effects.angle_wrapping import AngleWrapping
+from rigidsim.solve.effects.charts import Charts
+from rigidsim.solve.effects.effect import Effect
+from rigidsim.solve.effects.held_invariants import HeldInvariants
+from rigidsim.solve.effects.waypoints import Waypoints
+from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.loop import IntegrationLoop
@@ -64,6 +67,13 @@ class Assembly:
         """Order of the Taylor series; None without steps."""
         return None if self.corrected is None else int(self.stepper.integrator.order)
 
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """What happens between steps; without any, what the angles stand for remains."""
+        if self.corrected is not None:
+            return self.corrected.effects
+        return (self.wrapping,) if self.wrapping.positions else ()
+
     def boundary(self) -> StepBoundary:
         """The boundary where it stands: without steps, the start."""
         if self.corrected is not None:
@@ -71,7 +81,7 @@ class Assembly:
         precision = self.prepared.precision
         start = self.prepared.clock.start, precision.of_double(0.0)
         mark = Mark(start, precision.array(self.prepared.system.initial))
-        return StepBoundary(mark, self.wrapping.angles, chart_changes=0, projection=np.zeros(0))
+        return StepBoundary(mark, tuple(effect.memory for effect in self.effects))
 
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
@@ -89,7 +99,7 @@ def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly
 def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     system, precision = prepared.system, prepared.precision
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context, system.angle_unit)
-    log = EventLog([c.stop for c in system.crossings], wrapping)
+    log = EventLog([c.stop for c in system.crossings], lambda: wrapping.angles)
     corrected, countable = None, not system.turning  # samples alone can't tell what such a load does
     if prepared.has_steps:
         corrected = _stepping(prepared, wrapping, log, stride)
@@ -104,11 +114,22 @@ def _stepping(
 ) -> CorrectedStepper:
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     stepper = stepper_of(system, precision, prepared.tolerance, start, log)
-    projection = None
+    # in the order in which they are applied
+    effects: list[Effect] = []
+    whole = WholeTime() if WholeTime.suits(stepper) else None
+    if whole is not None:
+        effects.append(whole)
+    if wrapping.positions:
+        effects.append(wrapping)
     if prepared.holds_invariants:
-        projection = Projection(system, precision, start, late=prepared.holds_late)
-    interval = steps_between(precision, late=prepared.holds_late)
-    return CorrectedStepper(stepper, wrapping, projection, stride=stride, projection_interval=interval)
+        late = prepared.holds_late
+        projection = Projection(system, precision, start, late=late)
+        effects.append(HeldInvariants(projection, steps_between(precision, late=late)))
+    if system.partner is not None:
+        charts = Charts(system, system.partner, precision, wrapping, whole)
+        charts.watch(stepper)
+        effects.append(charts)
+    return CorrectedStepper(stepper, [*effects, Waypoints()], stride=stride)
 
 
 def radians_between_samples(prepared: InitialValueProblem) -> float:
@@ -144,7 +165,16 @@ def sampler(
     from rigidsim.solve.closed_form.sampler import ClosedFormSampler
 
     return ClosedFormSampler(
-        prepared.closed, prepared.system, parts.boundary(), clock, precision, receiver, check, start, pacing
+        prepared.closed,
+        prepared.system,
+        parts.boundary(),
+        parts.wrapping.angles,
+        clock,
+        precision,
+        receiver,
+        check,
+        start,
+        pacing,
     )
 
 

@@ -12,9 +12,10 @@ import heyoka as hy
 import mpmath
 import numpy as np
 
-from rigidsim.solve.angle_wrapping import AngleState
+from rigidsim.solve.angle_state import pack_angles, unpack_angles
 from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics, Undefined
 from rigidsim.solve.corrected_stepper import StepBoundary
+from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.events import FoundEvent
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Mark
@@ -24,10 +25,6 @@ Arrays = dict[str, np.ndarray]
 """Float64 or int64 arrays by name."""
 
 _STEP = 512  # a power of two that every type holds
-_LATE_PROJECTION = 1
-"""How ``hold_invariants = "auto"`` projects: 0 (where it is missing) compiled a second integrator whose
-coefficients have two parts; 1 adds at each correction what the coefficients lack.
-"""
 
 
 def pack(values: np.ndarray, precision: Precision, name: str) -> Arrays:
@@ -82,11 +79,16 @@ def _power(precision: Precision, exponent: int) -> Scalar:
 
 
 def pack_checkpoint(
-    checkpoint: Checkpoint, precision: Precision, invariants: Sequence[str], recorded: Sequence[str]
+    checkpoint: Checkpoint,
+    effects: Sequence[Effect],
+    precision: Precision,
+    invariants: Sequence[str],
+    recorded: Sequence[str],
 ) -> Arrays:
     """A checkpoint as arrays.
 
     Args:
+        effects: those whose memories it holds, in order.
         invariants, recorded: the system's invariants and recorded variables, in order.
     """
     position, continuity, counted = checkpoint.position, checkpoint.continuity, checkpoint.statistics
@@ -95,11 +97,8 @@ def pack_checkpoint(
     arrays = pack(np.array(mark.time, dtype=precision.scalar), precision, "time")
     arrays |= pack(mark.state, precision, "state")
     arrays["counts"] = np.array([mark.steps, mark.events, position.next_sample], dtype=np.int64)
-    arrays["rhythm_turns"] = _pack_angles([boundary.angles])[0]
-    if boundary.angles.turns:
-        arrays["rhythm_chart_changes"] = np.array([boundary.chart_changes], dtype=np.int64)
-    arrays["rhythm_held"] = boundary.projection
-    arrays["late_projection"] = np.array([_LATE_PROJECTION], dtype=np.int64)
+    for effect, memory in zip(effects, boundary.memories, strict=True):
+        arrays |= effect.pack(memory)
     arrays["rhythm_switching"] = np.array(mark.switching)
     arrays["rhythm_tiny"] = np.array([mark.tiny], dtype=np.int64)
     arrays["joined_turns"] = continuity.turns
@@ -123,29 +122,18 @@ def pack_checkpoint(
     return arrays
 
 
-def refuse_other_late_projection(arrays: Mapping[str, np.ndarray]) -> None:
-    """Look whether a run that projects late was projected as it would be now.
-
-    Raises:
-        ValueError: an earlier version began it, whose bits can't be had again.
-    """
-    if int(arrays.get("late_projection", np.zeros(1))[0]) != _LATE_PROJECTION:
-        raise ValueError(
-            "an earlier version of rigidsim began it, which projected "
-            'hold_invariants = "auto" in another way; resume it with that version, or begin a new run'
-        )
-
-
 def unpack_checkpoint(
     arrays: Mapping[str, np.ndarray],
+    effects: Sequence[Effect],
     precision: Precision,
     invariants: Sequence[str],
     recorded: Sequence[str],
-    start: StepBoundary,
+    start: Mark,
 ) -> Checkpoint:
     """A checkpoint restored from its arrays.
 
     Args:
+        effects: those of the resumed system, in order.
         invariants, recorded: the system's invariants and recorded variables, in order.
         start: any boundary of the resumed system, as a template of what it has to remember.
 
@@ -154,21 +142,14 @@ def unpack_checkpoint(
     """
     time, state = unpack(arrays, precision, "time"), unpack(arrays, precision, "state")
     steps, events, next_sample = _numbers(arrays, "counts", 3)
-    if time.shape != (2,) or state.shape != start.mark.state.shape:
+    if time.shape != (2,) or state.shape != start.state.shape:
         raise ValueError("the checkpoint belongs to another system of equations")
-    [angles] = _unpack_angles(arrays.get("rhythm_turns", np.zeros(0, dtype=np.int64))[None, :])
-    if len(angles.turns) != len(start.angles.turns):
-        raise ValueError("the checkpoint has other angles")
-    projection = arrays.get("rhythm_held", np.zeros(0))
-    if projection.shape != start.projection.shape:
-        raise ValueError(f"the checkpoint remembers {projection.shape} numbers of projections")
-    chart_changes = int(arrays.get("rhythm_chart_changes", np.zeros(1))[0])
     switching = np.asarray(arrays.get("rhythm_switching", np.zeros(0)), dtype=np.float64)
-    if switching.shape != (len(start.mark.switching),):
+    if switching.shape != (len(start.switching),):
         raise ValueError(f"the checkpoint remembers {switching.shape} numbers of switching surfaces")
     tiny = int(arrays.get("rhythm_tiny", np.zeros(1))[0])
     mark = Mark((time[0], time[1]), state, int(events), int(steps), tuple(switching.tolist()), tiny)
-    boundary = StepBoundary(mark, angles, chart_changes, projection)
+    boundary = StepBoundary(mark, tuple(effect.unpack(arrays) for effect in effects))
     continuity = Continuity(
         np.asarray(arrays.get("joined_turns", np.zeros(3)), dtype=np.int64),
         arrays.get("joined_angles"),
@@ -234,32 +215,6 @@ def _unpack_undefined(table: np.ndarray | None, names: Sequence[str]) -> dict[st
     return {name: Undefined(int(n), int(leading), since) for name, (n, leading, since) in rows if n}
 
 
-def _pack_angles(found: Sequence[AngleState]) -> np.ndarray:
-    """One row for each: turns, chart, and the bits of the reference angles; (n, 0) without angle states.
-
-    Unfinished runs have been saved in this format before ``AngleState`` was a value of its own.
-    """
-    rows = [
-        [*angles.turns, angles.chart, *np.array(angles.reference, dtype=np.float64).view(np.int64)]
-        for angles in found
-        if angles.turns
-    ]
-    return np.array(rows, dtype=np.int64).reshape(len(found), -1)
-
-
-def _unpack_angles(rows: np.ndarray) -> list[AngleState]:
-    if not rows.shape[1]:
-        return [AngleState()] * len(rows)
-    if rows.shape[1] != 7:
-        raise ValueError(f"angles of shape {rows.shape}")
-    rows = np.ascontiguousarray(rows, dtype=np.int64)
-    reference = np.ascontiguousarray(rows[:, 4:]).view(np.float64)
-    return [
-        AngleState((a, b, c), chart, tuple(angles))
-        for (a, b, c, chart, *_), angles in zip(rows.tolist(), reference.tolist(), strict=True)
-    ]
-
-
 def pack_events(found: Sequence[FoundEvent], precision: Precision) -> Arrays:
     """Crossings as arrays."""
     if not found:
@@ -268,7 +223,7 @@ def pack_events(found: Sequence[FoundEvent], precision: Precision) -> Arrays:
     states = np.concatenate([np.asarray(f.state) for f in found]).astype(precision.scalar)
     arrays |= pack(states, precision, "state")
     arrays["index"] = np.array([f.index for f in found], dtype=np.int64)
-    arrays["turns"] = _pack_angles([f.angles for f in found])
+    arrays["turns"] = pack_angles([f.angles for f in found])
     return arrays
 
 
@@ -287,5 +242,5 @@ def unpack_events(arrays: Mapping[str, np.ndarray], precision: Precision, states
     index = arrays.get("index", np.zeros(0, dtype=np.int64))
     if index.shape != (count,):
         raise ValueError("events without their kind")
-    angles = _unpack_angles(arrays.get("turns", np.zeros((count, 0), dtype=np.int64)))
+    angles = unpack_angles(arrays.get("turns", np.zeros((count, 0), dtype=np.int64)))
     return [FoundEvent(int(i), t, v, a) for i, t, v, a in zip(index, times, values, angles, strict=True)]

@@ -4,34 +4,30 @@ A step is never clamped to a sample, but some corrections have to be made along 
 back into one turn, and the engine's time, which is a sum of two numbers, is put back on a single one. They
 happen at fixed counts of natural steps: on whichever path a run goes through these counts, skipping,
 recording or resumed, it does the same there. A chart of Euler angles is changed at the first step boundary
-whose state asks for it, likewise.
-
-That time is a single number at each stride's start is what lets whole strides be recorded by the engine's own
-grid output, which starts at such a time only. The move back to it is a step of some 1e-16 of the time.
+whose state asks for it, likewise. Each of them is an effect (``rigidsim.solve.effects``).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
-from rigidsim.solve.angle_wrapping import STEPS_BETWEEN, AngleState, AngleWrapping
-from rigidsim.solve.building import interruptible
-from rigidsim.solve.charts import Charts
+from rigidsim.solve.effects.effect import Effect
+from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.projection import LATE, NOTED, Projection
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.stepper import Mark, Stepper
-from rigidsim.solve.trail import Waypoints
+
+E = TypeVar("E", bound=Effect)
 
 STRIDE = 1024
 """Natural steps between corrections if only time is corrected: half a millisecond, so that the calls cost
 less than a hundredth of it.
 """
-
-_NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -40,15 +36,11 @@ class StepBoundary:
 
     Attributes:
         mark: the engine's time and state, and counts.
-        angles: what the angle states stand for.
-        chart_changes: number of chart changes so far.
-        projection: a copy of ``Projection.memory``; (0,) if nothing is projected.
+        memories: those of the effects, in their order.
     """
 
     mark: Mark
-    angles: AngleState
-    chart_changes: int
-    projection: np.ndarray
+    memories: tuple[Any, ...]
 
 
 _NEAR = 3
@@ -56,53 +48,30 @@ _NEAR = 3
 
 
 class CorrectedStepper:
-    """Takes steps and makes corrections when they are due.
+    """Takes steps and applies effects when they are due.
 
     Attributes:
-        projection: puts invariants back, if requested.
-        whole_times: whether time is a single number at each stride's start. Not where events or switching
-            surfaces are looked for: a step back could cross one twice; nor where steps are cut short.
-        charts: charts of a run in Euler angles; None for others.
-        collapsed: whether steps have become too small to ever arrive.
-        waypoints: some of the boundaries after corrections.
+        effects: in the order in which they are applied.
+        whole_times: whether time is a single number at each stride's start.
+        stride: natural steps between corrections at present.
 
     Args:
         stride: largest number of natural steps between corrections; affects results within rounding.
-        projection_interval: largest number of natural steps between projections.
     """
 
-    def __init__(
-        self,
-        stepper: Stepper,
-        wrapping: AngleWrapping,
-        projection: Projection | None = None,
-        *,
-        stride: int = STRIDE,
-        projection_interval: int = STRIDE,
-    ) -> None:
-        self.stepper = stepper
-        self.wrapping = wrapping
-        self.projection = projection
-        self._plain_stride = min(stride, STEPS_BETWEEN) if wrapping.positions else stride
-        self._held_stride = min(self._plain_stride, projection_interval)
-        self._projection_interval = max(projection_interval // self._held_stride, 1) * self._held_stride
-        self.whole_times = not (stepper.has_events or stepper.single_steps or stepper.cuts_steps)
+    def __init__(self, stepper: Stepper, effects: Sequence[Effect], *, stride: int = STRIDE) -> None:
+        self.stepper, self.effects, self._longest_stride = stepper, tuple(effects), stride
+        self._anywhere = [effect for effect in effects if effect.anywhere]
+        self.whole_times = self.effect(WholeTime) is not None
         self._stuck = False
-        self.waypoints = Waypoints()
-        self.charts: Charts | None = None
-        system = stepper.system
-        if system.partner is not None:
-            self.charts = stepper.watcher = Charts(system, system.partner, stepper.precision, wrapping)
-            if self.charts.near(stepper.state):  # no change on the way: it begins there
-                self._change_chart(self.charts)
-                self.charts.changes = 0
-                stepper.bound_first_step()
+        self._set_stride()
 
-    @property
-    def stride(self) -> int:
-        """Natural steps between corrections."""
-        holding = self.projection is not None and self.projection.holding
-        return self._held_stride if holding else self._plain_stride
+    def effect(self, kind: type[E]) -> E | None:
+        """The effect of a kind; None if there is none."""
+        return next((effect for effect in self.effects if isinstance(effect, kind)), None)
+
+    def _set_stride(self) -> None:
+        self.stride = min([self._longest_stride, *(effect.limit for effect in self.effects)])
 
     @property
     def left(self) -> int:
@@ -116,25 +85,15 @@ class CorrectedStepper:
 
     def boundary(self) -> StepBoundary:
         """Remember this boundary."""
-        return StepBoundary(
-            self.stepper.mark(),
-            self.wrapping.angles,
-            0 if self.charts is None else self.charts.changes,
-            _NOTHING if self.projection is None else self.projection.memory.copy(),
-        )
+        return StepBoundary(self.stepper.mark(), tuple([effect.memory for effect in self.effects]))
 
     def back_to(self, boundary: StepBoundary) -> None:
         """Return to a boundary."""
         self._stuck = False
-        self.wrapping.angles = boundary.angles
-        if self.projection is not None:
-            self.projection.memory[...] = boundary.projection
-        if self.charts is not None:
-            self.charts.changes = boundary.chart_changes
-            self.stepper.use(self.charts.chart)
-            if self.projection is not None:
-                self.projection.use(self.charts.chart)
+        for effect, memory in zip(self.effects, boundary.memories, strict=True):
+            effect.back_to(memory, self.stepper)
         self.stepper.back_to(boundary.mark)
+        self._set_stride()
 
     def arrive(self, boundary: StepBoundary, moment: Scalar) -> StepBoundary:
         """Go back to a boundary before a moment, and on by the same steps to the first boundary at or past
@@ -186,48 +145,17 @@ class CorrectedStepper:
             first: index of the first sample.
             times, states: those of each sample, as in ``SampleBlock``.
         """
-        reference = None if self.charts is None else self.charts.references(times)
-        # corrections put back before a sample: by all corrections before its own step
-        put_back = _NOTHING if self.projection is None else self.projection.corrections
-        return SampleBlock.of(first, times, states, self.wrapping.angles, put_back, reference)
+        known: dict[str, Any] = {}
+        for effect in self.effects:
+            known |= effect.of_samples(times)
+        return SampleBlock.of(first, times, states, **known)
 
     def correct(self) -> None:
-        """Make the corrections if they are due; dense output of the latest step is then void."""
-        due = self.stepper.steps % self.stride == 0
-        change = self.charts is not None and self.charts.near(self.stepper.state)
-        if not (due or change):
-            return
-        if self.whole_times and not self.stepper.to_whole_time():
-            self._stuck = True
-            return
-        if due and self.wrapping.positions:
-            self.wrapping.wrap(self.stepper.state)
-        if due and self.projection is not None:
-            self._project(self.projection)
-        if change and self.charts is not None:
-            self._change_chart(self.charts)
-        if due:
-            self._note()
-
-    def _project(self, projection: Projection) -> None:
-        state, time, steps = self.stepper.state, self.stepper.time, self.stepper.steps
-        if projection.holding:
-            if not projection.late or steps % self._projection_interval == 0:
-                projection.project(state, time)
-        elif steps >= LATE:
-            interruptible(projection.load)
-            projection.begin(state, time)
-        elif steps % NOTED == 0:
-            projection.note(state, time, steps // NOTED - 1)
-
-    def _note(self) -> None:
-        stepper, chart = self.stepper, 0 if self.charts is None else self.charts.chart
-        number = stepper.steps // self.stride
-        self.waypoints.note(number, stepper.steps, stepper.time, stepper.state, chart)
-
-    def _change_chart(self, charts: Charts) -> None:
-        state = charts.change(self.stepper.state)
-        self.stepper.use(charts.chart)
-        if self.projection is not None:
-            self.projection.use(charts.chart)
-        self.stepper.state[:] = state
+        """Apply the effects that are due; dense output of the latest step is then void."""
+        stepper, stride = self.stepper, self.stride
+        possible = self._anywhere if stepper.steps % stride else self.effects
+        for effect in [effect for effect in possible if effect.due(stepper, stride)]:
+            if not effect.apply(stepper, self.stride):
+                self._stuck = True
+                return
+            self.stride = min(self.stride, effect.limit)  # shorter once projection has begun

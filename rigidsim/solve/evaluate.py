@@ -13,10 +13,10 @@ import numpy as np
 
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.solve.angle_wrapping import AngleWrapping
 from rigidsim.solve.building import interruptible
-from rigidsim.solve.charts import Lift
 from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.effects.angle_wrapping import AngleWrapping
+from rigidsim.solve.effects.charts import Lift
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.rows import evaluate_rows

@@ -15,7 +15,7 @@ import numpy as np
 
 from rigidsim.errors import StoppedError
 from rigidsim.model.system import System
-from rigidsim.solve.angle_wrapping import AngleState, AngleWrapping
+from rigidsim.solve.angle_state import AngleState
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.event_units import of_order_one
@@ -56,14 +56,14 @@ class EventLog:
 
     Attributes:
         stops: for each of the system's events, whether it ends the run.
-        wrapping: knows what the angle states stand for; None if there are none.
+        angles: what the angle states stand for now.
         stop: time of the first crossing that ends the run, or None.
         quiet_until: time up to which crossings are already known; None if there are none.
         muted: whether a step is being repeated whose crossings are already known.
     """
 
     stops: list[bool] = field(default_factory=list)
-    wrapping: AngleWrapping | None = None
+    angles: Callable[[], AngleState] = AngleState
     found: list[FoundEvent] = field(default_factory=list)
     stop: Scalar | None = None
     quiet_until: Scalar | None = None
@@ -84,8 +84,7 @@ class EventLog:
             )
         if self.stop is not None and time > self.stop:
             return
-        angles = AngleState() if self.wrapping is None else self.wrapping.angles
-        self.found.append(FoundEvent(index, time, np.array(state), angles))
+        self.found.append(FoundEvent(index, time, np.array(state), self.angles()))
         if self.stops[index] and self.stop is None:
             self.stop = time
 

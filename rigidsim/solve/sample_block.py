@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.solve.angle_wrapping import AngleState
+from rigidsim.solve.angle_state import AngleState
 
 _NOTHING = np.zeros(0)
+_NO_ANGLES = AngleState()
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class SampleBlock:
         first: int,
         times: np.ndarray,
         states: np.ndarray,
-        angles: AngleState,
+        angles: AngleState = _NO_ANGLES,
         put_back: np.ndarray = _NOTHING,
         reference: np.ndarray | None = None,
     ) -> SampleBlock:

@@ -176,6 +176,11 @@ class Stepper:
         return self._integrator
 
     @property
+    def chart(self) -> int:
+        """0 in the system, 1 in its partner."""
+        return self._chart
+
+    @property
     def time(self) -> Scalar:
         """Current time (high part), internal units."""
         return self._integrator.time

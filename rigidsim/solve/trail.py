@@ -1,7 +1,4 @@
-"""A few of a run's samples and step boundaries, spread evenly over it and kept in memory.
-
-The run's errors are later estimated at the samples, and its neighbours start from the boundaries.
-"""
+"""A few of a run's samples, spread evenly over it: its errors are later estimated there."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ import numpy as np
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 
-_MOST_WAYPOINTS = 32
 _MOST = {True: 64, False: 16}  # of narrow precisions, whose closed forms take arrays, and of others
 
 
@@ -50,38 +46,3 @@ class SampleTrail:
     @staticmethod
     def _sample(block: SampleBlock, row: int) -> tuple[int, Scalar, np.ndarray, int]:
         return block.first + row, block.times[row], np.array(block.states[row]), int(block.chart[row])
-
-
-@dataclass(frozen=True)
-class Waypoint:
-    """A step boundary, internal units."""
-
-    steps: int
-    time: float
-    state: np.ndarray
-    chart: int
-
-
-@dataclass
-class Waypoints:
-    """Evenly spaced boundaries of corrections; the choice depends on the steps alone."""
-
-    _kept: dict[int, Waypoint] = field(default_factory=dict)
-    _spacing: int = 1
-
-    def note(self, number: int, steps: int, time: Scalar, state: np.ndarray, chart: int) -> None:
-        """Note the boundary of correction ``number``, unless it is there already."""
-        if number % self._spacing:
-            return
-        # numbers of more than 80 bits aren't numpy's own
-        plain = state.astype(np.float64) if state.dtype.kind == "f" else np.array([float(x) for x in state])
-        self._kept[number] = Waypoint(steps, float(time), plain, chart)
-        if len(self._kept) > _MOST_WAYPOINTS:
-            self._spacing *= 2
-            self._kept = {n: kept for n, kept in self._kept.items() if n % self._spacing == 0}
-
-    def between(self, first: float, last: float) -> list[Waypoint]:
-        """Boundaries between two counts of steps, in order."""
-        return sorted(
-            (kept for kept in self._kept.values() if first <= kept.steps < last), key=lambda kept: kept.steps
-        )

@@ -25,9 +25,7 @@ from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.session.storage import storage
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.session.variables import dataset_variables, unused_variables
-from rigidsim.solve.assembly import assemble
-from rigidsim.solve.corrected_stepper import CorrectedStepper
-from rigidsim.solve.evaluate import Evaluator
+from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
@@ -85,7 +83,7 @@ def plan(
     steps = max(1.0, duration / step * (pace or 1.0))
     samples = prepared.clock.count
     room = storage(prepared, Path(out) / prepared.scene.name)
-    seconds_per_sample = _seconds_per_sample(prepared, corrected, parts.evaluator, room.row)
+    seconds_per_sample = _seconds_per_sample(prepared, parts, room.row)
     integrate = steps * pilot.seconds_per_step
     modelling = _modelling_seconds(prepared, levels)
     record = samples * seconds_per_sample
@@ -174,15 +172,13 @@ def _modelling_seconds(prepared: InitialValueProblem, levels: Sequence[Mapping[s
     return next((row["modelling_seconds"] or 0.0 for row in levels if row["level"] == average.level), 0.0)
 
 
-def _seconds_per_sample(
-    prepared: InitialValueProblem, corrected: CorrectedStepper, evaluator: Evaluator, row: float
-) -> float:
+def _seconds_per_sample(prepared: InitialValueProblem, parts: Assembly, row: float) -> float:
     """Cost of a sample that takes ``row`` bytes, s."""
     count = _EVALUATED[prepared.precision.cheap]
     states = np.repeat(prepared.precision.array(prepared.system.initial)[None, :], count, axis=0)
     times = np.repeat(prepared.clock.internal(0, 1), count)
-    block = SampleBlock.of(0, times, states, corrected.wrapping.angles)
+    block = SampleBlock.of(0, times, states, parts.wrapping.angles)
     started = time.perf_counter()
-    evaluator.evaluate(block)
+    parts.evaluator.evaluate(block)
     evaluation = (time.perf_counter() - started) / count
     return evaluation + row * _COMPRESSION + _BUFFERING

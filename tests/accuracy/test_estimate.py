@@ -17,11 +17,11 @@ from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.neighbours import lanes
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
-from rigidsim.solve.trail import Waypoints
 from rigidsim.store.variables import parts_in
 
 COVERED = 3.0  # the campaign's measure (experiments/error_coverage.py): true at most 3 times the announced
@@ -139,7 +139,7 @@ def test_a_motion_that_is_followed_loosely_is_held_against_the_run(monkeypatch: 
     prepared = prepare(rigidsim.parse(scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "1000", DRIVEN)))
     parts = assemble(prepared)
     steps = sampler(prepared, parts, Unread()).run().steps
-    passed = parts.corrected.waypoints
+    passed = parts.steps().effect(Waypoints)
     elsewhere = Waypoints()
     for n, point in enumerate(passed.between(0, steps)):
         elsewhere.note(n, point.steps, point.time, 1.1 * point.state, point.chart)

@@ -20,7 +20,7 @@ from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.attitude import AXES, quaternion_from_euler, rotation_matrix
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.charts import NEAR
+from rigidsim.solve.effects.charts import NEAR
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import precision_of
 from rigidsim.workflows.plan import plan

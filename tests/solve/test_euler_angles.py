@@ -54,7 +54,7 @@ def test_angles_grow_through_full_turns_without_a_jump() -> None:
 @pytest.mark.slow
 def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(monkeypatch: pytest.MonkeyPatch) -> None:
     """heyoka's step control is relative to the largest component: unwrapped angles loosen it."""
-    from rigidsim.solve.angle_wrapping import AngleWrapping
+    from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 
     setting = ['integrator.formulation="euler_angles"', "time.end=20000", "time.samples=101"]
     wrapped = run_text(FREE, 'name="w"', *setting)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.trail import Waypoints
 
 
 @dataclass(frozen=True)

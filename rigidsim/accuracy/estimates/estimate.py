@@ -22,10 +22,11 @@ from rigidsim.accuracy.estimates.exact_error import ExactError, exact_error
 from rigidsim.accuracy.estimates.following import follow, leading
 from rigidsim.accuracy.estimates.growth import exponential_growth, power_of_time
 from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
+from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.trail import SampleTrail, Waypoints
+from rigidsim.solve.trail import SampleTrail
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from rigidsim.accuracy.estimates.course import Course, Followed
 from rigidsim.accuracy.estimates.growth import power_of_time
 from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.solve.building import interruptible
+from rigidsim.solve.effects.waypoints import Waypoint
 from rigidsim.solve.neighbours.lanes import (
     LOOSE,
     NEIGHBOURS,
@@ -28,7 +29,6 @@ from rigidsim.solve.neighbours.lanes import (
 )
 from rigidsim.solve.neighbours.pushed import Neighbours
 from rigidsim.solve.neighbours.spread import Spread
-from rigidsim.solve.trail import Waypoint
 
 
 def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:

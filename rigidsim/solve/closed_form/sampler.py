@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from rigidsim.model.system import System
+from rigidsim.solve.angle_state import AngleState
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.closed_form.solution import ClosedForm
 from rigidsim.solve.corrected_stepper import StepBoundary
@@ -24,6 +25,7 @@ class ClosedFormSampler:
 
     Args:
         begin: the integration's start, the only step boundary.
+        angles: what the angle states stand for, at all samples.
         start: where to continue; None starts at the beginning.
     """
 
@@ -32,6 +34,7 @@ class ClosedFormSampler:
         form: ClosedForm,
         system: System,
         begin: StepBoundary,
+        angles: AngleState,
         clock: SampleClock,
         precision: Precision,
         receiver: SampleReceiver,
@@ -41,7 +44,7 @@ class ClosedFormSampler:
     ) -> None:
         self._form = form
         self._system = system
-        self._begin = begin
+        self._begin, self._angles = begin, angles
         self._clock = clock
         self._precision = precision
         self._receiver = receiver
@@ -70,7 +73,7 @@ class ClosedFormSampler:
             states = self._form.states(self._system, self._precision, times, clock.start)
             progress.integration_seconds += time.perf_counter() - started
             try:
-                self._receiver.take(SampleBlock.of(first, times, states, self._begin.angles))
+                self._receiver.take(SampleBlock.of(first, times, states, self._angles))
             except KeyboardInterrupt:  # while the code that counts turns was being compiled
                 stop = self._check(progress)
                 if stop is None:

@@ -16,7 +16,8 @@ keeps the value it had.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import heyoka as hy
 import mpmath
@@ -25,10 +26,14 @@ import numpy as np
 from rigidsim.model.euler_charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
 from rigidsim.model.system import System
 from rigidsim.scene.attitude import quaternion_from_euler
-from rigidsim.solve.angle_wrapping import Angles, AngleState, AngleWrapping
+from rigidsim.solve.angle_state import Angles, AngleState
 from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.effects.angle_wrapping import AngleWrapping
+from rigidsim.solve.effects.effect import Effect
+from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.engine import CompiledFunction, TaylorEngine
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.stepper import Stepper
 
 NEAR = 0.5
 """Singular factor below which a chart is left."""
@@ -90,24 +95,34 @@ class Lift:
         return joined, sign if factor < self._pole else 0, seen
 
 
-class Charts:
+class Charts(Effect):
     """The chart that a run is in, and the changes between charts.
 
-    Called by the engine after each natural step; its memory is in the wrapping's ``angles`` and in
-    ``changes``, both part of a checkpoint.
+    Called by the engine after each natural step. Which chart it is, and the requested angles, are in the
+    memory of the wrapping, which comes before it.
 
     Attributes:
         changes: changes of chart so far.
+
+    Args:
+        whole: puts time on a single number before a change; None where it may be two.
     """
 
-    def __init__(self, asked: System, partner: System, precision: Precision, wrapping: AngleWrapping) -> None:
+    def __init__(
+        self,
+        asked: System,
+        partner: System,
+        precision: Precision,
+        wrapping: AngleWrapping,
+        whole: WholeTime | None = None,
+    ) -> None:
         self._sequences = asked.sequence, partner.sequence
         self._positions = list(asked.angle_states)
         self._middle = self._positions[1]
         self._precision = precision
         self._half = precision.number(mpmath.mpf(0.5))
         self._lift = Lift(asked.sequence, precision)
-        self._wrapping = wrapping
+        self._wrapping, self._whole = wrapping, whole
         self.changes = 0
         self._passed: list[tuple[Scalar, tuple[float, ...]]] = []  # times and asked angles since ``begin``
         self._conversions = [self._compile(sequence) for sequence in self._sequences]
@@ -172,6 +187,56 @@ class Charts:
         for time, _ in self._passed[1:]:
             passed += np.asarray(times > time, dtype=bool)
         return np.array([angles for _, angles in self._passed])[passed]
+
+    # --- as an effect -----------------------------------------------------------------------------------
+
+    def watch(self, stepper: Stepper) -> None:
+        """Follow a stepper from its start on, where the other chart may be needed already."""
+        stepper.watcher = self
+        if self.near(stepper.state):  # no change on the way: it begins there
+            self._enter_other(stepper)
+            self.changes = 0
+            stepper.bound_first_step()
+
+    anywhere = True
+
+    def due(self, stepper: Stepper, stride: int) -> bool:
+        """See ``Effect``: at any boundary whose state asks for it."""
+        return self.near(stepper.state)
+
+    def apply(self, stepper: Stepper, stride: int) -> bool:
+        """See ``Effect``."""
+        if self._whole is not None and not self._whole.apply(stepper, stride):
+            return False
+        self._enter_other(stepper)
+        return True
+
+    def _enter_other(self, stepper: Stepper) -> None:
+        state = self.change(stepper.state)
+        stepper.use(self.chart)
+        stepper.state[:] = state
+
+    @property
+    def memory(self) -> int:
+        """See ``Effect``."""
+        return self.changes
+
+    def back_to(self, memory: int, stepper: Stepper) -> None:
+        """See ``Effect``."""
+        self.changes = memory
+        stepper.use(self.chart)
+
+    def pack(self, memory: int) -> dict[str, np.ndarray]:
+        """See ``Effect``."""
+        return {"rhythm_chart_changes": np.array([memory], dtype=np.int64)}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> int:
+        """See ``Effect``."""
+        return int(arrays.get("rhythm_chart_changes", np.zeros(1))[0])
+
+    def of_samples(self, times: np.ndarray) -> dict[str, Any]:
+        """See ``Effect``."""
+        return {"reference": self.references(times)}
 
     # --- changing ---------------------------------------------------------------------------------------
 

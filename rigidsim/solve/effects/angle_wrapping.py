@@ -7,35 +7,22 @@ so they are brought back into (-pi, pi] every few steps, and the turns are count
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 import mpmath
 import numpy as np
 
+from rigidsim.solve.angle_state import AngleState, pack_angles, unpack_angles
+from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.precision import Precision
-
-Angles = tuple[float, float, float]
-"""Euler angles in the order of their sequence, rad."""
+from rigidsim.solve.stepper import Stepper
 
 STEPS_BETWEEN = 32
 """Natural steps from one wrapping to the next: a fixed count, so that bits don't depend on timing."""
 
 
-class AngleState(NamedTuple):
-    """Which Euler angles the angle states stand for; all fields are empty or 0 without angle states.
-
-    Attributes:
-        turns: full turns of the angle states.
-        chart: 0 for angles of the requested sequence, 1 for those of its partner (``rigidsim.solve.charts``).
-        reference: in the partner chart, the requested angles at the latest natural step, rad; else zeros.
-    """
-
-    turns: tuple[int, ...] = ()
-    chart: int = 0
-    reference: tuple[float, ...] = ()
-
-
-class AngleWrapping:
+class AngleWrapping(Effect):
     """Counts the full turns removed from the angle states.
 
     Attributes:
@@ -76,6 +63,40 @@ class AngleWrapping:
                 state[position] = (state[position] - count * high) - count * low
                 counted[n] += turns
         self.angles = self.angles._replace(turns=tuple(counted))
+
+    @property
+    def limit(self) -> int:
+        """See ``Effect``."""
+        return STEPS_BETWEEN
+
+    def apply(self, stepper: Stepper, stride: int) -> bool:
+        """See ``Effect``."""
+        self.wrap(stepper.state)
+        return True
+
+    @property
+    def memory(self) -> AngleState:
+        """See ``Effect``."""
+        return self.angles
+
+    def back_to(self, memory: AngleState, stepper: Stepper) -> None:
+        """See ``Effect``."""
+        self.angles = memory
+
+    def pack(self, memory: AngleState) -> dict[str, np.ndarray]:
+        """See ``Effect``."""
+        return {"rhythm_turns": pack_angles([memory])[0]}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> AngleState:
+        """See ``Effect``."""
+        [angles] = unpack_angles(arrays.get("rhythm_turns", np.zeros(0, dtype=np.int64))[None, :])
+        if len(angles.turns) != len(self.angles.turns):
+            raise ValueError("the checkpoint has other angles")
+        return angles
+
+    def of_samples(self, times: np.ndarray) -> dict[str, Any]:
+        """See ``Effect``."""
+        return {"angles": self.angles}
 
     def unwrapped(self, angles: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Angles (n, 3) plus 2 pi times turns (n, 3), rounded in the run's precision."""

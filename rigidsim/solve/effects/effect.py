@@ -1,0 +1,66 @@
+"""An effect: something that happens at boundaries of natural steps, with a memory of its own."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rigidsim.solve.stepper import Stepper
+
+
+class Effect:
+    """Something done at boundaries of natural steps: by default at each stride's end, and without a memory.
+
+    Strides are fixed counts of natural steps, as long as the smallest limit of all effects allows.
+
+    Attributes:
+        anywhere: whether it may be due within a stride, too.
+    """
+
+    anywhere = False
+
+    @property
+    def limit(self) -> int:
+        """Largest length of a stride that it allows at present; it never grows on the way."""
+        return sys.maxsize
+
+    def due(self, stepper: Stepper, stride: int) -> bool:
+        """Whether to apply it here, at a stride's end or ``anywhere``: by steps, state and memory alone, so
+        that bits depend on no clock or sampling.
+        """
+        return True
+
+    def apply(self, stepper: Stepper, stride: int) -> bool:
+        """Do it; False if it can't be done, which ends the run here."""
+        raise NotImplementedError
+
+    @property
+    def memory(self) -> Any:
+        """All that its later applications depend on, as a value that stays as it is."""
+        return None
+
+    def back_to(self, memory: Any, stepper: Stepper) -> None:
+        """Return to an earlier memory; the stepper's state follows after that of all effects."""
+
+    def pack(self, memory: Any) -> dict[str, np.ndarray]:
+        """A memory as arrays of a checkpoint, float64 or int64, with names that no other effect uses."""
+        return {}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> Any:
+        """A memory restored from a checkpoint's arrays.
+
+        Raises:
+            ValueError: they belong to another system.
+        """
+        return None
+
+    def of_samples(self, times: np.ndarray) -> dict[str, Any]:
+        """What samples within the latest steps have to know of it, as arguments of ``SampleBlock.of``.
+
+        Args:
+            times: (n,), internal units.
+        """
+        return {}

@@ -1,0 +1,85 @@
+"""When invariants are projected onto their initial values (``rigidsim.solve.projection``)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rigidsim.solve.building import interruptible
+from rigidsim.solve.effects.effect import Effect
+from rigidsim.solve.projection import LATE, NOTED, Projection
+from rigidsim.solve.stepper import Stepper
+
+_LATE_PROJECTION = 1
+"""How ``hold_invariants = "auto"`` projects: 0 (where it is missing) compiled a second integrator whose
+coefficients have two parts; 1 adds at each correction what the coefficients lack.
+"""
+
+
+class HeldInvariants(Effect):
+    """Projection from the beginning, or from ``LATE`` steps on, until when states are noted.
+
+    Args:
+        interval: largest number of natural steps between projections.
+    """
+
+    def __init__(self, projection: Projection, interval: int) -> None:
+        self._projection, self._interval = projection, interval
+
+    @property
+    def limit(self) -> int:
+        """See ``Effect``."""
+        return self._interval if self._projection.holding else sys.maxsize
+
+    def due(self, stepper: Stepper, stride: int) -> bool:
+        """See ``Effect``: from the beginning each stride, later the most strides that fit the interval."""
+        if not self._projection.holding:
+            return stepper.steps >= LATE or stepper.steps % NOTED == 0
+        strides = max(self._interval // stride, 1) if self._projection.late else 1
+        return stepper.steps // stride % strides == 0
+
+    def apply(self, stepper: Stepper, stride: int) -> bool:
+        """See ``Effect``."""
+        projection, state, time = self._projection, stepper.state, stepper.time
+        projection.use(stepper.chart)
+        if projection.holding:
+            projection.project(state, time)
+        elif stepper.steps >= LATE:
+            interruptible(projection.load)
+            projection.begin(state, time)
+        else:
+            projection.note(state, time, stepper.steps // NOTED - 1)
+        return True
+
+    @property
+    def memory(self) -> np.ndarray:
+        """See ``Effect``: a copy of ``Projection.memory``."""
+        return self._projection.memory.copy()
+
+    def back_to(self, memory: np.ndarray, stepper: Stepper) -> None:
+        """See ``Effect``."""
+        self._projection.memory[...] = memory
+
+    def pack(self, memory: np.ndarray) -> dict[str, np.ndarray]:
+        """See ``Effect``."""
+        return {"rhythm_held": memory, "late_projection": np.array([_LATE_PROJECTION], dtype=np.int64)}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+        """See ``Effect``; what an earlier version projected late is refused: its bits can't be had again."""
+        memory = arrays.get("rhythm_held", np.zeros(0))
+        if memory.shape != self._projection.memory.shape:
+            raise ValueError(f"the checkpoint remembers {memory.shape} numbers of projections")
+        begun = self._projection.late and int(arrays["counts"][0]) > LATE
+        if begun and int(arrays.get("late_projection", np.zeros(1))[0]) != _LATE_PROJECTION:
+            raise ValueError(
+                "an earlier version of rigidsim began it, which projected "
+                'hold_invariants = "auto" in another way; resume it with that version, or begin a new run'
+            )
+        return memory
+
+    def of_samples(self, times: np.ndarray) -> dict[str, Any]:
+        """See ``Effect``: what was put back before a sample, by all corrections before its own step."""
+        return {"put_back": self._projection.corrections}
