@@ -11,7 +11,7 @@ from rigidsim.accuracy.estimates.course import Course
 from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.model.system import System
 from rigidsim.scene.moments import acts_at_moments_alone
-from rigidsim.solve.angle_wrapping import STEPS_BETWEEN
+from rigidsim.solve.effects.angle_wrapping import STEPS_BETWEEN
 from rigidsim.solve.neighbours.lanes import (
     TIGHT,
     BatchLanes,
