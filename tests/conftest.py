@@ -20,7 +20,7 @@ import rigidsim.workflows.read  # noqa: F401  (tests that read configs below nee
 TERMINAL = shutil.get_terminal_size().columns
 # Whatever terminal the tests are started from, and however long the path of their temporary folder: no line
 # of a screen is broken, but where a test is about that and gives a width.
-os.environ.update(COLUMNS="1000", FORCE_COLOR="", TTY_COMPATIBLE="", NO_COLOR="")
+os.environ.update(COLUMNS="1000", TERM="xterm-256color", FORCE_COLOR="", TTY_COMPATIBLE="", NO_COLOR="")
 
 
 @pytest.hookimpl(wrapper=True)
