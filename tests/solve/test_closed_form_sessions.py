@@ -136,3 +136,33 @@ def memories(parts: Assembly) -> dict[str, np.ndarray]:
     """What its effects remember, as a checkpoint holds it."""
     packed = (e.pack(memory) for e, memory in zip(parts.effects, parts.boundary().memories, strict=True))
     return {name: values for arrays in packed for name, values in arrays.items()}
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_no_bit_depends_on_which_samples_are_evaluated_together(precision: str) -> None:
+    """A flight that begins with exact zeros in its attitude, where the working precision's last bits show."""
+    flight = {
+        **TOP,
+        "body": "principal_moments = [1, 2, 2.5]\nmass = 1",
+        "initial": "angular_velocity = [0.3, 0.2, 1]\nposition = [0, 0, 0]\nvelocity = [1, 2, 30]",
+        "time": "end = 1000\nsamples = 41",
+        "output": "",
+    }
+    given = precision if precision.isdigit() else f'"{precision}"'
+    integrator = f'method = "closed_form"\nprecision = {given}'
+    prepared = prepare(rigidsim.parse(config(**flight, integrator=integrator)))
+    assert prepared.closed is not None
+    times = prepared.clock.internal(0, 41)
+    blocks = [
+        np.concatenate(
+            [
+                prepared.closed.states(
+                    prepared.system, prepared.precision, times[k : k + rows], prepared.clock.start
+                )
+                for k in range(0, 41, rows)
+            ]
+        )
+        for rows in (41, 5, 1)
+    ]
+    assert (blocks[0] == blocks[1]).all()
+    assert (blocks[0] == blocks[2]).all()

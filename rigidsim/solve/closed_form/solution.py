@@ -70,12 +70,16 @@ class ClosedForm:
             columns = self._columns(Doubles(), elapsed, system)
             return np.stack(columns, axis=1).astype(precision.scalar)
         begin = precision.exact(start)
-        late = max((abs(precision.exact(t) - begin) for t in (*times[:1], *times[-1:])), default=0)
-        arithmetic = Digits(self._context(precision.bits, late))
-        number = arithmetic.number
+        known: dict[int, Digits] = {}
         result = np.empty((len(times), len(system.states)), dtype=precision.scalar)
         for n, time in enumerate(times):
-            elapsed = number(precision.exact(time)) - number(begin)
+            # by the sample's own time, so that no bit depends on which samples are evaluated together
+            exact = precision.exact(time)
+            late = _phase_bits(exact - begin)
+            if late not in known:
+                known[late] = Digits(self._context(precision.bits, late))
+            arithmetic = known[late]
+            elapsed = arithmetic.number(exact) - arithmetic.number(begin)
             row = self._columns(arithmetic, elapsed, system)
             result[n] = [precision.number(x) for x in row]
         return result
@@ -98,16 +102,14 @@ class ClosedForm:
             digits: number of correct digits, relative to the largest rate.
         """
         elapsed = mpmath.ldexp(seconds, -self.scaling.time)
-        arithmetic = Digits(self._context(math.ceil(digits * math.log2(10)), elapsed))
+        arithmetic = Digits(self._context(math.ceil(digits * math.log2(10)), _phase_bits(elapsed)))
         rates, quaternion = self._turned(arithmetic, arithmetic.number(seconds) * 2**-self.scaling.time)
         return [mpmath.ldexp(w, -self.scaling.time) for w in rates], quaternion
 
-    def _context(self, bits: int, late: mpmath.mpf) -> mpmath.MPContext:
-        """Context with enough bits: a phase costs as many as it has, and in internal units it is about the
-        time itself.
-        """
+    def _context(self, bits: int, late: int) -> mpmath.MPContext:
+        """Context with enough bits, among them those of a phase."""
         context = mpmath.MPContext()
-        context.prec = bits + _GUARD_BITS + max(0, math.ceil(mpmath.log(1 + abs(late), 2)))
+        context.prec = bits + _GUARD_BITS + late
         return context
 
     def _turned(self, arithmetic: Arithmetic, time: Any) -> tuple[Vector, Vector]:
@@ -162,6 +164,11 @@ class ClosedForm:
             values[name] = x + ratio * ((v + pull * time / 2) * time)
             values[f"v{name}"] = v + pull * time
         return values
+
+
+def _phase_bits(elapsed: mpmath.mpf) -> int:
+    """Bits of a phase, which in internal units is about the time itself."""
+    return max(0, math.ceil(mpmath.log(1 + abs(elapsed), 2)))
 
 
 def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
