@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from rigidsim.scene.arithmetic import GUARD_BITS, negligible
+from rigidsim.scene.expressions.piecewise import on_sides
 from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
     FLIGHT_NAMES,
@@ -78,19 +80,15 @@ def surfaces_of(scene: Scene) -> Surfaces:
     states = random_states(scene)
     context = scene.context
     found: list[Surface] = []
-    known: list[list[Any]] = []
     places: dict[Node, tuple[int, int]] = {}
+    first: dict[int, tuple[int, int]] = {}  # of each kind: its place
+    kinds = _kinds(arguments, states, context)
     for node, surface in arguments.items():
-        values = [_value(surface.expression, state, context) for state in states]
-        for index, others in enumerate(known):
-            sign = _ratio(values, others, context)
-            if sign:
-                places[node] = index, sign
-                break
-        else:
-            places[node] = len(found), 1
+        kind, sign = kinds[node]
+        if kind not in first:
+            first[kind] = len(found), sign
             found.append(surface)
-            known.append(values)
+        places[node] = first[kind][0], sign * first[kind][1]
     parts = [*(expression for _, expression in expressions), *(s.expression for s in found)]
     turn = 2 * context.pi
     turning = tuple(
@@ -165,6 +163,39 @@ def _nodes(expression: Expression) -> Iterator[Node]:
             waiting += node.operands
 
 
+def _kinds(
+    arguments: Mapping[Node, Surface], states: Sequence[Mapping[str, Any]], context: Any
+) -> dict[Node, tuple[int, int]]:
+    """For each argument a number that those in a constant ratio share, and the sign of the ratio to the first.
+
+    They are compared in all digits of the scene, and a sign within them has both values at random, wherever
+    its own surface lies: ``max(t - 5, 0) - 1`` and ``max(t - 8, 0) - 1`` are equal before 5.
+    """
+    found: dict[Node, tuple[int, int]] = {}
+    known: list[list[Any]] = []
+    generator = random.Random(1)
+    drawn = [[generator.choice((1, -1)) for _ in arguments] for _ in states]
+    agreement = negligible(context)
+    with context.workprec(context.prec + GUARD_BITS):
+        for node, surface in sorted(arguments.items(), key=lambda item: _size(item[1].expression)):
+            parts = [on_sides(surface.expression, found, sides) for sides in drawn]
+            values = [_value(part, state, context) for part, state in zip(parts, states, strict=True)]
+            for index, others in enumerate(known):
+                sign = _ratio(values, others, agreement)
+                if sign:
+                    found[node] = index, sign
+                    break
+            else:
+                found[node] = len(known), 1
+                known.append(values)
+    return found
+
+
+def _size(expression: Expression) -> int:
+    """Number of nodes: what is within an argument has fewer."""
+    return sum(1 for _ in _nodes(expression))
+
+
 def _value(expression: Expression, state: Mapping[str, Any], context: Any) -> Any | None:
     try:
         return evaluate(expression, state, context)
@@ -172,13 +203,13 @@ def _value(expression: Expression, state: Mapping[str, Any], context: Any) -> An
         return None
 
 
-def _ratio(values: Sequence[Any], others: Sequence[Any], context: Any) -> int:
+def _ratio(values: Sequence[Any], others: Sequence[Any], agreement: Any) -> int:
     """Sign of the constant ratio of two rows of values; 0 if the ratio isn't constant."""
     pairs = [(a, b) for a, b in zip(values, others, strict=True) if a is not None and b is not None]
-    pairs = pairs[:_STATES]
+    pairs = [(a, b) for a, b in pairs if a != 0 or b != 0]
     if len(pairs) < _STATES or any(b == 0 or a == 0 for a, b in pairs):
         return 0
     first = pairs[0][0] / pairs[0][1]
-    if any(abs(a / b - first) > context.ldexp(abs(first), -_BITS) for a, b in pairs):
+    if any(abs(a / b - first) > agreement * abs(first) for a, b in pairs[1:]):
         return 0
     return 1 if first > 0 else -1

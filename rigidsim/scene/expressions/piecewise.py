@@ -14,11 +14,12 @@ sine or cosine of x is a triangle wave.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Constant, Node, Operation, operation
+from rigidsim.scene.expressions.tree import Constant, Expression, Node, Operation, fold, operation
 
 Span = tuple[int, int]
 
@@ -44,6 +45,30 @@ def power(base: Node, exponent: Node, span: Span) -> Node:
     if (rest.numerator % 2 or rest.denominator != 1) and _square_root(root) is None:
         root = _abs([root], span)
     return root if rest == 1 else operation("power", (root, Constant(ExactNumber(rest), exponent.span)), span)
+
+
+def on_sides(
+    expression: Expression, places: Mapping[Node, tuple[int, int]], sides: Sequence[int]
+) -> Expression:
+    """An expression with every sign in it replaced by its value.
+
+    Args:
+        places: for each argument of a sign, the index of its surface, and the sign of their ratio.
+        sides: of each surface; a sign whose surface has neither 1 nor -1 stays.
+    """
+
+    def combine(node: Node, operands: list[Node]) -> Node:
+        if not isinstance(node, Operation):
+            return node
+        if node.operator == "sign" and node.operands[0] in places:
+            index, ratio = places[node.operands[0]]
+            if abs(sides[index]) == 1:
+                return _number(ratio * sides[index], node.span)
+        if len(operands) > 2:  # a chain, made two by two
+            return reduce(lambda a, b: operation(node.operator, (a, b), node.span), operands)
+        return operation(node.operator, tuple(operands), node.span)
+
+    return Expression(expression.text, fold(expression, combine))
 
 
 def _square_root(node: Node) -> Node | None:

@@ -17,7 +17,7 @@ class SurfaceRoots(SwitchedEngines):
 
     def moment(self, root: Root) -> tuple[tuple[Scalar, Scalar], bool]:
         """Time of a root in two numbers, and whether it is known from the surface's expression."""
-        known = self._probe.moments[root[1]].near(root[0])
+        known = self._probe.moments[root[1]].near(root[0], self._modes)
         return known or (root[0], root[0] * 0), known is not None
 
     def _first_root(self, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Root | None:

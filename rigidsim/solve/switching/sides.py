@@ -59,11 +59,13 @@ class Look:
         pairs = zip(self.gradients[j], self.field, strict=True)
         return sum((abs(float(g) * float(f)) for g, f in pairs), abs(float(self.by_time[j])))
 
-    def size(self, j: int, states: Sequence[np.ndarray]) -> float:
-        """Size to which the argument's rounding is relative, for states of these sizes shortly before."""
+    def size(self, j: int, states: Sequence[np.ndarray], time: float) -> float:
+        """Size to which the argument's rounding is relative, for states of these sizes shortly before, and a
+        span of time to which its rounding is relative.
+        """
         largest = [max(abs(float(x)) for x in row) for row in zip(*states, strict=True)]
         terms = (abs(float(g)) * x for g, x in zip(self.gradients[j], largest, strict=True))
-        return sum(terms, abs(float(self.by_time[j]) * float(self.time)))
+        return sum(terms, abs(float(self.by_time[j]) * time))
 
 
 class Probe:
@@ -119,9 +121,7 @@ class Probe:
 
     def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
         """Size below which an argument counts as zero because of rounding."""
-        if self.moments[j].at_known_time:  # what is left is the rounding of the second number
-            return _ROUNDINGS * self._epsilon**2 * abs(float(look.by_time[j]) * float(look.time))
-        return _ROUNDINGS * self._epsilon * look.size(j, states)
+        return _ROUNDINGS * self._epsilon * look.size(j, states, self.moments[j].rounded_from(look.time))
 
     def swing_noise(self, look: Look, j: int, state: np.ndarray) -> float:
         """The same for an argument that is a small difference of states of order one, as when swings come to
