@@ -28,12 +28,17 @@ class Moments:
         at_known_time: whether the argument is a line in time, whose values have hardly any rounding.
     """
 
-    def __init__(self, system: System, precision: Precision, expression: Expression) -> None:
-        self._system, self._precision, self._expression = system, precision, expression
+    def __init__(self, system: System, precision: Precision, place: int) -> None:
+        expression = system.plan.surfaces.found[place].expression
+        self._system, self._precision, self._expression, self._place = system, precision, expression, place
+        self._context = system.scene.context
         self.of_time = names_used(expression) == {"t"}
         known = system.clocked and self.of_time
-        self.at_known_time = known and as_line(expression, system.scene.context) is not None
-        self._from = self._moments_of_lines() if known and not self.at_known_time else None
+        self.at_known_time = known and as_line(expression, self._context) is not None
+        exponent = -system.scaling.time
+        lines = lines_in(expression, self._context) if known and not self.at_known_time else []
+        self._middles = sorted(self._context.ldexp(line.zero, exponent) for line in lines)
+        self._from = [precision.number(middle) for middle in self._middles]
         self._zeros: dict[tuple[int, ...], tuple[Expression, Any]] = {}
 
     def rounded_from(self, time: Scalar) -> float:
@@ -43,9 +48,9 @@ class Moments:
         rounding = float(self._precision.epsilon) * abs(float(time))
         if self.at_known_time:
             return rounding
-        if self._from is None:
+        if not self._from:
             return abs(float(time))
-        return max((abs(float(time - moment)) for moment in self._from), default=0.0) + rounding
+        return max(abs(float(time - moment)) for moment in self._from) + rounding
 
     def near(self, time: Scalar, modes: Sequence[int]) -> tuple[Scalar, Scalar] | None:
         """The moment in two numbers (internal units) next to one found in one number; None if the surface
@@ -54,38 +59,65 @@ class Moments:
         Args:
             modes: the sides of all surfaces on which the motion is.
         """
+        found = self._exactly_near(time, modes)
+        return None if found is None else in_two_numbers(found, self._precision.number, self._context)
+
+    def left_out(self, time: tuple[Scalar, Scalar], modes: Sequence[int]) -> float:
+        """How far two numbers are from the moment next to them; 0 if it isn't known."""
+        found = self._exactly_near(time[0], modes)
+        context = self._context
+        return 0.0 if found is None else abs(float(found - exactly(time[0], context) - exactly(time[1], context)))
+
+    def hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> Scalar | None:
+        """The middle of something between two times, where the argument isn't on the motion's side: it may be
+        too narrow for a step's polynomials, as 1 - ((t - 5000)/1e-9)^2 is.
+        """
+        for number, middle in zip(self._from, self._middles, strict=True):
+            if not begin < number < end:
+                continue
+            expression, zero = self._on(modes)
+            if zero is not None:  # a straight line hides nothing
+                return None
+            try:
+                value = self._value(expression, middle)
+            except ExpressionError:
+                continue
+            if value * modes[self._place] < 0:
+                return number
+        return None
+
+    def _exactly_near(self, time: Scalar, modes: Sequence[int]) -> Any | None:
         if not self.of_time:
             return None
-        context, exponent = self._system.scene.context, self._system.scaling.time
+        context = self._context
         expression, zero = self._on(modes)
-        if zero is None:
-            rounding = context.mpf(float(self._precision.epsilon)) * max(abs(float(time)), 1.0)
-            about, unit = exactly(time, context), context.ldexp(context.one, exponent)
-            zero = _zero(
-                lambda t: evaluate(expression, {"t": t}, context), about * unit, rounding * unit, context
-            )
-        if zero is None:
-            return None
-        return in_two_numbers(context.ldexp(zero, -exponent), self._precision.number, context)
+        if zero is not None:
+            return zero
+        rounding = context.mpf(float(self._precision.epsilon)) * max(abs(float(time)), 1.0)
+        function: Callable[[Any], Any] = lambda t: self._value(expression, t)  # noqa: E731
+        about = exactly(time, context)
+        return _zero(function, about, rounding, self._middles, modes[self._place], context)
+
+    def _value(self, expression: Expression, time: Any) -> Any:
+        unit = self._context.ldexp(self._context.one, self._system.scaling.time)
+        return evaluate(expression, {"t": time * unit}, self._context)
 
     def _on(self, modes: Sequence[int]) -> tuple[Expression, Any]:
-        """The argument on these sides of the surfaces within it, and its zero (s, mpf) if that is a line."""
+        """The argument on these sides of the surfaces within it, and its zero (mpf, internal units) if that is
+        a line.
+        """
         sides = tuple(modes)
         if sides not in self._zeros:
             found = on_sides(self._expression, self._system.plan.surfaces.places, sides)
-            line = as_line(found, self._system.scene.context) if self._system.clocked else None
-            self._zeros[sides] = found, None if line is None else line.zero
+            line = as_line(found, self._context) if self._system.clocked else None
+            zero = None if line is None else self._context.ldexp(line.zero, -self._system.scaling.time)
+            self._zeros[sides] = found, zero
         return self._zeros[sides]
-
-    def _moments_of_lines(self) -> list[Scalar]:
-        scene, exponent = self._system.scene, self._system.scaling.time
-        zeros = [line.zero for line in lines_in(self._expression, scene.context)]
-        return [self._precision.number(scene.context.ldexp(zero, -exponent)) for zero in zeros]
 
 
 def moments_of(system: System, precision: Precision) -> list[Moments]:
     """The moments of each surface of a system."""
-    return [Moments(system, precision, surface.expression) for surface in system.plan.surfaces.found]
+    return [Moments(system, precision, place) for place in range(len(system.surfaces))]
 
 
 def between(begin: tuple[Scalar, Scalar], end: tuple[Scalar, Scalar]) -> Scalar:
@@ -93,16 +125,26 @@ def between(begin: tuple[Scalar, Scalar], end: tuple[Scalar, Scalar]) -> Scalar:
     return (end[0] - begin[0]) - begin[1] + end[1]
 
 
-def _zero(function: Callable[[Any], Any], about: Any, width: Any, context: Any) -> Any | None:
+def _zero(
+    function: Callable[[Any], Any], about: Any, width: Any, middles: Sequence[Any], side: int, context: Any
+) -> Any | None:
     """A zero of a function near a number, to the precision of the arithmetic; None if there is none.
 
     Regula falsi with halved ordinates (Dowell & Jarratt 1971, BIT 11, 168).
+
+    Args:
+        middles: of narrow things, between whose ends zeros are looked for too.
+        side: the sign that the function has before the zero, if there are two as near.
     """
     try:
         for _ in range(_MOST_WIDER):
             a, b = about - width, about + width
-            u, v = function(a), function(b)
-            if u * v <= 0:
+            points = [a, *(x for x in middles if a < x < b), b]
+            values = [function(x) for x in points]
+            changes = [n for n in range(1, len(points)) if values[n - 1] * values[n] <= 0]
+            if changes:
+                n = next((n for n in changes if side * values[n - 1] >= 0), changes[0])
+                (a, b), (u, v) = points[n - 1 : n + 1], values[n - 1 : n + 1]
                 break
             width *= _WIDER
         else:

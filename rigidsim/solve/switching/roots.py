@@ -29,10 +29,11 @@ class SurfaceRoots(SwitchedEngines):
         engine = self._integrator
         end, after = engine.time, np.array(engine.state)
         states = [before, after]
+        hidden = self._hidden(begun[0], end)
         # those of known moments may differ by less than one number tells
-        roots = sorted(self._roots, key=lambda root: self.moment(root)[0])
+        roots = sorted([*self._roots, *hidden], key=lambda root: self.moment(root)[0])
         for n, (time, j, side) in enumerate(roots):
-            if self._modes[j] == SLIDES:
+            if self._modes[j] == SLIDES or roots[n] in hidden:
                 return roots[n]
             if side != -self._modes[j]:
                 continue
@@ -53,6 +54,15 @@ class SurfaceRoots(SwitchedEngines):
                 return begun[0], j, -mode
             return self._bisected(j, inside, end), j, -mode
         return None
+
+    def _hidden(self, begin: Scalar, end: Scalar) -> list[Root]:
+        """Roots within the step that its polynomials may have missed."""
+        found = []
+        for j, moments in enumerate(self._probe.moments):
+            middle = moments.hidden(begin, end, self._modes)
+            if middle is not None:
+                found.append((middle, j, -self._modes[j]))
+        return found
 
     def _again(
         self,

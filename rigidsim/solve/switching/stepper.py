@@ -30,6 +30,9 @@ rounding, whose period is the square root of its size.
 """
 _SHORTEST = 2.0**-8  # internal units of time; with more digits less, see ``_window``
 _ROUNDINGS = 2.0**15  # in the square of an interval
+_MOST_LEFT_OUT = 8.0  # roundings of the state, by a moment in two numbers
+_SMOOTH = "make the change smooth, for instance tanh(u/width) in place of sign(u)"
+_NOT_RESOLVED = "choose a higher precision, or count time from an epoch shortly before"
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
 
 
@@ -136,7 +139,7 @@ class SwitchingStepper(SurfaceRoots):
             log.back_to(events)
             begun.dtime = time
             begun.state[:] = before
-            if not self._arrive(root, [before]):
+            if not self._arrive(root, [before], self._fresh):
                 return False, False
         else:
             assert root is not None
@@ -147,8 +150,8 @@ class SwitchingStepper(SurfaceRoots):
         self._judge(time[0], 1)
         on = True if self.watcher is None else self.watcher(begun)
         self._follow()
-        self._fresh = False
-        if root is not None and not self._arrive(root, [before, np.array(self.state)]):
+        again, self._fresh = self._fresh, False
+        if root is not None and not self._arrive(root, [before, np.array(self.state)], again):
             return False, False
         if self._along:
             self._keep_to_surfaces()
@@ -186,8 +189,12 @@ class SwitchingStepper(SurfaceRoots):
         """Time (internal units) within which ``_MOST_SWITCHES`` count as an accumulation."""
         return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * self._epsilon) ** 0.5)
 
-    def _arrive(self, root: Root, states: list[np.ndarray]) -> bool:
-        """Continue from a surface; False if that is impossible."""
+    def _arrive(self, root: Root, states: list[np.ndarray], again: bool) -> bool:
+        """Continue from a surface; False if that is impossible.
+
+        Args:
+            again: whether the step began on a surface, too.
+        """
         _, j, side = root
         self._fresh = True
         self.switches += 1
@@ -209,11 +216,32 @@ class SwitchingStepper(SurfaceRoots):
         for i in range(len(self._modes)):
             if i not in on and abs(float(look.u[i])) <= self._probe.noise(look, i, states):
                 on.append(i)
+        moments = [i for i in on if self._probe.moments[i].of_time]
+        if (again or len(moments) > 1) and any(self._unresolved(i) for i in moments):
+            why = (
+                f"something so strong changes that two numbers of {self.precision.name} precision don't tell "
+                "its impulse"
+            )
+            return self._fail(j, why, _NOT_RESOLVED)
         choice = self._at_rest(on, look) or self._chosen(on, hint=(j, side))
         if choice.modes is None:
             return self._fail(j, choice.why)
         self._take(choice)
         return True
+
+    def _unresolved(self, j: int) -> bool:
+        """Whether the change of the field on a surface matters even for what two numbers leave out of its
+        moment. Where something ends the state tells its impulse, by which the rest is judged.
+        """
+        above, below = (
+            self._probe.look(self.state, self.time, self._parameters({j: side})).field for side in (1, -1)
+        )
+        change = max(abs(float(x)) for x in above - below)
+        size = max(1.0, *(abs(float(x)) for x in self.state))
+        allowed, time = _MOST_LEFT_OUT * self._epsilon * size, self._integrator.dtime
+        if change * self._epsilon**2 * abs(float(time[0])) <= allowed:
+            return False
+        return change * self._probe.moments[j].left_out(time, self._modes) > allowed
 
     def _agree(self, known: Collection[int] = ()) -> Look:
         """Put all surfaces except the known ones on the sides where the state lies, since an argument that
@@ -281,10 +309,9 @@ class SwitchingStepper(SurfaceRoots):
             modes[j] = kept[0] or idle[j]
         return Continuation(modes)
 
-    def _fail(self, j: int, why: str) -> bool:
+    def _fail(self, j: int, why: str, what_to_do: str = _SMOOTH) -> bool:
         surface = self.system.plan.surfaces.found[j]
         self.failure = (
-            f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; make the change smooth, for '
-            "instance tanh(u/width) in place of sign(u)"
+            f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; {what_to_do}'
         )
         return False
