@@ -166,7 +166,7 @@ def _nodes(expression: Expression) -> Iterator[Node]:
 def _kinds(
     arguments: Mapping[Node, Surface], states: Sequence[Mapping[str, Any]], context: Any
 ) -> dict[Node, tuple[int, int]]:
-    """For each argument a number that those in a constant ratio share, and the sign of the ratio to the first.
+    """The kind of each argument, a number that those in a constant ratio share, and the ratio's sign.
 
     They are compared in all digits of the scene, and a sign within them has both values at random, wherever
     its own surface lies: ``max(t - 5, 0) - 1`` and ``max(t - 8, 0) - 1`` are equal before 5.

@@ -29,7 +29,7 @@ _BOUNDED: Mapping[str, float] = {
 }  # fmt: skip
 
 
-def _operations(expression: Expression) -> Iterator[Operation]:
+def operations(expression: Expression) -> Iterator[Operation]:
     """Every operation, outer ones before inner ones."""
     waiting = [expression.root]
     while waiting:
@@ -45,7 +45,7 @@ def narrow_parts(expression: Expression) -> list[Expression]:
     Constants are left out, and anything that can't leave ``WIDE``, such as a sine.
     """
     found: dict[Node, None] = {}
-    for node in _operations(expression):
+    for node in operations(expression):
         part: Node | None = None
         if node.operator in _FLAT:
             part = node.operands[0]
@@ -69,7 +69,7 @@ def root_parts(expression: Expression) -> list[Expression]:
     Sums of squares and a positive number, or anything else positive by its form, are left out.
     """
     found: dict[Node, None] = {}
-    for node in _operations(expression):
+    for node in operations(expression):
         part: Node | None = None
         if node.operator == "sqrt":
             part = node.operands[0]

@@ -103,6 +103,94 @@ def test_times_that_matter_to_no_digit_move_no_bit() -> None:
         assert prepare(parse(text)).system.clocked is states
 
 
+U = "((t - 700.3)/{w})"
+NARROW = {
+    "triangle": (f"max(0, 1 - abs({U} - 1))", 1.0),
+    "roof": ("max(0, {w} - abs(t - 700.3))/{w}", 1.0),
+    "ramps": (f"min(max({U}, 0), 1) - min(max({U} - 3, 0), 1)", 3.0),
+    "trapezium": (f"max(0, min(1, 2 - abs({U})))", 3.0),
+    "two triangles": (f"max(0, 1 - abs(abs({U}) - 2))", 2.0),
+    "sawtooth": (f"pulse(t, 700.3, 700.3 + {{w}})*{U}", 0.5),
+    "overlap": (f"step(1 - abs({U}))*step(0.5 - abs({U} - 1))", 0.5),
+    "parabola": (f"max(0, 1 - {U}^2)", 4 / 3),
+    "square": (f"step(1 - {U}^2)", 2.0),
+}
+"""Functions of time, u = (t - 700.3)/w, with their integrals over u."""
+
+
+def impulse(shape: str, spacings: float, precision: str) -> float:
+    """The error of the rate that a narrow torque of order one impulse leaves, in roundings.
+
+    Args:
+        spacings: width over the spacing of the precision's numbers around 512.
+    """
+    torque, exact = NARROW[shape]
+    width = repr(spacings * 512 * EPSILON[precision])
+    text = LATE.format(spin=0, torque=f"({torque})/{{w}}".format(w=width), end=1000, precision=precision)
+    run = run_text(text)
+    assert run.summary["status"] == "finished"
+    return float(abs(wide(run.dataset, "angular_velocity")[-1, 2] - exact)) / EPSILON[precision] / exact
+
+
+@pytest.mark.parametrize("shape", ["triangle", "ramps", "parabola"])
+def test_nested_kinks_are_met_however_narrow(shape: str) -> None:
+    """Also within the spacing of the times: nothing is passed over, no zero is taken for its neighbour."""
+    # two moments in two numbers, each to half a spacing of the second, and two roundings of the rate
+    assert impulse(shape, 0.3, "single") <= 1 / 0.3 + 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_random_narrow_kinks(precision: str) -> None:
+    """Twenty-seven in each precision, from a quarter of a spacing to a thousand."""
+    random = np.random.default_rng(2025)
+    for n in range(27):
+        spacings = float(2.0 ** random.uniform(-2, 10))
+        assert impulse(list(NARROW)[n % len(NARROW)], spacings, precision) <= 1 / spacings + 4
+
+
+@pytest.mark.slow
+def test_a_triangle_of_fifty_spacings() -> None:
+    """Scene 825 of seed 31, in single precision: 1 - |u - 1| counted as zero throughout, for rounding."""
+    found = judge(coverage_scene(825, seed=31))
+    assert found.ended == "finished"
+    assert found.true <= 3 * found.announced < 0.1
+
+
+@pytest.mark.parametrize(
+    ("torque", "precision"),
+    [
+        ("pulse(t, 700.3, 700.3 + 1e-20)*1e20", "extended"),
+        ("pulse(t, 700.3, 700.3 + 1e-40)*1e40", "double"),
+    ],
+)
+def test_pulses_beyond_two_numbers_are_refused_with_the_reason(torque: str, precision: str) -> None:
+    text = LATE.format(spin=0, torque=torque, end=1000, precision=precision)
+    summary = run_text(text).summary
+    assert summary["status"] == "stopped: switching unresolved"
+    assert f"two numbers of {precision} precision don't tell its impulse" in summary["message"]
+
+
+def test_a_pulse_of_no_consequence_is_no_reason_to_stop() -> None:
+    """As of 0.3 beside 0.1 + 0.2."""
+    text = LATE.format(spin=1, torque="pulse(t, 0.3, 0.30000000000000004)", end=2, precision="single")
+    assert run_text(text).dataset["angular_velocity"].values[-1].tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("torque", "words"),
+    [
+        ("exp(-((t - 700.3)/{w})^2)/{w}", "double precision tells times there to 1.6e-13 s: choose a higher"),
+        ("1/cosh(t - 700.3)^2", "exceeds the range of double precision there (2^1024): write it with"),
+    ],
+)
+def test_spikes_that_stop_a_run_are_named(torque: str, words: str) -> None:
+    text = LATE.format(spin=0, torque=torque.format(w="(2^-48)"), end=1000, precision="double")
+    summary = run_text(text).summary
+    assert summary["status"] == "stopped: non-finite state"
+    assert words in summary["message"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["late switch", "late spike"])
 def test_announced_errors_of_late_pulses_and_spikes(family: str) -> None:

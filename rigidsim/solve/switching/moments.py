@@ -66,7 +66,11 @@ class Moments:
         """How far two numbers are from the moment next to them; 0 if it isn't known."""
         found = self._exactly_near(time[0], modes)
         context = self._context
-        return 0.0 if found is None else abs(float(found - exactly(time[0], context) - exactly(time[1], context)))
+        return (
+            0.0
+            if found is None
+            else abs(float(found - exactly(time[0], context) - exactly(time[1], context)))
+        )
 
     def hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> Scalar | None:
         """The middle of something between two times, where the argument isn't on the motion's side: it may be
@@ -103,8 +107,8 @@ class Moments:
         return evaluate(expression, {"t": time * unit}, self._context)
 
     def _on(self, modes: Sequence[int]) -> tuple[Expression, Any]:
-        """The argument on these sides of the surfaces within it, and its zero (mpf, internal units) if that is
-        a line.
+        """The argument on these sides of the surfaces within it, and its zero (mpf, internal units) if it is a
+        line.
         """
         sides = tuple(modes)
         if sides not in self._zeros:

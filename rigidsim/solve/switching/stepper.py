@@ -311,7 +311,5 @@ class SwitchingStepper(SurfaceRoots):
 
     def _fail(self, j: int, why: str, what_to_do: str = _SMOOTH) -> bool:
         surface = self.system.plan.surfaces.found[j]
-        self.failure = (
-            f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; {what_to_do}'
-        )
+        self.failure = f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; {what_to_do}'
         return False
