@@ -107,9 +107,7 @@ class Moments:
         return evaluate(expression, {"t": time * unit}, self._context)
 
     def _on(self, modes: Sequence[int]) -> tuple[Expression, Any]:
-        """The argument on these sides of the surfaces within it, and its zero (mpf, internal units) if it is a
-        line.
-        """
+        """The argument on these sides of the surfaces within it, and its zero (mpf) if it is a line."""
         sides = tuple(modes)
         if sides not in self._zeros:
             found = on_sides(self._expression, self._system.plan.surfaces.places, sides)
