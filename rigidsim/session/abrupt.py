@@ -29,7 +29,9 @@ def why_it_broke(prepared: InitialValueProblem, time: float) -> str:
     for where, part in _parts(scene):
         for line in lines_in(part, context):
             moment, width = line.zero, _width(part, line.zero, context)
-            near = width is not None and width < _NARROW * spacing * abs(moment)
+            if width is None:
+                continue
+            near = width < _NARROW * spacing * abs(moment)
             if near and scene.start < moment < scene.end and moment > time - _NARROW * spacing * abs(time):
                 return (
                     f'; "{part.text}" ({where}) changes at {time_words(scene).moment(float(moment))} within '
