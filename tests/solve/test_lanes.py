@@ -90,3 +90,30 @@ def test_errors_of_series_are_those_of_their_order() -> None:
     looser, tighter = (SeriesErrors(system, tolerance).of_step(initial, 0.0) for tolerance in (1e-9, 1e-13))
     sizes = [float(np.abs(found).max()) for found in (looser, one, tighter)]
     assert sizes[0] > 3 * sizes[1] > 9 * sizes[2] > 0
+
+
+def test_errors_of_steps_add_up_to_what_a_run_has_lost() -> None:
+    """Whatever the motion turns through within a step: what a step gets wrong of the quaternion's length, which
+    is 1 without errors, would come out with another size and sign if it were counted as made in its beginning.
+    """
+    system = system_of(
+        config(
+            body="principal_moments = [0.85, 0.85, 1]",
+            initial="angular_velocity = [0, 0, 30]\neuler_angles = [0.1, 0.9, 0.2]",
+            loads='kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+            "orbit = {semi_major_axis = 1, eccentricity = 0.2, inclination = 0.4}",
+            time="end = 10\nsamples = 2",
+        )
+    )
+    engine = stepper_of(system, COMPACT, 1e-7, 0.0).integrator
+    errors, told = SeriesErrors(system, 1e-7, engine), 0.0
+    places = [system.states.index(name) for name in ("qw", "qx", "qy", "qz")]
+    before = float(np.linalg.norm(engine.state[places]))
+    for _ in range(100):
+        state = np.array(engine.state)
+        told += float(state[places] @ errors.of_step(state, float(engine.time))[places])
+        engine.step()
+    lost = float(np.linalg.norm(engine.state[places])) - before
+    assert abs(lost) > 1e-10
+    # what is carried back, and the sum of steps, are of first order
+    assert abs(told - lost) < 1e-3 * abs(lost)

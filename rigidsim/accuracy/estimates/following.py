@@ -15,6 +15,7 @@ from rigidsim.accuracy.estimates.carriers import loose, neighbours_of, same_stat
 from rigidsim.accuracy.estimates.course import Course, Followed
 from rigidsim.accuracy.estimates.growth import power_of_time
 from rigidsim.accuracy.estimates.margins import Margins
+from rigidsim.accuracy.estimates.slow_motion import power_of_slow_motion
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.effects.waypoints import Waypoint
 from rigidsim.solve.neighbours.lanes import (
@@ -45,6 +46,8 @@ def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool
     part = min(1.0, _affordable(course, margins) / max(course.steps, 1))
     if part < 1 and not _waypoints(course, part, margins):
         part = max(part, min(1.0, margins.all_steps / course.steps))
+    if part < 1 and power_of_slow_motion(course, go_on) > margins.most_power:
+        part = 1.0
     found, tight = _follow_loosely(course, part, margins, go_on)
     if found.windows and found.spread.whole and not same_states(course.prepared) and go_on():
         # what sets in between windows, or shows in none: quaternions follow it, which lose less than momenta

@@ -10,7 +10,7 @@ carries errors alike, up to terms that averaging leaves out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -55,31 +55,43 @@ class Carrying:
         Args:
             along, across: errors made along the path and across it, rad/s.
         """
-        made = np.diag([along, across]) * self.seconds / 2
-        errors, largest = np.empty((2, 2 * len(self.maps))), 0.0  # a column for each time and component
-        for n, step in enumerate(self.maps):
-            errors[:, : 2 * n] = step @ errors[:, : 2 * n]
-            # half of a stretch's errors at its beginning, half at its end
-            errors[:, 2 * n : 2 * n + 2] = step @ made + made
-            largest = max(largest, math.hypot(*np.abs(errors[:, : 2 * n + 2]).sum(axis=1)))
+        largest = 0.0
+        for error in self.errors(along, across):
+            largest = max(largest, error)
             if largest > math.pi:
                 break
         return largest
 
+    def errors(self, along: float, across: float) -> Iterator[float]:
+        """Errors (rad) at the ends of the stretches, as of ``grown``."""
+        made = np.diag([along, across]) * self.seconds / 2
+        errors = np.empty((2, 2 * len(self.maps)))  # a column for each time and component
+        for n, step in enumerate(self.maps):
+            errors[:, : 2 * n] = step @ errors[:, : 2 * n]
+            # half of a stretch's errors at its beginning, half at its end
+            errors[:, 2 * n : 2 * n + 2] = step @ made + made
+            yield math.hypot(*np.abs(errors[:, : 2 * n + 2]).sum(axis=1))
+
 
 def carrying(
-    prepared: InitialValueProblem, average: Average, go_on: Callable[[], bool] = lambda: True
+    prepared: InitialValueProblem, average: Average | None, go_on: Callable[[], bool] = lambda: True
 ) -> Carrying:
     """Tangent maps of a run's averaged motion, from its start to its end.
 
     Args:
+        average: the run's own; None for a run of the full model, whose average over the orbits is taken.
         go_on: polled repeatedly; False ends the work.
 
     Raises:
+        ConfigError: a run of the full model has no average over the orbits.
         Unmeasured: ``go_on`` ended it, or the motion can't be followed.
     """
     problem = _problem(prepared, average)
     system = problem.system
+    average = system.plan.average
+    assert average is not None
+    if average.resonance is not None:
+        raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, "a resonance is no motion of a direction alone")
     start, end = float(problem.clock.start), float(problem.clock.at(problem.clock.count - 1))
     seconds = math.ldexp(end - start, system.scaling.time)
     turned = seconds * average.strength * abs(float(average.motion.excess / average.motion.momentum))
@@ -107,20 +119,26 @@ def carrying(
     return Carrying(seconds / count, np.array(maps))
 
 
-def _problem(prepared: InitialValueProblem, average: Average) -> InitialValueProblem:
+def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialValueProblem:
     """The averaged motion that is followed: averaged over the orbits as well, if it can be."""
     scene, config = prepared.scene, prepared.scene.config
-    integrator = config.integrator.model_copy(update={"precision": "double", "tolerance": "auto"})
+    plain = {"precision": "double", "tolerance": "auto"}
+    if average is None:  # what is of the full motion alone
+        plain |= {"formulation": "auto", "method": "taylor", "hold_invariants": False}
+        plain |= {"accuracy": None, "accuracy_position": None}
+    integrator = config.integrator.model_copy(update=plain)
     output = config.output.model_copy(update={"record": ["momentum_axis"], "lyapunov": False})
-    for level in dict.fromkeys((ORBIT_AVERAGED, average.level)):
+    own_level = ORBIT_AVERAGED if average is None else average.level
+    for level in dict.fromkeys((ORBIT_AVERAGED, own_level)):
         model = config.model.model_copy(update={"level": level, "short_period": False})
-        changed = config.model_copy(update={"model": model, "integrator": integrator, "output": output})
-        found, loads = replace(scene, config=changed), prepared.python_loads
-        own = average if level == average.level else None
+        tables = {"model": model, "integrator": integrator, "output": output, "events": []}
+        found = replace(scene, config=config.model_copy(update=tables), events=())
+        loads = prepared.python_loads
+        own = average if level == own_level else None
         try:
             return compactly(prepare_scene(prepared.experiment, found, loads=loads, along=own))
         except ConfigError:
-            if level == average.level:
+            if level == own_level:
                 raise
     raise AssertionError
 
