@@ -93,8 +93,8 @@ def test_errors_of_series_are_those_of_their_order() -> None:
 
 
 def test_errors_of_steps_add_up_to_what_a_run_has_lost() -> None:
-    """Whatever the motion turns through within a step: what a step gets wrong of the quaternion's length, which
-    is 1 without errors, would come out with another size and sign if it were counted as made in its beginning.
+    """Whatever the motion turns through within a step: what a step gets wrong of the quaternion's length,
+    which is 1 without errors, would have another size and sign if it were counted as made in the beginning.
     """
     system = system_of(
         config(

@@ -1,5 +1,5 @@
-"""Growth of errors by the slow motion of a body's axis, whose e-folding time is a good part of the run's length:
-far longer than the beginning of a run, or windows, can tell from growth in proportion to time.
+"""Growth of errors by the slow motion of a body's axis, whose e-folding time is a good part of the run's
+length: longer than the beginning of a run, or windows, can tell from growth in proportion to time.
 
 The run's average over the rotation and the orbits carries them alike, and takes few steps.
 """
@@ -46,8 +46,9 @@ def power_of_slow_motion(course: Course, go_on: Callable[[], bool]) -> float:
 def _most_folds(course: Course) -> float:
     """Bound of the e-foldings of errors of the axis s within the run, without computing its motion.
 
-    Each source with the normal n of its orbit makes it precess, s' = k (n . s) n x s. Of this motion's tangent
-    map, k (n . ds) (n x s) is all that stretches, by k / 2 at most. About a single n at rest s just precesses.
+    Each source with the normal n of its orbit makes it precess, s' = k (n . s) n x s. Of this motion's
+    tangent map, k (n . ds) (n x s) is all that stretches, by k / 2 at most. About a single n at rest s just
+    precesses.
     """
     scene, context = course.prepared.scene, course.prepared.scene.context
     sources = sources_of(scene, course.prepared.system.plan.loads)
