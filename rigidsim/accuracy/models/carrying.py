@@ -122,7 +122,7 @@ def carrying(
 def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialValueProblem:
     """The averaged motion that is followed: averaged over the orbits as well, if it can be."""
     scene, config = prepared.scene, prepared.scene.config
-    plain = {"precision": "double", "tolerance": "auto"}
+    plain: dict[str, object] = {"precision": "double", "tolerance": "auto"}
     if average is None:  # what is of the full motion alone
         plain |= {"formulation": "auto", "method": "taylor", "hold_invariants": False}
         plain |= {"accuracy": None, "accuracy_position": None}
