@@ -204,6 +204,8 @@ def interrupted(command: Sequence[str], folder: Path, line: str = "", seconds: f
             os.kill(process.pid, signal.SIGKILL)
             ended.wait()
         process.returncode, total = result[0]
+        if process.returncode == -signal.SIGINT:  # a shell tells the same of a process that died of Ctrl-C
+            process.returncode = _INTERRUPTED
         finished = process.returncode == 0 or not alive
         spent = None if finished and not hangs else total - before
         return Ending(process.returncode, spent, time.monotonic() - sent, said())

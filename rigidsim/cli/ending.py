@@ -25,19 +25,28 @@ def exit_code(command: Callable[[], int]) -> int:
     except RigidsimError as error:
         print(f"rigidsim: {error.for_command_line()}", file=sys.stderr)
         return error.exit_code
-    except KeyboardInterrupt:
-        print("rigidsim: interrupted", file=sys.stderr)
-        _leave_builds(130)
-        return 130
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except BaseException as error:
+        if not _is_interruption(error):
+            raise
+        print("rigidsim: interrupted", file=sys.stderr)
+        _leave_builds(130)
+        return 130
     else:
         _leave_builds(code)  # of a run that was interrupted, and saved meanwhile
         return code
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _is_interruption(error: BaseException | None) -> bool:
+    """Whether it comes from Ctrl-C, which ends the import of a library as an ImportError, for one."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _leave_builds(code: int) -> None:

@@ -153,16 +153,12 @@ class Stepper:
         return hy.taylor_adaptive(system.equations, initial, nt_events=events, **options)
 
     def use(self, chart: int) -> None:
-        """Continue in the system (0) or its partner (1) at the same time; the state must be set
-        afterwards.
-        """
+        """Continue in the system (0) or its partner (1), whose time and state must be set afterwards."""
         if chart not in self._charts:
             wanted = self.system if chart == 0 else self.system.partner
             assert wanted is not None
             self._charts[chart] = interruptible(lambda: self._compiled(wanted))
-        time = self._integrator.dtime
         self._chart, self._integrator = chart, self._charts[chart]
-        self._integrator.dtime = time
         self._longest = self._bounds[chart]
 
     def _watched(self) -> Watcher | None:

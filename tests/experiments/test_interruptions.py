@@ -27,7 +27,8 @@ def test_commands_and_scenes_end_in_time(capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.slow
 def test_what_heeds_no_signal_is_late(tmp_path: Path) -> None:
     """A promise that can't be kept is found to be broken."""
-    (tmp_path / "scene.toml").write_text(f'name = "scene"\n{interruptions.SITUATIONS["imports"].text}')
-    found = interrupted(["run", "scene.toml"], tmp_path, "", 0.3)
+    situation = interruptions.SITUATIONS['"double", dense']
+    (tmp_path / "scene.toml").write_text(f'name = "scene"\n{situation.text}')
+    found = interrupted(["run", "scene.toml"], tmp_path, situation.line, situation.seconds)
     assert found.code == 130
     assert not found.within(0.0)

@@ -97,7 +97,7 @@ def test_such_a_sweep_is_resumed_verified_drawn_and_planned(tmp_path: Path) -> N
         ["resume", place],
         ["verify", place],
         ["plot", place, "--what", "modelling_error"],
-        ["export", place, "--format", "csv"],
+        ["export", place, "--format", "csv", "--out", str(tmp_path / "precessing.csv")],
     ]
     for command in commands:
         done = CliRunner().invoke(app, command)

@@ -116,7 +116,8 @@ def _tried(number: int, folder: Path) -> None:
     """Run, sweep, check and plan one random torque: each ends, or is refused in words."""
     generator = random.Random(number)
     formulation = generator.choice(["auto", "quaternion", "euler_angles", "rotation_matrix"])
-    text = SCENE.format(torque=_torque(generator), formulation=formulation)
+    # (2 t)^20 makes it spin at 1e9 rad/s
+    text = SCENE.format(torque=_torque(generator), formulation=formulation) + "[limits]\nwall_time = 0.5\n"
     swept = text + SWEPT.format(batch=generator.choice(["true", "false"]))
     path = folder / "tried.toml"
     path.write_text(swept)

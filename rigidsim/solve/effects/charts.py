@@ -212,8 +212,9 @@ class Charts(Effect):
         return True
 
     def _enter_other(self, stepper: Stepper) -> None:
-        state = self.change(stepper.state)
+        time, state = stepper.integrator.dtime, self.change(stepper.state)
         stepper.use(self.chart)
+        stepper.integrator.dtime = time
         stepper.state[:] = state
 
     @property
