@@ -12,7 +12,7 @@ from support import config
 import rigidsim
 from rigidsim.solve.closed_form import ClosedForm, closed_form_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 DOWN = [0, 0, -1]
 UNIT_ROUNDOFF = 2.0**-53
@@ -67,7 +67,7 @@ def closed(prepared: InitialValueProblem) -> ClosedForm:
 def against_integration(prepared: InitialValueProblem) -> float:
     """Largest difference of any state at the last sample: rates in the unit of the fastest, the rest O(1)."""
     clock = prepared.clock
-    stepper = Stepper(prepared.system, prepared.precision, prepared.tolerance, clock.at(0))
+    stepper = TaylorStepper(prepared.system, prepared.precision, prepared.tolerance, clock.at(0))
     assert stepper.to(clock.at(2))
     times = clock.internal(0, 3)
     states = closed(prepared).states(prepared.system, prepared.precision, times, clock.at(0))

@@ -21,8 +21,8 @@ from rigidsim.model.averaged.free_motion import Separatrix
 from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _MOMENTS = 6
 """Of the run, Gauss-Legendre nodes: the pace changes like an exponential function, over some e-foldings."""
@@ -96,7 +96,7 @@ def _driven(prepared: InitialValueProblem) -> Driven | None:
 
 
 def _turn_as(
-    stepper: Stepper, prepared: InitialValueProblem, course: Driven, amplitudes: list[float]
+    stepper: TaylorStepper, prepared: InitialValueProblem, course: Driven, amplitudes: list[float]
 ) -> None:
     """Give the stepper the rates of a momentum on the polhode of amplitudes P and Q."""
     context, polhodes, system = prepared.scene.context, course.polhodes, stepper.system

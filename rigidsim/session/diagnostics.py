@@ -16,6 +16,7 @@ from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import Caution, WarningCode
 
@@ -57,7 +58,7 @@ class Diagnostics:
     def estimated(
         self,
         trail: SampleTrail | None = None,
-        corrected: CorrectedStepper | None = None,
+        corrected: CorrectedStepper[TaylorStepper] | None = None,
         go_on: Callable[[], bool] = lambda: True,
     ) -> Diagnostics:
         """The diagnostics with an estimate of the errors.

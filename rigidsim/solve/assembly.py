@@ -23,8 +23,9 @@ from rigidsim.solve.projection import Projection, steps_between
 from rigidsim.solve.sampler import Check, Progress, Sampler, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.stepper import Mark
 from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.turns.count import MOST_OF_A_CLOSED_FORM, radians_between
 
 _RADIANS_AT_ONCE = 5e4
@@ -44,10 +45,10 @@ class Assembly:
     stride: int
     wrapping: AngleWrapping
     log: EventLog
-    corrected: CorrectedStepper | None
+    corrected: CorrectedStepper[TaylorStepper] | None
     evaluator: Evaluator
 
-    def steps(self) -> CorrectedStepper:
+    def steps(self) -> CorrectedStepper[TaylorStepper]:
         """What takes steps, compiled now if there is none: for whoever steps whatever the config says, as a
         pilot does.
         """
@@ -58,7 +59,7 @@ class Assembly:
         return self.corrected
 
     @property
-    def stepper(self) -> Stepper:
+    def stepper(self) -> TaylorStepper:
         """The stepper within ``steps()``."""
         return self.steps().stepper
 
@@ -111,7 +112,7 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
 
 def _stepping(
     prepared: InitialValueProblem, wrapping: AngleWrapping, log: EventLog, stride: int
-) -> CorrectedStepper:
+) -> CorrectedStepper[TaylorStepper]:
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
     stepper = stepper_of(system, precision, prepared.tolerance, start, log)
     # in the order in which they are applied

@@ -11,7 +11,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.stepper import CHUNK_TO, MOST_CHUNKS_TO, Stepper, Watcher
+from rigidsim.solve.taylor_stepper import CHUNK_TO, MOST_CHUNKS_TO, TaylorStepper, Watcher
 
 
 class SecondNumber:
@@ -44,7 +44,7 @@ def propagation(system: System) -> Callable[[Any, Any, int], Any]:
     return propagate
 
 
-class ClockedStepper(Stepper):
+class ClockedStepper(TaylorStepper):
     """Stepper of a system in which something happens at a moment late in the run, within a short while."""
 
     def __init__(

@@ -16,6 +16,7 @@ from rigidsim.solve.sample_buffer import SampleBuffer
 from rigidsim.solve.sampler import Check, Progress, Reach, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _CAREFUL = 2**20  # steps at once
 
@@ -36,7 +37,7 @@ class IntegrationLoop:
 
     def __init__(
         self,
-        corrected: CorrectedStepper,
+        corrected: CorrectedStepper[TaylorStepper],
         clock: SampleClock,
         precision: Precision,
         receiver: SampleReceiver,

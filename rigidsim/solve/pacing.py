@@ -28,6 +28,7 @@ from enum import Enum
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _LONG = 1e-3  # seconds; a step that takes longer isn't taken twice to be measured
 _SPARE = 4  # steps that a skip of steps of mean length ends early: a few are far from the mean
@@ -100,7 +101,11 @@ class WayFinder:
     """
 
     def __init__(
-        self, corrected: CorrectedStepper, clock: SampleClock, precision: Precision, pacing: Pacing
+        self,
+        corrected: CorrectedStepper[TaylorStepper],
+        clock: SampleClock,
+        precision: Precision,
+        pacing: Pacing,
     ) -> None:
         self._corrected = corrected
         self._clock = clock

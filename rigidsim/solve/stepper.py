@@ -1,41 +1,22 @@
-"""heyoka's integrator stepping freely: natural steps only, dense output, no step ever shortened.
-
-Four ways to go on, which give the same bits and differ in cost alone (engine measurements in
-experiments/README.md): ``skip`` takes many steps at once and keeps no dense output; ``grid`` takes many and
-gives the states at times known beforehand, from a whole time on; ``block`` takes many and keeps their dense
-output (about a millisecond per call); ``step`` takes one and keeps it.
-"""
+"""What takes natural steps through a motion, and the boundaries between them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
-import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.solve.building import interruptible
-from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.engine import TaylorEngine
-from rigidsim.solve.events import EventLog, engine_events
+from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
-
-_ARRIVED = hy.taylor_outcome.time_limit
-_LOST = hy.taylor_outcome.err_nf_state
-_FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
-_MOST_TO_WHOLE_TIME = 1000  # steps
-CHUNK_TO, MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
-_HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they would take years
-_TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
-_LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A natural step boundary of the engine.
+    """A natural step boundary.
 
     Attributes:
         time: two numbers whose sum it is, internal units.
@@ -64,269 +45,104 @@ class Watcher(Protocol):
 
 
 class Stepper:
-    """A compiled integrator and its count of steps.
+    """Takes single natural steps with dense output; no step is ever shortened for a sample.
+
+    One of your own defines ``time``, ``state``, ``step``, ``dense`` and ``back_to``, and keeps ``steps``,
+    ``smallest`` and ``largest``. All bits must follow from what its marks hold.
 
     Attributes:
-        system: the system integrated; its partner's equations are compiled when needed.
+        system: the system integrated.
         precision: precision of the arithmetic.
-        watcher: sees each step and may end a call early; None without one.
         steps: natural steps taken and kept.
         log: the events found along the way.
-        has_events: whether the engine looks for any.
+        has_events: whether it looks for any.
         smallest, largest: step sizes of the latest call, internal units.
-        single_steps: whether all ways go step by step.
-        careful: whether neighbours of the motion need it too, rather than the bare engine.
-        begun: if it is careful, the boundary at which the motion begins.
-        cuts_steps: whether some steps are cut short to end at given times, which ``grid`` doesn't know.
+        single_steps: whether steps are always taken one by one.
+        cuts_steps: whether some steps are cut short to end at given times.
+        changes_charts: whether it can continue in the system's partner (``use``).
         failure: why the latest step couldn't be taken although its state is finite; empty otherwise.
         destination: time of the last sample, internal units; None if steps may become arbitrarily
             small.
-        unresolved: whether several steps were taken at once of which some are tiny, so that they have to be
-            taken back and taken one by one, for ``collapsed`` to be told from the motion alone.
+        unresolved: whether several steps were taken at once that have to be taken back and taken one by one.
+        watcher: sees each step and may end a call early; None without one.
     """
 
-    single_steps = False
-    careful = False
-    begun: Mark
+    single_steps = True
     cuts_steps = False
+    changes_charts = False
 
-    def __init__(
-        self,
-        system: System,
-        precision: Precision,
-        tolerance: Scalar | None,
-        start: Scalar,
-        log: EventLog | None = None,
-    ) -> None:
-        self.system = system
-        self.watcher: Watcher | None = None
-        self.precision, self._tolerance, self._start = precision, tolerance, start
+    def __init__(self, system: System, precision: Precision, log: EventLog | None = None) -> None:
+        self.system, self.precision = system, precision
         self.log = log or EventLog()
-        self.has_events = log is not None and bool(system.crossings)
-        self._integrator = self._compiled(system)
-        self._charts = {0: self._integrator}
-        self._chart = 0
-        far = 1e37 if precision.scalar is np.float32 else _FAR
-        self._far = precision.number(system.scene.context.mpf(far))
-        bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
-        self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
-        self._longest = self._bounds[0]
-        if not self.cuts_steps:  # whose equations aren't set yet
-            self.bound_first_step()
+        self.has_events = False
         self.steps = 0
         self.smallest = self.largest = 0.0
         self.failure = ""
         self.destination: float | None = None
         self.unresolved = False
-        self._tiny = 0
-        self._epsilon = float(precision.epsilon)
-
-    def bound_first_step(self) -> None:
-        """Bound the first step of a motion whose series at the start have gaps where the engine looks, for
-        instance from rest. It must stand at its start.
-        """
-        engine, muted = self._integrator, self.log.muted
-        if self.single_steps:  # which are seen to one by one
-            return
-        time, state = engine.dtime, np.array(engine.state)
-        self.log.muted = True
-        engine.step(self._longest, write_tc=True)
-        self.log.muted = muted
-        bound = bound_of_sparse_series(engine.tc)
-        engine.dtime = time
-        engine.state[:] = state
-        if bound < float(self._longest):
-            self._bounds[self._chart] = self._longest = self.precision.of_double(bound)
-
-    def settle(self) -> None:
-        """Must be called after the state was set from outside."""
-
-    def _compiled(self, system: System) -> TaylorEngine:
-        options = dict(self.precision.options, time=self._start)
-        options["compact_mode"] = self.precision.compact or system.wide
-        if self._tolerance is not None:
-            options["tol"] = self._tolerance
-        initial = self.precision.array(system.initial)
-        if not self.has_events:
-            return compiled_engine(system.equations, initial, **options)
-        events = engine_events(system, self.precision, self.log, start=self._start)
-        return hy.taylor_adaptive(system.equations, initial, nt_events=events, **options)
-
-    def use(self, chart: int) -> None:
-        """Continue in the system (0) or its partner (1), whose time and state must be set afterwards."""
-        if chart not in self._charts:
-            wanted = self.system if chart == 0 else self.system.partner
-            assert wanted is not None
-            self._charts[chart] = interruptible(lambda: self._compiled(wanted))
-        self._chart, self._integrator = chart, self._charts[chart]
-        self._longest = self._bounds[chart]
-
-    def _watched(self) -> Watcher | None:
-        if self.watcher is not None:
-            self.watcher.begin(self._integrator.time)
-        return self.watcher
+        self.watcher: Watcher | None = None
 
     @property
-    def integrator(self) -> TaylorEngine:
-        """The heyoka object in use, for provenance."""
-        return self._integrator
+    def time(self) -> Scalar:
+        """Current time (of two numbers the first), internal units, in the run's precision."""
+        raise NotImplementedError
+
+    @property
+    def state(self) -> np.ndarray:
+        """Current state (states,), internal units, which effects assign to in place."""
+        raise NotImplementedError
+
+    def step(self) -> bool:
+        """Take one step with dense output; False if the state is no longer finite."""
+        raise NotImplementedError
+
+    def dense(self, time: Scalar) -> np.ndarray:
+        """State at a time within the step just taken by ``step``, shape (states,)."""
+        raise NotImplementedError
+
+    def skip(self, count: int) -> bool:
+        """Take at most ``count`` steps; False if the state is no longer finite."""
+        smallest, largest = math.inf, 0.0
+        for _ in range(count):
+            if not self.step():
+                return False
+            smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
+            if self.collapsed:
+                break
+        self.smallest, self.largest = smallest, largest
+        return True
+
+    def mark(self) -> Mark:
+        """Remember this boundary."""
+        time = self.time, self.precision.of_double(0.0)
+        return Mark(time, np.array(self.state), len(self.log.found), self.steps)
+
+    def back_to(self, mark: Mark) -> None:
+        """Return to a boundary."""
+        raise NotImplementedError
+
+    @property
+    def collapsed(self) -> bool:
+        """Whether steps have become too small to ever arrive."""
+        return False
+
+    def to_whole_time(self) -> bool:
+        """Go to the first of the two numbers of the time; False if that takes too many steps."""
+        return True
+
+    # --- those that change charts -------------------------------------------------------------------------
 
     @property
     def chart(self) -> int:
         """0 in the system, 1 in its partner."""
-        return self._chart
+        return 0
 
-    @property
-    def time(self) -> Scalar:
-        """Current time (high part), internal units."""
-        return self._integrator.time
+    def use(self, chart: int) -> None:
+        """Continue in the system (0) or its partner (1), whose time and state must be set afterwards."""
 
-    @property
-    def state(self) -> np.ndarray:
-        """Current state, a view that can be assigned to."""
-        return self._integrator.state
+    def enter(self, chart: int, state: np.ndarray) -> None:
+        """Continue from here in a chart, where this is the state."""
+        raise NotImplementedError
 
-    def mark(self) -> Mark:
-        """Remember this boundary."""
-        engine, found = self._integrator, len(self.log.found)
-        return Mark(engine.dtime, np.array(engine.state), found, self.steps, tiny=self._tiny)
-
-    def back_to(self, mark: Mark) -> None:
-        """Return to a boundary."""
-        self._integrator.dtime = mark.time
-        self._integrator.state[:] = mark.state
-        self.log.back_to(mark.events)
-        self.steps, self._tiny, self.unresolved = mark.steps, mark.tiny, False
-
-    @property
-    def at_whole_time(self) -> bool:
-        """Whether time is a single number, as ``grid`` needs it."""
-        return bool(self._integrator.dtime[1] == 0)
-
-    def to_whole_time(self) -> bool:
-        """Go to the high part of time, by a step of at most half its last bit in either direction; stays and
-        returns False if that takes too many natural steps.
-        """
-        engine = self._integrator
-        time, state = engine.dtime, np.array(engine.state)
-        if time[1] == 0:
-            return True
-        # one step is nearly always enough, and costs less than a call that may take several
-        if engine.step(-time[1])[0] == _ARRIVED and engine.dtime == (time[0], 0):
-            return True
-        engine.dtime = time
-        engine.state[:] = state
-        if engine.propagate_until(time[0], max_steps=_MOST_TO_WHOLE_TIME)[0] == _ARRIVED:
-            return True
-        engine.dtime = time
-        engine.state[:] = state
-        return False
-
-    def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
-        """Take ``count`` steps from a whole time: whether all went well, and the states (n, states) at those
-        ``times`` that they reached. The times ascend, and none lies before the current one.
-        """
-        ends = np.array([self._integrator.time, self._far], dtype=times.dtype)
-        first = int(len(times) > 0 and times[0] == ends[0])
-        before = self._integrator.dtime
-        outcome, smallest, largest, taken, _, states = self._integrator.propagate_grid(
-            np.concatenate([ends[:1], times[first:], ends[1:]]),
-            max_steps=count,
-            max_delta_t=self._longest,
-            callback=self._watched(),
-        )
-        return self._account(before, outcome, smallest, largest, taken), states[1 - first :]
-
-    def step(self) -> bool:
-        """Take one step with dense output; False if the state is no longer finite."""
-        self._watched()
-        before = self._integrator.time
-        outcome, size = self._integrator.step(self._longest, write_tc=True)
-        if outcome == _LOST:
-            self.smallest, self.largest = np.inf, 0.0  # as where no step was taken: its size may be no number
-            return False
-        self.smallest = self.largest = abs(float(size))
-        self.steps += 1
-        self._judge(before, 1)
-        if self.watcher is not None:
-            self.watcher(self._integrator)
-        return True
-
-    def dense(self, time: Scalar) -> np.ndarray:
-        """State at a time within the step just taken by ``step``, shape (states,)."""
-        return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
-
-    def skip(self, count: int) -> bool:
-        """Take at most ``count`` steps without dense output, fewer if the watcher ends the call; False if the
-        state is no longer finite.
-        """
-        before = self._integrator.dtime
-        outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
-            self._far,
-            max_steps=count,
-            max_delta_t=self._longest,
-            callback=self._watched(),
-            write_tc=self.watcher is not None,
-        )
-        return self._account(before, outcome, smallest, largest, taken)
-
-    def to(self, time: float) -> bool:
-        """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
-        for _ in range(MOST_CHUNKS_TO):  # Ctrl-C is heeded between chunks
-            engine = self._integrator
-            outcome = engine.propagate_until(time, max_steps=CHUNK_TO, max_delta_t=self._longest)[0]
-            if outcome != hy.taylor_outcome.step_limit:
-                break
-        return bool(outcome == _ARRIVED)
-
-    def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
-        """Take ``count`` steps with dense output: whether all went well, and a function from times (n,) to
-        states (n, states).
-        """
-        before = self._integrator.dtime
-        outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
-            self._far,
-            max_steps=count,
-            max_delta_t=self._longest,
-            c_output=True,
-            callback=self._watched(),
-            write_tc=self.watcher is not None,
-        )
-        return self._account(before, outcome, smallest, largest, taken), output
-
-    def _account(
-        self,
-        before: tuple[Scalar, Scalar],
-        outcome: hy.taylor_outcome,
-        smallest: Scalar,
-        largest: Scalar,
-        taken: int,
-    ) -> bool:
-        self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
-        if taken and self.largest == 0.0 and self._integrator.dtime != before:
-            # heyoka omits steps of the greatest allowed size
-            self.smallest = self.largest = float(self._longest)
-        self.steps += int(taken)
-        self._judge(before[0], int(taken))
-        return bool(outcome != _LOST)
-
-    @property
-    def collapsed(self) -> bool:
-        """Whether the latest steps were all so small that time, as a single number, doesn't resolve them, and
-        more remain to the last sample than can ever be taken.
-        """
-        return self._tiny >= _TINY_STEPS
-
-    def _judge(self, before: Scalar, taken: int) -> None:
-        """Count tiny steps, if they were taken one by one."""
-        if self.destination is None or not taken:
-            return
-        begin, end = float(before), float(self._integrator.time)
-        size = self.largest if taken == 1 else self.smallest  # a step that ends on a surface may be any size
-        resolved = self._epsilon * (abs(end) if taken == 1 else max(abs(begin), abs(end)))
-        if not (size < resolved and size * _HOPELESS_STEPS < self.destination - begin):
-            self._tiny = 0
-        elif taken == 1:
-            self._tiny += 1
-        else:
-            self.unresolved = True
+    def bound_first_step(self) -> None:
+        """Bound the first step after the state at the start was set."""

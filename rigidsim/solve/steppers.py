@@ -5,7 +5,7 @@ from __future__ import annotations
 from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 
 def stepper_of(
@@ -14,7 +14,7 @@ def stepper_of(
     tolerance: Scalar | None,
     start: Scalar,
     log: EventLog | None = None,
-) -> Stepper:
+) -> TaylorStepper:
     """The stepper of a system: a plain one, unless the system switches sides or changes at given times.
 
     Args:
@@ -31,7 +31,7 @@ def stepper_of(
 
         return ClockedStepper(system, precision, tolerance, start, log)
     if not system.switches:
-        return Stepper(system, precision, tolerance, start, log)
+        return TaylorStepper(system, precision, tolerance, start, log)
     from rigidsim.solve.switching.stepper import SwitchingStepper
 
     return SwitchingStepper(system, precision, tolerance, start, log)

@@ -15,12 +15,12 @@ import numpy as np
 from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 400_000  # steps to a given time at once, and how often
 
 
-class TableStepper(Stepper):
+class TableStepper(TaylorStepper):
     """Stepper of a system whose equations change at given times."""
 
     cuts_steps = careful = True

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -141,24 +141,24 @@ def test_a_failing_step_is_found_among_many(
     the run takes blocks or skips, it ends at the last step before, with every sample up to there.
     """
     broken = 80.0  # seconds
-    outcome = {name: getattr(Stepper, name) for name in ("step", "skip", "block", "grid")}
+    outcome = {name: getattr(TaylorStepper, name) for name in ("step", "skip", "block", "grid")}
 
-    def past(stepper: Stepper) -> bool:
+    def past(stepper: TaylorStepper) -> bool:
         return float(stepper.time) > broken / unit
 
-    def step(self: Stepper) -> bool:
+    def step(self: TaylorStepper) -> bool:
         fine = outcome["step"](self)
         return fine and not past(self)
 
-    def skip(self: Stepper, count: int) -> bool:
+    def skip(self: TaylorStepper, count: int) -> bool:
         fine = outcome["skip"](self, count)
         return fine and not past(self)
 
-    def block(self: Stepper, count: int) -> tuple[bool, Any]:
+    def block(self: TaylorStepper, count: int) -> tuple[bool, Any]:
         fine, output = outcome["block"](self, count)
         return fine and not past(self), output
 
-    def grid(self: Stepper, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
+    def grid(self: TaylorStepper, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
         fine, states = outcome["grid"](self, times, count)
         return fine and not past(self), states
 
@@ -167,7 +167,7 @@ def test_a_failing_step_is_found_among_many(
     with rigidsim.open_run("whole/free").dataset as whole:
         unit = 2.0 ** json.loads(whole.attrs["unit_exponents"])["time"]
         for method in (step, skip, block, grid):
-            monkeypatch.setattr(Stepper, method.__name__, method)
+            monkeypatch.setattr(TaylorStepper, method.__name__, method)
         result = rigidsim_command("run", name)
         assert result.exit_code == 3
         summary = json.loads(Path("runs/free/summary.json").read_text())

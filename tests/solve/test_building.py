@@ -74,7 +74,7 @@ def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pyt
         return compiled_engine(equations, *given, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr("rigidsim.solve.stepper.compiled_engine", interrupted)
+        patch.setattr("rigidsim.solve.taylor_stepper.compiled_engine", interrupted)
         run = run_text(text, out=tmp_path / "cut")
     never.set()
     assert run.status == "interrupted"

@@ -35,7 +35,7 @@ from rigidsim.solve.projection import (
     put_back_by_invariant,
     steps_between,
 )
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 ATTITUDE = "quaternion = [0.5, 0.5, -0.5, 0.5]"
 FREE = ("principal_moments = [1, 2, 3]", f"angular_velocity = [0.5, 0.25, 1]\n{ATTITUDE}", "")
@@ -84,7 +84,7 @@ class Motion:
         zero = (
             p.precision.scalar(0.0) if p.precision.scalar is not hy.real else hy.real(0.0, p.precision.bits)
         )
-        self.stepper = Stepper(system, p.precision, p.tolerance, zero)
+        self.stepper = TaylorStepper(system, p.precision, p.tolerance, zero)
         self.projection = Projection(p.system, p.precision, 0.0) if held else None
         self.wrapping = AngleWrapping(p.system.angle_states, p.precision, p.scene.context)
         self.every = every or steps_between(p.precision)
@@ -264,7 +264,7 @@ def test_coefficients_in_two_parts_keep_a_held_run_from_drifting_off() -> None:
     p, time = scene(parts, precision='"single"'), 1e5
     reference = Motion(scene(parts), held=False).until(time)
     split, rounded = (Motion(p, held=True, every=16) for _ in range(2))
-    rounded.stepper = Stepper(p.system, p.precision, p.tolerance, np.float32(0))
+    rounded.stepper = TaylorStepper(p.system, p.precision, p.tolerance, np.float32(0))
     two, one = (
         float(angle_between(m.until(time)[None, 3:7].astype(float), reference[None, 3:7])[0])
         for m in (split, rounded)

@@ -24,7 +24,7 @@ from rigidsim.solve.neighbours.lanes import (
 from rigidsim.solve.neighbours.pushed import Neighbours, Pushes
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _OF_SERIES = 4.0
 """Rounding of the arguments over that of time: multiples, by up to four, of angles that grow with it."""
@@ -37,7 +37,7 @@ def same_states(prepared: InitialValueProblem) -> bool:
     return prepared.system.requirements.formulation not in ("euler_angles", "canonical")
 
 
-def _by_itself(course: Course, own: Stepper, part: float, tolerance: float, margins: Margins) -> bool:
+def _by_itself(course: Course, own: TaylorStepper, part: float, tolerance: float, margins: Margins) -> bool:
     """Whether the run's own integrator carries its neighbours, at least at first."""
     if tolerance <= TIGHT or (part < 1 and not same_states(course.prepared)):
         return course.steps * part < margins.most_own_steps

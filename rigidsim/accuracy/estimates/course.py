@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Course:
     end: float
     steps: int
     waypoints: Waypoints | None
-    stepper: Stepper | None
+    stepper: TaylorStepper | None
     nearest: float
     uneven: float
     lost: float
@@ -44,7 +44,7 @@ class Course:
         return self.prepared.system.requirements.formulation != "rates"
 
     @property
-    def own(self) -> Stepper | None:
+    def own(self) -> TaylorStepper | None:
         """The run's stepper if it can carry the neighbours; None otherwise."""
         single = self.prepared.system.partner is None and self.prepared.precision.name == "double"
         return self.stepper if single else None

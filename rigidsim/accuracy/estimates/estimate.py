@@ -25,7 +25,7 @@ from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARG
 from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.trail import SampleTrail
 
 
@@ -72,7 +72,7 @@ def estimate_errors(
     *,
     trail: SampleTrail | None = None,
     waypoints: Waypoints | None = None,
-    stepper: Stepper | None = None,
+    stepper: TaylorStepper | None = None,
     nearest: float = 1.0,
     uneven: float = math.inf,
     go_on: Callable[[], bool] = lambda: True,

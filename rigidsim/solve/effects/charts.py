@@ -212,10 +212,8 @@ class Charts(Effect):
         return True
 
     def _enter_other(self, stepper: Stepper) -> None:
-        time, state = stepper.integrator.dtime, self.change(stepper.state)
-        stepper.use(self.chart)
-        stepper.integrator.dtime = time
-        stepper.state[:] = state
+        state = self.change(stepper.state)
+        stepper.enter(self.chart, state)
 
     @property
     def memory(self) -> int:

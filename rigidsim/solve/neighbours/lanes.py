@@ -20,8 +20,8 @@ from rigidsim.model.system import System
 from rigidsim.solve.clocked_stepper import propagation
 from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 NEIGHBOURS = 3
 _DOUBLE_ORDER = 20
@@ -68,7 +68,7 @@ _PARTS = 4
 
 
 @contextmanager
-def borrowed(stepper: Stepper | None) -> Iterator[None]:
+def borrowed(stepper: TaylorStepper | None) -> Iterator[None]:
     """Use a run's stepper, or copies of its engine, inside the block without leaving a trace."""
     if stepper is None:
         yield
@@ -259,7 +259,7 @@ class StepperLanes:
     """
 
     def __init__(
-        self, system: System, start: float, end: float, steps: int, stepper: Stepper | None = None
+        self, system: System, start: float, end: float, steps: int, stepper: TaylorStepper | None = None
     ) -> None:
         if stepper is None:
             precision = replace(precision_of("double"), compact=True)

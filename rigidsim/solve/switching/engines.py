@@ -21,16 +21,17 @@ from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.event_units import of_order_one
 from rigidsim.solve.events import BESIDE, EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.stepper import Mark
 from rigidsim.solve.switching.resting import Meeting
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe, continued
 from rigidsim.solve.switching.sliding import sliding
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 Root = tuple[Any, int, int]
 """Time, number of a surface, and the side to which it leads."""
 
 
-class SwitchedEngines(Stepper):
+class SwitchedEngines(TaylorStepper):
     """A stepper with surfaces apart from its steps: an engine for each combination of sides, and a memory."""
 
     single_steps = careful = True

@@ -31,8 +31,8 @@ from rigidsim.solve.building import interruptible
 from rigidsim.solve.compiled import compiled_engine, compiled_function
 from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.turns.shared import AngleSteps
 
 DENSE = 1.0
@@ -133,7 +133,7 @@ class _Plain:
 class _Stepwise:
     """Follows a motion with switching surfaces or tabulated orbits step by step."""
 
-    def __init__(self, stepper: Stepper) -> None:
+    def __init__(self, stepper: TaylorStepper) -> None:
         self._stepper = stepper
 
     def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
