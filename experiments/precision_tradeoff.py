@@ -30,7 +30,7 @@ import rigidsim
 from experiments.common import CONFIGS, Check, main, new_figure, save, tidy
 from rigidsim.accuracy.bench.measure import Measurement, Row, measure
 from rigidsim.accuracy.bench.plan import DEFAULT, Plan
-from rigidsim.accuracy.error_law import closed_form_if_any
+from rigidsim.accuracy.error_law import exact_method
 from rigidsim.accuracy.setting import Setting
 from rigidsim.solve.problem import prepare
 
@@ -49,15 +49,15 @@ _COLORS = ("#fdae61", "#d7301f", "#7a0177", "#2b8cbe", "#08306b")
 _MARKERS = {"single": "v", "double": "o", "extended": "s", "quadruple": "D"}
 
 
-def settings(closed: bool) -> list[Setting]:
+def settings(exact: str) -> list[Setting]:
     """Quaternions throughout: ``rigidsim tradeoff`` shows that other formulations cost more."""
     loose = [Setting("double", t) for t in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14)]
     rest = [Setting("single"), Setting("extended"), Setting("extended", 1e-16), Setting("quadruple"),
             Setting("quadruple", 1e-24)]  # fmt: skip
     plain = [DEFAULT, *loose, *rest]
     held = [Setting(s.precision, s.tolerance, hold_invariants=True) for s in plain]
-    exact = [Setting(p, method="closed_form") for p in ("double", "quadruple")] if closed else []
-    return [*plain, *held, *exact]
+    precise = [Setting(p, method=exact) for p in ("double", "quadruple")] if exact else []
+    return [*plain, *held, *precise]
 
 
 @dataclass(frozen=True)
@@ -83,18 +83,17 @@ def measure_scene(name: str, *, to: float, processes: int) -> Points:
     experiment = rigidsim.load(CONFIGS / f"{name}.toml")
     prepared = prepare(experiment)
     rate, start = float(prepared.system.rate_bound), float(prepared.scene.start)
-    form, why = closed_form_if_any(prepared.scene)
-    closed = form is not None
+    exact, why = exact_method(prepared.scene)
     decades = range(2, round(math.log10(to)) + 1)
     horizons = [10.0**n for n in decades]
-    last = len(horizons) if closed else min(len(horizons), 2)  # what a reference in quadruple can do
+    last = len(horizons) if exact else min(len(horizons), 2)  # what a reference in quadruple can do
     wide = max(len(horizons) - 2, 1)
-    first = _plan(horizons[:last], wide, rate, start, why)
-    measured = measure(experiment, budget=3600.0, repeats=processes, plan=first, settings=settings(closed))
+    first = _plan(horizons[:last], wide, rate, start, exact, why)
+    measured = measure(experiment, budget=3600.0, repeats=processes, plan=first, settings=settings(exact))
     points = _points(measured, horizons[:last])
     if last < len(horizons):
-        longer = _plan(horizons, wide, rate, start, why)
-        chosen = [s for s in settings(closed) if s.precision in ("double", "extended", "single")]
+        longer = _plan(horizons, wide, rate, start, exact, why)
+        chosen = [s for s in settings(exact) if s.precision in ("double", "extended", "single")]
         further = measure(
             experiment, budget=3600.0, repeats=1, plan=longer, settings=chosen, reference="extended"
         )
@@ -105,7 +104,7 @@ def measure_scene(name: str, *, to: float, processes: int) -> Points:
     return points
 
 
-def _plan(horizons: Sequence[float], wide: int, rate: float, start: float, why: str) -> Plan:
+def _plan(horizons: Sequence[float], wide: int, rate: float, start: float, exact: str, why: str) -> Plan:
     """Eight samples to each decade, the horizons among them; single precision means them exactly."""
     wide = min(wide, len(horizons))
     ends = [h / rate for h in horizons]
@@ -114,7 +113,7 @@ def _plan(horizons: Sequence[float], wide: int, rate: float, start: float, why: 
     short_end = float(np.float32(start + ends[wide - 1]))
     count = sum(t <= short_end for t in times)
     end = start + ends[-1]
-    return Plan(start, end, 0.0, 1.0, ends[wide - 1] / ends[-1], times, count, not why, why, SAMPLES)
+    return Plan(start, end, 0.0, 1.0, ends[wide - 1] / ends[-1], times, count, exact, why, SAMPLES)
 
 
 def _points(measured: Measurement, horizons: Sequence[float]) -> Points:
@@ -138,7 +137,7 @@ def _points(measured: Measurement, horizons: Sequence[float]) -> Points:
 def _cost(measured: Measurement, row: Row, part: float) -> float:
     """Of a closed form: its samples cost the same over any horizon."""
     cost = measured.cost(row)[0]
-    return cost / part if row.setting.method == "closed_form" else cost
+    return cost if row.setting.has_steps else cost / part
 
 
 def front(points: Sequence[Point]) -> list[Point]:
@@ -178,7 +177,7 @@ def draw(scenes: dict[str, Points], out: Path) -> Path:
                 marker = _MARKERS[str(point.setting.precision)]
                 face = color if held else "white"
                 axes.plot(point.cost, point.error, marker, color=color, markersize=5, markerfacecolor=face)
-            for point in (p for p in some if p.setting.method == "closed_form"):
+            for point in (p for p in some if not p.setting.has_steps):
                 axes.plot(point.cost, point.error, "*", color=colors[horizon], markersize=10, alpha=0.9)
         axes.set_xscale("log")
         axes.set_yscale("log")

@@ -121,7 +121,7 @@ def _judged(scene: RandomScene, experiment: Experiment, run: rigidsim.Run, outco
         setting = setting_of(parse(dataset.attrs["config"], source=outcome.kind))
         kinds = {r.how: r.kind for r in references(setting, motion_of(experiment), scene.accuracy)}
         reference = truth_setting(experiment, setting, scene, kinds.get(accuracy["how"]))
-        most = _WIDE_ROWS if reference.method == "closed_form" else _MOST_ROWS
+        most = _MOST_ROWS if reference.has_steps else _WIDE_ROWS
         rows = np.unique(np.linspace(0, samples - 1, min(samples, most)).astype(int))
         times = exact_times(dataset, rows)
         attitudes = parts_of(dataset, "quaternion", rows)

@@ -126,7 +126,7 @@ class Search:
         return cost(setting, self._steps, self._samples)
 
     def _keeps(self, setting: Setting) -> bool:
-        if setting.method == "closed_form" and self._cost(setting) >= self.cost:
+        if not setting.has_steps and self._cost(setting) >= self.cost:
             return False
         trial = self._trials.whole(setting, self._times)
         if trial is None:

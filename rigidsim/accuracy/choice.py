@@ -174,13 +174,13 @@ def _candidates(experiment: Experiment, motion: KnownMotion) -> list[Setting]:
     charts = formulation not in ("auto", "rates", "quaternion")
     precisions = (integrator.precision,) if "precision" in given else _LADDER
     found: list[Setting] = []
-    if integrator.method == "closed_form" or "method" not in given:
-        open_ = motion.closed and not charts and not experiment.config.events
+    if motion.exact and (integrator.method == motion.exact or "method" not in given):
+        open_ = not charts and not experiment.config.events
         open_ = open_ and not (integrator.hold_invariants is True and "hold_invariants" in given)
-        found += [Setting(p, method="closed_form") for p in precisions if p != "extended" and open_]
-    if "method" in given and integrator.method == "closed_form":
+        found += [Setting(p, method=motion.exact) for p in precisions if p != "extended" and open_]
+    if not integrator.has_steps:
         return found
-    plain = Setting(formulation=formulation if charts else "quaternion")
+    plain = Setting(formulation=formulation if charts else "quaternion", method=integrator.method)
     holds = [integrator.hold_invariants is True] if "hold_invariants" in given else [False, True]
     looser = 13
     for precision in precisions:

@@ -82,6 +82,12 @@ def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedFor
         return None, str(none)
 
 
+def exact_method(scene: Scene, *, driven: bool = False) -> tuple[str, str]:
+    """The method that gives a scene's motion without steps, or empty and the reason why there is none."""
+    form, why_not = closed_form_if_any(scene, driven=driven)
+    return (form.method if form else ""), why_not
+
+
 def motion_growth(prepared: InitialValueProblem) -> Growth:
     """Amplification of errors by the motion itself (takes some 30 ms).
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from rigidsim.accuracy.comparison import angles_between, spread_times
 from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
-from rigidsim.accuracy.reference import STANDARD, Policy, closed_form_beyond, stepped_reference
+from rigidsim.accuracy.reference import STANDARD, Policy, exact_beyond, stepped_reference
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import Told, Trial, Trials
 from rigidsim.look.readable_time import span_text
@@ -145,7 +145,7 @@ class Forecasts:
             self._measured[setting] = math.inf
             if floor <= self._accuracy:
                 times = spread_times(self._experiment, self._law.closed_times)
-                better = closed_form_beyond(setting.precision).setting
+                better = exact_beyond(setting.precision, setting.method).setting
                 one, other = (self._trials.whole(s, times) for s in (setting, better))
                 if one is not None and other is not None:
                     found = float(angles_between(one.attitudes, other.attitudes).max())

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rigidsim.accuracy.error_law import attitude_error, closed_form_if_any
+from rigidsim.accuracy.error_law import attitude_error, exact_method
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import compactly, trial_scene
 from rigidsim.model.load import Load
@@ -91,7 +91,7 @@ class KnownMotion:
         seconds: the run's length.
         growth: amplification of errors by the motion itself.
         holds: whether it has invariants to project, if only the quaternion's norm.
-        closed: whether it has a closed form.
+        exact: method that gives it without steps; empty if it has no closed form.
     """
 
     steps: float
@@ -99,7 +99,7 @@ class KnownMotion:
     seconds: float
     growth: Growth
     holds: bool
-    closed: bool
+    exact: str
 
     def error(self, level: float) -> float:
         """Attitude error at the end, rad, for random errors of size ``level`` at each step, which the motion
@@ -128,5 +128,5 @@ def motion_of(
         seconds=float(scene.samples.last - scene.start),
         growth=measure_growth(double_twin(prepared), precision, begin, end),
         holds=any(i.name != "energy_balance" for i in prepared.system.invariants),
-        closed=closed_form_if_any(scene, driven=bool(loads))[0] is not None,
+        exact=exact_method(scene, driven=bool(loads))[0],
     )

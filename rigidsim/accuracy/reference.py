@@ -122,19 +122,19 @@ def references(
     stepped: list[str | int] = []
     if setting.bits <= 53 and loose and motion.steps > policy.extended_steps:
         stepped.append("double")
-    if setting.bits <= 53 and (motion.steps <= policy.extended_steps or not motion.closed):
+    if setting.bits <= 53 and (motion.steps <= policy.extended_steps or not motion.exact):
         stepped.append("extended")
     costly: list[Reference] = []
-    if motion.closed and setting.has_steps:
-        costly.append(closed_form_beyond(setting.precision))
+    if motion.exact and setting.has_steps:
+        costly.append(exact_beyond(setting.precision, motion.exact))
     elif motion.steps <= policy.wide_steps:
         stepped += ["quadruple"] * (setting.bits <= 64)
         stepped.append(digits_beyond(setting.precision))
-    elif motion.closed:  # too long for steps: the closed form must check itself, with many more digits
-        costly.append(closed_form_to(digits_beyond(setting.precision)))
+    elif motion.exact:  # too long for steps: the closed form must check itself, with many more digits
+        costly.append(exact_to(digits_beyond(setting.precision), motion.exact))
     else:
         other = "rotation_matrix" if setting.formulation == "quaternion" else "quaternion"
-        peer = replace(setting, formulation=other, tolerance=None, method="taylor")
+        peer = replace(setting, formulation=other, tolerance=None)
         costly.append(Reference(peer, ReferenceKind.PEER))
     finer = [stepped_reference(p, motion, motion.steps, policy) for p in stepped]
     return [
@@ -148,10 +148,13 @@ def digits_beyond(precision: str | int) -> int:
     return max(LEAST_DIGITS, int(working_bits(precision) * 0.302) + _SPARE_DIGITS)
 
 
-def closed_form_beyond(precision: str | int) -> Reference:
-    """The closed form with more digits than a precision; it costs the same at any horizon."""
-    digits = "quadruple" if working_bits(precision) <= 64 else digits_beyond(precision)
-    return Reference(Setting(digits, method="closed_form"), ReferenceKind.CLOSED_FORM)
+def exact_beyond(precision: str | int, method: str) -> Reference:
+    """The closed form with more digits than a precision; it costs the same at any horizon.
+
+    Args:
+        method: which gives the motion exactly (``KnownMotion.exact``).
+    """
+    return exact_to("quadruple" if working_bits(precision) <= 64 else digits_beyond(precision), method)
 
 
 def stepped_reference(
@@ -179,9 +182,9 @@ def _only_as_good(
     return replace(reference, tolerance=tolerance) if tolerance > epsilon(reference.precision) else reference
 
 
-def closed_form_to(digits: int) -> Reference:
-    """The closed form to so many digits, for many settings at once."""
-    return Reference(Setting(digits, method="closed_form"), ReferenceKind.CLOSED_FORM)
+def exact_to(precision: str | int, method: str) -> Reference:
+    """The closed form in a precision, or to so many digits."""
+    return Reference(Setting(precision, method=method), ReferenceKind.CLOSED_FORM)
 
 
 def best_and_second(precision: str | int) -> tuple[Setting, Setting]:

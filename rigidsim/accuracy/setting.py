@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
 from rigidsim.solve.problem import auto_tolerance
 
 
@@ -26,18 +27,18 @@ class Setting:
     tolerance: float | None = None
     formulation: str = "quaternion"
     hold_invariants: bool = False
-    method: str = "taylor"
+    method: str = DEFAULT_METHOD
 
     @property
     def has_steps(self) -> bool:
         """Whether it integrates in steps; a closed form takes none."""
-        return self.method != "closed_form"
+        return METHODS[self.method].has_steps
 
     @property
     def title(self) -> str:
         """Title for tables."""
         if not self.has_steps:
-            return f"closed form, {self.precision}"
+            return f"{METHODS[self.method].title}, {self.precision}"
         tolerance = "" if self.tolerance is None else f", tolerance {self.tolerance:.0e}"
         held = ", held" if self.hold_invariants else ""
         return f"{precision_title(self.precision)}{tolerance}, {self.formulation}{held}"

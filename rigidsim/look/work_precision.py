@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidsim.look.figures.style import STYLE
 from rigidsim.look.readable_time import span_text
+from rigidsim.scene.methods import method_named
 
 if TYPE_CHECKING:
     import xarray
@@ -22,8 +23,8 @@ _MARKERS = {
     "rotation_matrix": "s",
     "euler_angles": "^",
     "canonical": "D",
-    "closed_form": "*",
 }
+_STEPLESS = "*"
 _FRONT = "#1b2733"
 
 
@@ -59,8 +60,8 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
     for n in np.nonzero(np.isfinite(error) & np.isfinite(cost))[0]:
         color, marker = _look(dataset, int(n))
         axes.plot(
-            cost[n], error[n], marker, markersize=11 if marker == "*" else 6.5, color=color,
-            markerfacecolor=color if held[n] or marker == "*" else "white", markeredgewidth=1.3,
+            cost[n], error[n], marker, markersize=11 if marker == _STEPLESS else 6.5, color=color,
+            markerfacecolor=color if held[n] or marker == _STEPLESS else "white", markeredgewidth=1.3,
             alpha=0.45 if short[n] else 1.0, linestyle="none", zorder=3,
         )  # fmt: skip
     _draw_models(axes, dataset)
@@ -112,9 +113,9 @@ def _plotted(dataset: xarray.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 def _look(dataset: xarray.Dataset, n: int) -> tuple[str, str]:
     one = dataset.isel(setting=n)
-    closed = one["method"].item() == "closed_form"
-    kind = "closed_form" if closed else str(one["formulation"].item())
-    return _COLORS.get(str(one["precision"].item()), _OTHER), _MARKERS.get(kind, "o")
+    formulation, method = str(one["formulation"].item()), method_named(str(one["method"].item()))
+    marker = _MARKERS.get(formulation, "o") if method.has_steps else _STEPLESS
+    return _COLORS.get(str(one["precision"].item()), _OTHER), marker
 
 
 def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
@@ -126,12 +127,11 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
     shown = np.isfinite(dataset["cpu_ratio"].values)
     precisions = set(dataset["precision"].values[shown])
     kinds = set(dataset["formulation"].values[shown])
-    closed = (dataset["method"].values[shown] == "closed_form").any()
+    methods = [method_named(str(name)) for name in dict.fromkeys(dataset["method"].values[shown])]
     handles = [handle(p, marker="o", color=c) for p, c in _COLORS.items() if p in precisions]
     grey = {"color": "#444444", "markerfacecolor": "white", "markeredgewidth": 1.3}
     handles += [handle(k.replace("_", " "), marker=m, **grey) for k, m in _MARKERS.items() if k in kinds]
-    if closed:
-        handles.append(handle("closed form", marker="*", color="#444444"))
+    handles += [handle(m.title, marker=_STEPLESS, color="#444444") for m in methods if not m.has_steps]
     handles.append(handle("filled: invariants held", marker="o", color="#444444"))
     if "model" in dataset.sizes:
         handles.append(handle("averaged model: axes, to the end", marker="P", color=_OTHER))

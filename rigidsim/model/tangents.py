@@ -21,6 +21,7 @@ from rigidsim.model.planar import ANGLE, SPIN
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.state_names import TANGENT
+from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.registry import register_observable
 
 GROWTH = "tangent_growth"
@@ -223,8 +224,9 @@ def _absent(m: Mechanics) -> str | None:
         return "single precision can't hold a vector that small; choose double"
     if m.surfaces.found:
         return "where the equations switch, at a kink or jump, variational equations end"
-    if integrator.method == "closed_form":
-        return 'a closed form takes no steps along which a vector could be carried; choose method = "taylor"'
+    if not integrator.has_steps:
+        what = "a closed form takes no steps along which a vector could be carried; "
+        return what + f'choose method = "{DEFAULT_METHOD}"'
     return None
 
 

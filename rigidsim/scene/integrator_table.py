@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, StrictInt, WithJsonSchema, field_validator
+from pydantic import Field, StrictBool, StrictInt, StrictStr, WithJsonSchema, field_validator
 
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.fields import ConfigTable, Dimensionless, EulerSequence, Metre, number_schema, refuse
-from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
+from rigidsim.scene.validation_messages import nearest, shown
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
 # room for numbers down to 1e-70.
@@ -46,10 +47,10 @@ class Integrator(ConfigTable):
     euler_sequence: EulerSequence = Field(
         default="zxz", description="axes of the intrinsic rotations, for [initial] and for recorded angles"
     )
-    method: Literal["taylor", "closed_form"] = Field(
-        default="taylor",
-        description="taylor: Taylor series step by step; closed_form: for a free body or a heavy "
-        "symmetric top, theta functions at a cost independent of the time",
+    method: StrictStr = Field(
+        default=DEFAULT_METHOD,
+        description="; ".join(f"{method.name}: {method.told}" for method in METHODS.values()),
+        json_schema_extra=lambda schema: schema.update(enum=list(METHODS)),
     )
     hold_invariants: StrictBool | Literal["auto"] = Field(
         default="auto",
@@ -57,6 +58,19 @@ class Integrator(ConfigTable):
         "slowly; auto: from step 8192 on, leaving shorter runs unchanged; in sweeps auto "
         "means false",
     )
+
+    @field_validator("method", mode="before")
+    @classmethod
+    def _known_method(cls, value: Any) -> Any:
+        if not isinstance(value, str) or value not in METHODS:
+            near = nearest(value if isinstance(value, str) else shown(value), METHODS)
+            raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(METHODS)}")
+        return value
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether the method integrates in steps; a closed form takes none."""
+        return METHODS[self.method].has_steps
 
     @field_validator("hold_invariants", mode="before")
     @classmethod

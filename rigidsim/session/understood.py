@@ -121,7 +121,7 @@ def _wasted_tolerance(scene: Scene) -> str:
     integrator, context = scene.config.integrator, scene.context
     if isinstance(integrator.tolerance, str):
         return ""
-    if integrator.method == "closed_form":
+    if not integrator.has_steps:
         return "[integrator] tolerance has no effect, since a closed form takes no steps; leave it out"
     given, epsilon = integrator.tolerance.at(context), 2.0 ** (1 - working_bits(integrator.precision))
     if given >= epsilon / 8:

@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from rigidsim.errors import RunFolderError
+from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.store.summary_fields import Claim, FiniteNumber, SummaryPart, Text
 from rigidsim.store.summary_parts import (
     Accuracy,
@@ -83,7 +84,7 @@ class Summary(Brief):
     precision: Annotated[Text, Claim()]
     tolerance: Annotated[FiniteNumber, Claim()]
     cost: Cost
-    method: Annotated[Text, Claim()] = "taylor"
+    method: Annotated[Text, Claim()] = DEFAULT_METHOD
     hold_invariants: Annotated[StrictBool, Claim()] = False
     hold_from_step: Annotated[StrictInt | None, Claim()] = None
     invariants: dict[Text, InvariantDrift]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.accuracy.bench.advice import BestSetting, advice
-from rigidsim.accuracy.bench.dataset import dataset_of
+from rigidsim.accuracy.bench.dataset import TOLD, dataset_of
 from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
@@ -71,22 +71,11 @@ class Tradeoff:
                 }
                 for one in (data.isel(model=n) for n in range(data.sizes.get("model", 0)))
             ],
-            **{key: _plain(value) for key, value in data.attrs.items() if key in _TOLD},
+            **{key: _plain(value) for key, value in data.attrs.items() if key in TOLD},
             "advice": [asdict(a) for a in self.advice],
             "settings": rows,
             "folder": None if self.folder is None else str(self.folder),
         }
-
-
-_TOLD = (
-    "compared",
-    "reference",
-    "horizon_seconds",
-    "measured_seconds",
-    "closed_form",
-    "processes",
-    "seconds",
-)
 
 
 def _plain(value: Any) -> Any:

@@ -55,7 +55,8 @@ def free(end: float = 100.0, text: str = FREE) -> rigidsim.Experiment:
 
 def fixed_plan(end: float, *, closed: bool, count: int = 8) -> Plan:
     times = (0.0, *grid(0.0, end, 1.0, count))
-    return Plan(0.0, end, 0.0, 1.0, 1.0, times, count + 1, closed, "" if closed else "for this test", 11)
+    why = (CLOSED.method, "") if closed else ("", "for this test")
+    return Plan(0.0, end, 0.0, 1.0, 1.0, times, count + 1, *why, 11)
 
 
 @pytest.fixture(scope="module")
@@ -273,14 +274,14 @@ def test_settings_past_the_budget_are_listed_as_left_out() -> None:
 
 
 def test_every_kind_of_setting_is_there_once() -> None:
-    settings = every_setting(True, full=True)
+    settings = every_setting(CLOSED.method, full=True)
     assert len(settings) == len(set(settings))
     kinds = {(s.precision, s.formulation, s.hold_invariants) for s in settings if s.tolerance is None}
     for precision in ("single", "double", "extended"):
         for formulation in ("quaternion", "rotation_matrix", "euler_angles", "canonical"):
             assert {(precision, formulation, False), (precision, formulation, True)} <= kinds
-    assert set(every_setting(False)) <= set(settings)
-    assert not any(s.method == "closed_form" for s in every_setting(False))
+    assert set(every_setting()) <= set(settings)
+    assert all(s.has_steps for s in every_setting())
 
 
 @given(st.floats(0, 1e6), st.floats(1e-3, 1e9), st.floats(1e-6, 1), st.integers(1, 40))

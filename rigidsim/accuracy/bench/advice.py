@@ -89,10 +89,10 @@ def _keys(one: xarray.Dataset) -> tuple[str, ...]:
     """The setting as lines for ``[integrator]``."""
     precision = precision_titled(str(one["precision"].item()))
     keys = [f"precision = {precision}" if isinstance(precision, int) else f'precision = "{precision}"']
-    if one["method"].item() == "closed_form":
-        return (*keys, 'method = "closed_form"')
-    tolerance = float(one["tolerance"])
-    if tolerance != Setting(precision).step_tolerance:
+    default, method, tolerance = Setting(precision), one["method"].item(), float(one["tolerance"])
+    if method != default.method:
+        keys.append(f'method = "{method}"')
+    if math.isfinite(tolerance) and tolerance != default.step_tolerance:
         keys.append(f"tolerance = {tolerance:.0e}")
     if one["formulation"].item() != "quaternion":
         keys.append(f'formulation = "{one["formulation"].item()}"')

@@ -11,10 +11,23 @@ import numpy as np
 from rigidsim.accuracy.bench.measure import Measurement, RowStatus
 from rigidsim.accuracy.bench.plan import DEFAULT
 from rigidsim.accuracy.setting import Setting, precision_title
+from rigidsim.scene.methods import METHODS
 
 if TYPE_CHECKING:
     import xarray
     from numpy.typing import ArrayLike
+
+
+TOLD = (
+    "compared",
+    "reference",
+    "horizon_seconds",
+    "measured_seconds",
+    "closed_form",
+    "processes",
+    "seconds",
+)
+"""Attributes of a measurement that its JSON repeats."""
 
 
 def dataset_of(measured: Measurement) -> xarray.Dataset:
@@ -97,7 +110,7 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
                 np.array([r.setting.hold_invariants for r in rows], dtype=np.int8), "1", "invariants put back"
             ),
             "method": variable(
-                np.array([r.setting.method for r in rows], dtype=object), "1", "taylor or closed_form"
+                np.array([r.setting.method for r in rows], dtype=object), "1", " or ".join(METHODS)
             ),
             "time": ("time", np.array(plan.times), {"units": "s", "long_name": "since start of the scene"}),
             "invariant": ("invariant", np.array(names, dtype=object), {"long_name": "invariant"}),
@@ -112,7 +125,7 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             "default_setting": DEFAULT.title,
             "horizon_seconds": span,
             "measured_seconds": plan.part * span,
-            "closed_form": "yes" if plan.closed else f"none: {plan.why}",
+            "closed_form": "yes" if plan.exact else f"none: {plan.why}",
             "processes": measured.processes,
             "seconds": measured.seconds,
             **versions(),

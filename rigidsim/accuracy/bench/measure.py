@@ -177,7 +177,7 @@ def measure(
     begun = time.monotonic()
     plan = plan or make_plan(experiment, budget)
     if settings is None:
-        settings = every_setting(plan.closed, full=full)
+        settings = every_setting(plan.exact, full=full)
     rows = [Row(s) for s in dict.fromkeys([DEFAULT, *settings])]
     explored = begun + timing.exploring * budget
     references = ReferenceThread(experiment, plan, explored, timing.grace, wanted=reference == "best")

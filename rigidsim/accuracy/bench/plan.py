@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidsim.accuracy.error_law import closed_form_if_any
+from rigidsim.accuracy.error_law import exact_method
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import trial_scene
@@ -68,7 +68,7 @@ class Plan:
         steps: approximate steps of the default setting over all of it.
         part, short: parts measured by most settings and by quadruple precision.
         times: seconds, ascending; the first ``short_count`` reach to the end of ``short``.
-        closed, why: whether the scene has a closed form, and if not, why.
+        exact, why: method that gives the motion without steps; empty if there is none, and why.
         samples: number of samples that the experiment itself records.
     """
 
@@ -79,16 +79,16 @@ class Plan:
     short: float
     times: tuple[float, ...]
     short_count: int
-    closed: bool
+    exact: str
     why: str
     samples: int
 
 
-def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
+def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
     """All settings, the most important first, since a budget cuts at the end.
 
     Args:
-        closed: whether the scene has a closed form.
+        exact: method that gives the motion without steps, if there is one.
         full: include every tolerance in every formulation and precision.
     """
 
@@ -96,7 +96,7 @@ def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
         return [replace(s, hold_invariants=held) for s in settings for held in (False, True)]
 
     plain = both([Setting(p) for p in ("double", "extended", "single", "quadruple")])
-    exact = [Setting(p, method="closed_form") for p in ("double", "extended", "quadruple")] if closed else []
+    precise = [Setting(p, method=exact) for p in ("double", "extended", "quadruple")] if exact else []
     loose = both([Setting(p, tolerance) for p, some in _TOLERANCES.items() for tolerance in some])
     tight = [
         replace(s, formulation=f)
@@ -107,10 +107,10 @@ def every_setting(closed: bool, *, full: bool = False) -> list[Setting]:
     few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in FORMULATIONS[1:]])
     rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in FORMULATIONS[1:]]
     # needed to know the error of a reference, if nothing better is possible
-    others = [] if closed else [Setting(p, formulation="rotation_matrix") for p in ("double", "extended")]
+    others = [] if exact else [Setting(p, formulation="rotation_matrix") for p in ("double", "extended")]
     listed = [
         *plain[:2],
-        *exact,
+        *precise,
         *plain[2:],
         *others,
         *loose,
@@ -139,10 +139,10 @@ def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING)
         corrected.stepper, prepared.clock, corrected.skip, steps=how.pilot_steps, warming=_WARMING
     )
     whole = pilot.whole * pilot.seconds_per_step
-    form, why = closed_form_if_any(scene)
+    exact, why = exact_method(scene)
     part = min(1.0, how.all_share * budget / (whole * how.all_cost))
     short = how.quadruple_share * budget / (whole * how.quadruple_cost)
-    if form is None:
+    if not exact:
         part = min(part, how.reference_share * budget / (whole * how.reference_cost))
         short = min(short, how.digits_share * budget / (whole * how.digits_cost))
     short = min(part, short)
@@ -158,7 +158,7 @@ def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING)
         short=short,
         times=times,
         short_count=sum(t <= limit for t in times),
-        closed=form is not None,
+        exact=exact,
         why=why,
         samples=scene.samples.count,
     )

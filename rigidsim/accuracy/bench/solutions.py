@@ -16,9 +16,9 @@ from rigidsim.accuracy.reference import (
     LEAST_DIGITS,
     best_and_second,
     closed_form_error,
-    closed_form_to,
     equals_of,
     errors_of_best,
+    exact_to,
 )
 from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import RigidsimError
@@ -65,9 +65,9 @@ class ReferenceThread(threading.Thread):
     ) -> None:
         super().__init__(daemon=True)
         self._experiment, self._deadline, self._grace = experiment, deadline, grace
-        self._exact = closed_form_to(LEAST_DIGITS).setting
+        self._exact = exact_to(LEAST_DIGITS, plan.exact).setting if plan.exact else None
         self._tasks: list[Task] = []
-        if plan.closed:
+        if self._exact is not None:
             self._tasks = [attitude_task(plan, self._exact, _WITHOUT_END, wide=False)]
         elif wanted:
             self._tasks = [
@@ -100,7 +100,7 @@ class ReferenceThread(threading.Thread):
         """
         if self._failure is not None:
             raise self._failure
-        if self._exact in self._found:
+        if self._exact is not None and self._exact in self._found:
             exact = self._found[self._exact]
             own = np.full(len(exact[0]), closed_form_error(LEAST_DIGITS))
             how = f"closed form to {LEAST_DIGITS} digits"

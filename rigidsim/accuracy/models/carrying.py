@@ -20,6 +20,7 @@ from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.accuracy.trial import compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average
+from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.solve.neighbours.lanes import NEIGHBOURS, BatchLanes, Lanes, StepperLanes
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
@@ -124,7 +125,7 @@ def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialV
     scene, config = prepared.scene, prepared.scene.config
     plain: dict[str, object] = {"precision": "double", "tolerance": "auto"}
     if average is None:  # what is of the full motion alone
-        plain |= {"formulation": "auto", "method": "taylor", "hold_invariants": False}
+        plain |= {"formulation": "auto", "method": DEFAULT_METHOD, "hold_invariants": False}
         plain |= {"accuracy": None, "accuracy_position": None}
     integrator = config.integrator.model_copy(update=plain)
     output = config.output.model_copy(update={"record": ["momentum_axis"], "lyapunov": False})

@@ -14,6 +14,7 @@ from rigidsim.cli.screens.understood import understood
 from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.look.readable_time import TimeWords, span_text
+from rigidsim.scene.methods import method_named
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift
 from rigidsim.store.understood import Span, Start, UnderstoodBody
@@ -97,8 +98,9 @@ def _from_step(step: int | None) -> str:
 def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     _print_understood(summary.body, summary.start, summary.time, loads, on)
     how = f"tolerance {summary.tolerance:.3g}"
-    if summary.method == "closed_form":
-        how = "in closed form"
+    method = method_named(summary.method)
+    if not method.has_steps:
+        how = f"in {method.title}"
     if summary.held:
         how += ", invariants projected" + _from_step(summary.hold_from_step)
     on.line(
@@ -244,7 +246,7 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
         f"{plan['precision']} precision, tolerance {plan['tolerance']:.3g}, Taylor order "
         f"{plan['taylor_order']}{held}",
     )
-    if plan["method"] == "closed_form":
+    if not method_named(plan["method"]).has_steps:
         on.line("method", f"{plan['closed_form']}: no steps are taken")
     elif plan["closed_form"] is not None:
         on.line("closed", f'{plan["closed_form"]}: method = "closed_form" would take no steps')

@@ -29,12 +29,12 @@ drift above which a summary warns (a few roundings of several operations per ste
 
 
 def law(dataset: xarray.Dataset) -> Array | None:
-    """tolerance sqrt(steps until then) (rows,), steps spread evenly over the run; None for closed forms."""
+    """tolerance sqrt(steps until then) (rows,), steps spread evenly over the run; None if there were none."""
     try:
         steps, tolerance = float(dataset.attrs["steps"]), float(dataset.attrs["tolerance"])
     except (KeyError, ValueError, TypeError):
         return None
-    if not (steps > 0 and tolerance > 0) or dataset.attrs.get("method") == "closed_form":
+    if not (steps > 0 and tolerance > 0):
         return None
     seconds = signals.seconds(dataset)
     span = seconds[-1] - seconds[0]

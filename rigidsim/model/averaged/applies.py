@@ -78,7 +78,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = (
             f'[integrator] formulation = "{integrator.formulation}" carries every rotation: leave it out'
         )
-    elif integrator.method != "taylor":
+    elif not integrator.has_steps:
         against = f'[integrator] method = "{integrator.method}" is of the full motion: leave it out'
     elif integrator.hold_invariants is True:
         against = "[integrator] hold_invariants = true is for the full motion's: set it to false"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import mpmath
 import numpy as np
@@ -31,12 +31,14 @@ class ClosedForm:
     """Closed-form solution of a scene, forwards or backwards from its start.
 
     Attributes:
+        method: name in ``[integrator]``.
         motion: rotation of the body about its reference point, internal units of time.
         scaling: the internal units.
         before, after: quaternions from the motion's fixed frame to space, and from the body axes to the
             motion's own.
     """
 
+    method: ClassVar[str] = "closed_form"
     scene: Scene
     motion: Motion
     scaling: Scaling
