@@ -65,14 +65,19 @@ class CorrectedStepper(Generic[S]):
         self._anywhere = [effect for effect in effects if effect.anywhere]
         self.whole_times = self.effect(WholeTime) is not None
         self._stuck = False
-        self._set_stride()
+        self._set_limits()
 
     def effect(self, kind: type[E]) -> E | None:
         """The effect of a kind; None if there is none."""
         return next((effect for effect in self.effects if isinstance(effect, kind)), None)
 
-    def _set_stride(self) -> None:
+    def _set_limits(self) -> None:
         self.stride = min([self._longest_stride, *(effect.limit for effect in self.effects)])
+        self._set_until()
+
+    def _set_until(self) -> None:
+        ends = [effect.until for effect in self._anywhere]
+        self.stepper.until = min((end for end in ends if end is not None), default=None)
 
     @property
     def left(self) -> int:
@@ -94,7 +99,7 @@ class CorrectedStepper(Generic[S]):
         for effect, memory in zip(self.effects, boundary.memories, strict=True):
             effect.back_to(memory, self.stepper)
         self.stepper.back_to(boundary.mark)
-        self._set_stride()
+        self._set_limits()
 
     def arrive(self, boundary: StepBoundary, moment: Scalar) -> StepBoundary:
         """Go back to a boundary before a moment, and on by the same steps to the first boundary at or past
@@ -160,3 +165,4 @@ class CorrectedStepper(Generic[S]):
                 self._stuck = True
                 return
             self.stride = min(self.stride, effect.limit)  # shorter once projection has begun
+            self._set_until()

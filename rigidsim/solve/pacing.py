@@ -196,7 +196,7 @@ class WayFinder:
         fits = spacing * pacing.grid_rows >= stride
         # the last one goes past the last sample, and back: no more of it than of the others
         near = spacing <= pacing.grid_strides * min(stride, STRIDE)
-        return self._corrected.whole_times and fits and near
+        return self._corrected.whole_times and self._corrected.stepper.until is None and fits and near
 
     def _grid_steps(self, left: int) -> int:
         """Whole strides, or all remaining steps and more, since the remainder of a grid would go step by

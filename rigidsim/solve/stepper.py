@@ -58,17 +58,17 @@ class Stepper:
         has_events: whether it looks for any.
         smallest, largest: step sizes of the latest call, internal units.
         single_steps: whether steps are always taken one by one.
-        cuts_steps: whether some steps are cut short to end at given times.
         changes_charts: whether it can continue in the system's partner (``use``).
         failure: why the latest step couldn't be taken although its state is finite; empty otherwise.
         destination: time of the last sample, internal units; None if steps may become arbitrarily
             small.
         unresolved: whether several steps were taken at once that have to be taken back and taken one by one.
+        until: time beyond which no step may go, to be set from outside: one that would is cut short to end
+            there; None for any.
         watcher: sees each step and may end a call early; None without one.
     """
 
     single_steps = True
-    cuts_steps = False
     changes_charts = False
 
     def __init__(self, system: System, precision: Precision, log: EventLog | None = None) -> None:
@@ -80,6 +80,7 @@ class Stepper:
         self.failure = ""
         self.destination: float | None = None
         self.unresolved = False
+        self.until: Scalar | None = None
         self.watcher: Watcher | None = None
 
     @property
@@ -101,13 +102,13 @@ class Stepper:
         raise NotImplementedError
 
     def skip(self, count: int) -> bool:
-        """Take at most ``count`` steps; False if the state is no longer finite."""
+        """Take ``count`` steps, fewer if one ends at ``until``; False if the state is no longer finite."""
         smallest, largest = math.inf, 0.0
         for _ in range(count):
             if not self.step():
                 return False
             smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            if self.collapsed:
+            if self.collapsed or self.time == self.until:
                 break
         self.smallest, self.largest = smallest, largest
         return True

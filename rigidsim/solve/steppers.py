@@ -15,21 +15,13 @@ def stepper_of(
     start: Scalar,
     log: EventLog | None = None,
 ) -> TaylorStepper:
-    """The stepper of a system: a plain one, unless the system switches sides or changes at given times.
+    """The stepper of a system: a plain one, unless the system switches sides.
 
     Args:
         tolerance: None for the precision's epsilon.
         start: start time, internal units.
         log: log of events; without one, none are looked for.
     """
-    if system.pieces is not None:
-        from rigidsim.solve.table_stepper import TableStepper
-
-        return TableStepper(system, precision, tolerance, start, log)
-    if not system.switches and system.clocked:
-        from rigidsim.solve.clocked_stepper import ClockedStepper
-
-        return ClockedStepper(system, precision, tolerance, start, log)
     if not system.switches:
         return TaylorStepper(system, precision, tolerance, start, log)
     from rigidsim.solve.switching.stepper import SwitchingStepper

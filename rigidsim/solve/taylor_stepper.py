@@ -9,6 +9,7 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -19,14 +20,15 @@ from rigidsim.solve.compiled import compiled_engine
 from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.requirements import after_each_step, requirement_of
 from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
-from rigidsim.solve.stepper import Mark, Stepper, Watcher
+from rigidsim.solve.stepper import Mark, Stepper
 
 _ARRIVED = hy.taylor_outcome.time_limit
 _LOST = hy.taylor_outcome.err_nf_state
 _FAR = 1e300  # a target that no run reaches: propagation ends by the count of steps
 _MOST_TO_WHOLE_TIME = 1000  # steps
-CHUNK_TO, MOST_CHUNKS_TO = 256, 400  # steps to a given time at once, and how often
+_CHUNK_TO, _MOST_CHUNKS_TO = 256, 4000  # steps to a given time at once, and how often between two limits
 _HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they would take years
 _TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
@@ -36,14 +38,11 @@ class TaylorStepper(Stepper):
     """A compiled integrator and its count of steps; the partner's equations are compiled when needed.
 
     Attributes:
-        careful: whether neighbours of the motion need it too, rather than the bare engine.
-        begun: if it is careful, the boundary at which the motion begins.
+        begun: the boundary at which the motion begins.
     """
 
     single_steps = False
     changes_charts = True
-    careful = False
-    begun: Mark
 
     def __init__(
         self,
@@ -55,6 +54,7 @@ class TaylorStepper(Stepper):
     ) -> None:
         super().__init__(system, precision, log)
         self._tolerance, self._start = tolerance, start
+        self._requirement = requirement_of(system)
         self.has_events = log is not None and bool(system.crossings)
         self._integrator = self._compiled(system)
         self._charts = {0: self._integrator}
@@ -64,18 +64,19 @@ class TaylorStepper(Stepper):
         bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
         self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
         self._longest = self._bounds[0]
-        if not self.cuts_steps:  # whose equations aren't set yet
-            self.bound_first_step()
+        self.bound_first_step()
         self._tiny = 0
         self._epsilon = float(precision.epsilon)
+        self.begun = TaylorStepper.mark(self)
 
     def bound_first_step(self) -> None:
         """Bound the first step of a motion whose series at the start have gaps where the engine looks, for
         instance from rest. It must stand at its start.
         """
-        engine, muted = self._integrator, self.log.muted
         if self.single_steps:  # which are seen to one by one
             return
+        self._meet()
+        engine, muted = self._integrator, self.log.muted
         time, state = engine.dtime, np.array(engine.state)
         self.log.muted = True
         engine.step(self._longest, write_tc=True)
@@ -116,10 +117,18 @@ class TaylorStepper(Stepper):
         self._integrator.dtime = time
         self._integrator.state[:] = state
 
-    def _watched(self) -> Watcher | None:
+    def _meet(self) -> Scalar | None:
+        """Set what the equations need here; returns the time beyond which no step may go, None for any."""
+        if self._requirement is None:
+            return self.until
+        ends = [end for end in (self._requirement.meet(self._integrator), self.until) if end is not None]
+        return min(ends, default=None)
+
+    def _watched(self) -> Callable[[TaylorEngine], bool] | None:
+        """What to call after each of the steps that begin now."""
         if self.watcher is not None:
             self.watcher.begin(self._integrator.time)
-        return self.watcher
+        return after_each_step(self._requirement, self.watcher)
 
     @property
     def integrator(self) -> TaylorEngine:
@@ -166,6 +175,7 @@ class TaylorStepper(Stepper):
         time, state = engine.dtime, np.array(engine.state)
         if time[1] == 0:
             return True
+        self._meet()
         # one step is nearly always enough, and costs less than a call that may take several
         if engine.step(-time[1])[0] == _ARRIVED and engine.dtime == (time[0], 0):
             return True
@@ -179,8 +189,10 @@ class TaylorStepper(Stepper):
 
     def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
         """Take ``count`` steps from a whole time: whether all went well, and the states (n, states) at those
-        ``times`` that they reached. The times ascend, and none lies before the current one.
+        ``times`` that they reached. The times ascend, and none lies before the current one; ``until`` must be
+        None.
         """
+        self._meet()
         ends = np.array([self._integrator.time, self._far], dtype=times.dtype)
         first = int(len(times) > 0 and times[0] == ends[0])
         before = self._integrator.dtime
@@ -194,6 +206,9 @@ class TaylorStepper(Stepper):
 
     def step(self) -> bool:
         """Take one step with dense output; False if the state is no longer finite."""
+        until = self._meet()
+        if until is not None:
+            return self._propagate(until, 1, write_tc=True)[0]
         self._watched()
         before = self._integrator.time
         outcome, size = self._integrator.step(self._longest, write_tc=True)
@@ -215,37 +230,42 @@ class TaylorStepper(Stepper):
         """Take at most ``count`` steps without dense output, fewer if the watcher ends the call; False if the
         state is no longer finite.
         """
-        before = self._integrator.dtime
-        outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
-            self._far,
-            max_steps=count,
-            max_delta_t=self._longest,
-            callback=self._watched(),
-            write_tc=self.watcher is not None,
-        )
-        return self._account(before, outcome, smallest, largest, taken)
+        return self._propagate(self._meet(), count, write_tc=self.watcher is not None)[0]
 
     def to(self, time: float) -> bool:
         """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
-        for _ in range(MOST_CHUNKS_TO):  # Ctrl-C is heeded between chunks
-            engine = self._integrator
-            outcome = engine.propagate_until(time, max_steps=CHUNK_TO, max_delta_t=self._longest)[0]
-            if outcome != hy.taylor_outcome.step_limit:
+        chunks = _MOST_CHUNKS_TO
+        while chunks > 0:  # Ctrl-C is heeded between chunks
+            until = self._meet()
+            last = until is None or time <= until
+            outcome, _, _, taken, *_ = self._integrator.propagate_until(
+                time if last else until,
+                max_steps=_CHUNK_TO,
+                max_delta_t=self._longest,
+                callback=after_each_step(self._requirement),
+            )
+            if outcome == _ARRIVED and last:
+                return True
+            if outcome not in (_ARRIVED, hy.taylor_outcome.step_limit) or not taken:
                 break
-        return bool(outcome == _ARRIVED)
+            chunks = _MOST_CHUNKS_TO if outcome == _ARRIVED else chunks - 1
+        return False
 
     def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
-        """Take ``count`` steps with dense output: whether all went well, and a function from times (n,) to
-        states (n, states).
+        """Take at most ``count`` steps with dense output, fewer at a limit of time: whether all went well,
+        and a function from times (n,) to states (n, states).
         """
+        return self._propagate(self._meet(), count, c_output=True, write_tc=self.watcher is not None)
+
+    def _propagate(self, until: Scalar | None, count: int, **options: bool) -> tuple[bool, Any]:
+        """Take at most ``count`` steps, none beyond a time: whether all went well, and continuous output."""
         before = self._integrator.dtime
         outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
-            self._far,
+            self._far if until is None else until,
             max_steps=count,
             max_delta_t=self._longest,
-            c_output=True,
             callback=self._watched(),
-            write_tc=self.watcher is not None,
+            **options,
         )
         return self._account(before, outcome, smallest, largest, taken), output
 

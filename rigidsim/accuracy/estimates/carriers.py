@@ -60,7 +60,7 @@ def neighbours_of(
     series: SeriesErrors | None = None
     stand_in = False
     follows = tolerance > TIGHT or not loose(prepared)  # it is as loose as the run
-    if own is not None and own.careful:
+    if own is not None and own.system.stepwise:
         lanes: Lanes = StepperLanes(system, course.start, course.end, course.steps, own)
     elif own is not None and follows and _by_itself(course, own, part, tolerance, margins):
         lanes = OwnLanes(system, own.integrator, tolerance if same_states(prepared) else None)

@@ -8,13 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.solve.precision import Scalar
 from rigidsim.solve.stepper import Stepper
 
 
 class Effect:
     """Something done at boundaries of natural steps: by default at each stride's end, and without a memory.
 
-    Strides are fixed counts of natural steps, as long as the smallest limit of all effects allows.
+    Strides are fixed counts of natural steps, as long as the smallest limit of all effects allows. A step
+    that would go beyond a time given by an effect is cut short to end there.
 
     Attributes:
         anywhere: whether it may be due within a stride, too.
@@ -26,6 +28,13 @@ class Effect:
     def limit(self) -> int:
         """Largest length of a stride that it allows at present; it never grows on the way."""
         return sys.maxsize
+
+    @property
+    def until(self) -> Scalar | None:
+        """Time (internal units) at which a step has to end next, None for none; only with ``anywhere``.
+        When it has come the effect must be due, and its application move it on.
+        """
+        return None
 
     def due(self, stepper: Stepper, stride: int) -> bool:
         """Whether to apply it here, at a stride's end or ``anywhere``: by steps, state and memory alone, so

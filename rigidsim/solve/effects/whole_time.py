@@ -18,7 +18,7 @@ class WholeTime(Effect):
         """Not where events or switching surfaces are looked for, since a step back could cross one twice; nor
         where steps are cut short.
         """
-        return not (stepper.has_events or stepper.single_steps or stepper.cuts_steps)
+        return not (stepper.has_events or stepper.single_steps or stepper.system.stepwise)
 
     def apply(self, stepper: Stepper, stride: int) -> bool:
         """See ``Effect``; False if steps are too small to arrive there."""

@@ -17,9 +17,9 @@ import numpy as np
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
-from rigidsim.solve.clocked_stepper import propagation
 from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.precision import precision_of
+from rigidsim.solve.requirements import propagation
 from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 

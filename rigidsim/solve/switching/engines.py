@@ -34,7 +34,7 @@ Root = tuple[Any, int, int]
 class SwitchedEngines(TaylorStepper):
     """A stepper with surfaces apart from its steps: an engine for each combination of sides, and a memory."""
 
-    single_steps = careful = True
+    single_steps = True
 
     def __init__(
         self,

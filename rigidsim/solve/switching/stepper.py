@@ -74,7 +74,7 @@ class SwitchingStepper(SurfaceRoots):
             if not fine:
                 return False
             smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            if not on or self.collapsed:
+            if not on or self.collapsed or self.time == self.until:
                 break
         self.smallest, self.largest = smallest, largest
         return True
@@ -107,6 +107,9 @@ class SwitchingStepper(SurfaceRoots):
         if self._unsettled:
             self.failure = self._unsettled
             return False, False
+        if self.until is not None:
+            high, low = self._integrator.dtime
+            longest = min(longest, (self.until - high) - low)
         self._watched()
         self._quieten()
         log, events = self.log, len(self.log.found)

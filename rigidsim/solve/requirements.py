@@ -1,0 +1,112 @@
+"""What equations need set before steps, wherever they are integrated: in a run as well as beside it.
+
+Each depends on the boundary alone where steps begin, so that a checkpoint needs to know nothing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from rigidsim.model.system import System
+from rigidsim.solve.engine import TaylorEngine
+from rigidsim.solve.precision import Scalar
+
+
+class Requirement(Protocol):
+    """Something to be set before steps.
+
+    Attributes:
+        each: whether before each single step, rather than before several that are taken at once.
+    """
+
+    each: bool
+
+    def meet(self, integrator: TaylorEngine) -> Scalar | None:
+        """Set it for the boundary where the integrator is; returns the time beyond which no step may go from
+        there, None for any.
+        """
+
+
+def requirement_of(system: System) -> Requirement | None:
+    """What a system's equations need; None if nothing, or if they switch and see to it themselves."""
+    if system.pieces is not None:
+        return TableRows(system)
+    return SecondNumber(system.parameters - 1) if system.clocked and not system.switches else None
+
+
+class TableRows:
+    """Parameters and some states of the equations, reset at the rows of a table, at which steps end.
+
+    Many steps at once give the bits of single ones, since the target of each is the next row.
+    """
+
+    each = False
+
+    def __init__(self, system: System) -> None:
+        assert system.pieces is not None
+        self._pieces, self._states = system.pieces, system.states
+        self._entered: tuple[int, int] | None = None
+
+    def meet(self, integrator: TaylorEngine) -> Scalar | None:
+        """See ``Requirement``: continue with the piece that begins at this boundary, or contains it."""
+        pieces = self._pieces
+        high, low = integrator.dtime
+        number = pieces.number_at(high)
+        if number and high == pieces.knots[number - 1]:
+            if low != 0:
+                integrator.dtime = (high, high * 0)
+            state = integrator.state
+            for name, value in pieces.states(number).items():
+                state[self._states.index(name)] = value
+        if self._entered != (number, id(integrator)):
+            integrator.pars[:] = np.array(pieces.parameters(number), dtype=integrator.pars.dtype)
+            self._entered = (number, id(integrator))
+        return pieces.knots[number] if number < len(pieces.knots) else None
+
+
+class SecondNumber:
+    """The second number of the time, a parameter of equations in which something happens at a moment late in
+    the run, within a short while.
+    """
+
+    each = True
+
+    def __init__(self, place: int) -> None:
+        self._place = place
+
+    def meet(self, integrator: TaylorEngine) -> None:
+        """See ``Requirement``."""
+        integrator.pars[self._place] = integrator.dtime[1]
+
+
+def after_each_step(
+    requirement: Requirement | None, watcher: Callable[[TaylorEngine], bool] | None = None
+) -> Callable[[TaylorEngine], bool] | None:
+    """What to call after each of many steps: the watcher, and before it what the next step needs."""
+    if requirement is None or not requirement.each:
+        return watcher
+
+    def after(integrator: TaylorEngine) -> bool:
+        requirement.meet(integrator)
+        return watcher is None or watcher(integrator)
+
+    return after
+
+
+def propagation(system: System) -> Callable[[Any, Any, int], Any]:
+    """``propagate_until`` for engines, single or batch, of a system that needs no more than both numbers of
+    the time: a function of the engine, the time or times, and the most steps.
+    """
+    requirement = requirement_of(system)
+
+    def propagate(integrator: Any, until: Any, most: int) -> Any:
+        if requirement is None:
+            return integrator.propagate_until(until, max_steps=most)
+        requirement.meet(integrator)
+        after = after_each_step(requirement)
+        return integrator.propagate_until(until, max_steps=most, callback=after)
+
+    return propagate
