@@ -8,14 +8,13 @@ import sys
 from pathlib import Path
 from types import FrameType
 
+from house_figures import LONGEST, ROOT, SOLVER, late_imports, length, of_folder, package
 from typer.testing import CliRunner
 
 from rigidsim.cli.app import app
 
-ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "house.md").read_text(encoding="utf-8")
-MODULES = sorted((ROOT / "rigidsim").rglob("*.py"))
-LONGEST = 350
+MODULES = package(of_folder(ROOT))
 
 
 def test_each_room_is_in_the_table() -> None:
@@ -29,16 +28,28 @@ def test_each_room_is_in_the_table() -> None:
 
 def test_no_module_is_longer_than_the_page_says() -> None:
     assert f"at most {LONGEST} lines" in PAGE
-    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
-    assert {path: length for path, length in lengths.items() if length > LONGEST} == {}
+    assert [path for path, code in MODULES.items() if length(code) > LONGEST] == []
+
+
+def test_hardly_any_module_asks_which_solver_it_is() -> None:
+    """They ask ``rigidsim.scene.methods`` what a method can do; what is left are names promised to users."""
+    assert len(SOLVER.named_in(MODULES)) <= 8
+    found = SOLVER.asked_in(
+        {"a.py": 'if m in ("taylor", "b"): c', "b.py": "d.closed", "c.py": 'e = "taylor"'}
+    )
+    assert found == ["a.py", "b.py"]
+
+
+def test_imports_within_functions_are_counted_once() -> None:
+    assert late_imports("import a\ndef f():\n    import b\n    def g():\n        from c import d") == 2
 
 
 def test_no_class_name_has_two_meanings() -> None:
     found: dict[str, list[str]] = {}
-    for path in MODULES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path, code in MODULES.items():
+        for node in ast.walk(ast.parse(code)):
             if isinstance(node, ast.ClassDef):
-                found.setdefault(node.name.lstrip("_"), []).append(path.relative_to(ROOT).as_posix())
+                found.setdefault(node.name.lstrip("_"), []).append(path)
     assert len(found) > 300
     assert {name: places for name, places in found.items() if len(places) > 1} == {}
 

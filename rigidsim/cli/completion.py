@@ -50,12 +50,15 @@ def _values(key: str, annotation: Any) -> list[str]:
     from rigidsim.scene.bodies.presets import PRESETS
     from rigidsim.scene.bodies.shapes import SHAPES
     from rigidsim.scene.fields import EULER_SEQUENCES
+    from rigidsim.scene.methods import METHODS
 
-    if key == "body.preset":
-        return list(PRESETS)
-    if key == "body.shape":
-        return list(SHAPES)
-    return list(EULER_SEQUENCES if key == "integrator.euler_sequence" else _literals(annotation))
+    names = {
+        "body.preset": PRESETS,
+        "body.shape": SHAPES,
+        "integrator.euler_sequence": EULER_SEQUENCES,
+        "integrator.method": METHODS,
+    }
+    return list(names[key] if key in names else _literals(annotation))
 
 
 def _literals(annotation: Any) -> Iterator[str]:

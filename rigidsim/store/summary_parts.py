@@ -53,7 +53,7 @@ class UnmeasuredCode(Enum):
 
 
 class AdviceCode(Enum):
-    """Which setting would do better nearly for free; ``value`` stands in summaries."""
+    """Which setting would do better nearly free; ``value`` stands in summaries; a method's is its name."""
 
     HOLD_INVARIANTS = "hold_invariants"
     CLOSED_FORM = "closed_form"

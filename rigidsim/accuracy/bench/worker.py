@@ -29,6 +29,7 @@ from rigidsim.accuracy.trial import trial_scene, try_setting
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.config import Experiment, parse
 from rigidsim.solve.assembly import assemble
+from rigidsim.solve.closed_form import closed_form_of
 from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import prepare_scene
 from rigidsim.solve.status import Status
@@ -117,8 +118,8 @@ def speed(experiment: Experiment, task: Task) -> dict[str, Any]:
     times = [mpmath.mpf(t) for t in task.times]
     scene = trial_scene(experiment, task.setting, times)
     prepared = prepare_scene(experiment, scene, tolerance=task.setting.tolerance)
-    if prepared.closed is not None:
-        closed, system, precision = prepared.closed, prepared.system, prepared.precision
+    if not prepared.has_steps:
+        closed, system, precision = closed_form_of(scene), prepared.system, prepared.precision
         rows = np.resize(prepared.clock.internal(0, prepared.clock.count), _CLOSED_ROWS[precision.narrow])
         begin = prepared.clock.start
 

@@ -33,7 +33,7 @@ _WORDS = {
 _ADVICE = {
     AdviceCode.HOLD_INVARIANTS: "hold_invariants = true would bring {now} rad to about {then} for a few "
     "percent more CPU",
-    AdviceCode.CLOSED_FORM: 'this scene has a closed form: method = "closed_form" is right to {then} rad at '
+    AdviceCode.CLOSED_FORM: 'this scene has a closed form: method = "{code}" is right to {then} rad at '
     "any time, in place of {now}",
     AdviceCode.AVERAGED: '[model] level = "{level}" with short_period = true keeps the axes within {then} '
     "rad of this at 1/{times} of the steps",
@@ -65,7 +65,7 @@ def advice_line(advice: Advice) -> str | None:
         return None
     times = f"{1 / advice.share:.2g}" if advice.share else "1"
     then = f"{advice.then:.1e}" if advice.level else f"{advice.then:.0e}"
-    return text.format(now=f"{advice.now:.1e}", then=then, level=advice.level, times=times)
+    return text.format(code=advice.code, now=f"{advice.now:.1e}", then=then, level=advice.level, times=times)
 
 
 def next_lines(status: str, exit_code: int, place: str) -> list[str]:
