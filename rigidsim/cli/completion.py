@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin
 
@@ -52,7 +52,7 @@ def _values(key: str, annotation: Any) -> list[str]:
     from rigidsim.scene.fields import EULER_SEQUENCES
     from rigidsim.scene.methods import METHODS
 
-    names = {
+    names: dict[str, Iterable[str]] = {
         "body.preset": PRESETS,
         "body.shape": SHAPES,
         "integrator.euler_sequence": EULER_SEQUENCES,
