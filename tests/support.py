@@ -22,13 +22,14 @@ from rigidsim.session.tuning import Tuning
 from rigidsim.solve import compiled
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import prepare
+from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 from rigidsim.store.segments import SegmentLimits
 from rigidsim.store.variables import parts_in
 
 CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
 # a look at the guards after every few steps, so that they cut short runs where they say
-IMPATIENT = Tuning(Pacing(chunk_seconds=0.0, patience=0.0, block_steps=16))
+IMPATIENT = Tuning(Pacing(chunk_seconds=0.0, patience=0.0, solver=Ways(block_steps=16)))
 # and a segment for each
 EAGER = Tuning(IMPATIENT.pacing, SegmentLimits(seconds=0.0))
 # for a process of its own, before it calls the command line

@@ -1,6 +1,7 @@
 """Methods that a config can name in ``[integrator] method``, and what each can do.
 
-Whoever has to treat methods differently asks for an ability here, never for a name.
+Whoever has to treat methods differently asks for an ability here, never for a name. How they solve a scene is
+told by ``rigidsim.solve.solvers``.
 """
 
 from __future__ import annotations

@@ -14,8 +14,9 @@ from rigidsim.session.summary import cost_so_far
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.checkpoint import Checkpoint
+from rigidsim.solve.driver import Driver
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.sampler import Progress, Sampler
+from rigidsim.solve.sampler import Progress
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryWriter
@@ -43,7 +44,7 @@ class ActiveRun:
     variables: list[Variable]
     writer: SegmentWriter | MemoryWriter
     recorder: Recorder
-    loop: Sampler
+    driver: Driver
     interruption: Interruption
 
     @classmethod
@@ -69,7 +70,9 @@ class ActiveRun:
         if folder is not None:
             limits = session.tuning.segments
             writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
-        recorder = Recorder(prepared, parts.evaluator, writer, parts.log, parts.effects, session.effort)
+        recorder = Recorder(
+            prepared, parts.evaluator, writer, parts.log, parts.corrected.effects, session.effort
+        )
         interruption = Interruption()
         session.phases.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)
@@ -77,19 +80,19 @@ class ActiveRun:
         guards = Guards(prepared, recorder.statistics, interruption, session.observer)
         start = None if resumed is None else resumed.position
         most = _most_steps(prepared, resumed)
-        loop = sampler(prepared, parts, recorder, guards, start, session.tuning.pacing, most)
-        recorder.progress = loop.progress
+        driver = sampler(prepared, parts, recorder, guards, start, session.tuning.pacing, most)
+        recorder.progress = driver.progress
         if resumed is not None:
             recorder.restore(resumed.statistics)
-            session.observer.resumed(loop.progress)
+            session.observer.resumed(driver.progress)
         return cls(
-            prepared, folder, run_id, parts, attributes, variables, writer, recorder, loop, interruption
+            prepared, folder, run_id, parts, attributes, variables, writer, recorder, driver, interruption
         )
 
     @property
     def progress(self) -> Progress:
         """How far it is, and how it ended."""
-        return self.loop.progress
+        return self.driver.progress
 
     @property
     def last_time(self) -> float:
@@ -102,7 +105,7 @@ class ActiveRun:
 
     def save(self) -> None:
         """Save where it stands, to go on from there."""
-        self.recorder.save(self.loop.position())
+        self.recorder.save(self.driver.position())
 
     def wanted(self) -> bool:
         """Whether nobody has asked for its end."""

@@ -55,7 +55,7 @@ def root_attributes(
         precision=prepared.precision.name,
         precision_bits=prepared.precision.bits,
         tolerance=prepared.effective_tolerance,
-        integrator=prepared.solver,
+        integrator=prepared.algorithm.title,
         method=scene.config.integrator.method,
         hold_invariants=int(prepared.holds_invariants),
         hold_from_step=LATE if prepared.holds_late else None,

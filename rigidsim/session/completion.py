@@ -69,7 +69,7 @@ class Completion:
         self.session.observer.phase("dataset")
         checkpoint, recorder = None, self.run.recorder
         if self.run.progress.status is Status.FINISHED:
-            position = self.run.loop.position()
+            position = self.run.driver.position()
             arrays, events = recorder.packed(position), recorder.all_events(position)
             checkpoint = self.folder.checkpoint, arrays, events
         self.writer.complete(

@@ -14,8 +14,8 @@ from rigidsim.session.tuning import AdviceLimits
 from rigidsim.session.understood import time_words
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.waypoints import Waypoints
-from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.sampler import Progress
 from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import Caution, WarningCode
@@ -58,7 +58,7 @@ class Diagnostics:
     def estimated(
         self,
         trail: SampleTrail | None = None,
-        corrected: CorrectedStepper[TaylorStepper] | None = None,
+        corrected: CorrectedStepper | None = None,
         go_on: Callable[[], bool] = lambda: True,
     ) -> Diagnostics:
         """The diagnostics with an estimate of the errors.
@@ -70,14 +70,14 @@ class Diagnostics:
         """
         from rigidsim.accuracy.estimates.estimate import estimate_errors
 
-        progress = self.progress
+        progress, own = self.progress, None if corrected is None else corrected.stepper
         found = estimate_errors(
             self.prepared,
             progress.steps,
             min(progress.time, float(self.prepared.scene.samples.last)),
             trail=trail,
             waypoints=None if corrected is None else corrected.effect(Waypoints),
-            stepper=None if corrected is None else corrected.stepper,
+            stepper=own if isinstance(own, TaylorStepper) else None,
             nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
             uneven=progress.largest_step / max(progress.smallest_step, 1e-300),
             go_on=go_on,

@@ -57,7 +57,7 @@ def execute(
 
 
 def _integrate(session: Session, run: ActiveRun) -> None:
-    progress = run.loop.run()
+    progress = run.driver.run()
     if not progress.status.final:
         run.save()
     session.phases.next("integrate_and_record")

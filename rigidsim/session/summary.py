@@ -17,9 +17,9 @@ from rigidsim.session.variables import unused_variables
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.effects.charts import Charts
 from rigidsim.solve.events import EventLog
-from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
+from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
 from rigidsim.store.attributes import RootAttributes, Use
 from rigidsim.store.summary import Summary, as_fields
@@ -196,7 +196,7 @@ def chart_changes(prepared: InitialValueProblem, parts: Assembly) -> ChartChange
     system = prepared.system
     if system.partner is None:
         return None
-    charts = None if parts.corrected is None else parts.corrected.effect(Charts)
+    charts = parts.corrected.effect(Charts)
     return ChartChanges(
         count=0 if charts is None else charts.changes,
         sequence=system.sequence,

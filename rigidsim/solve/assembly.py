@@ -1,4 +1,4 @@
-"""Assembly of what integrates a prepared scene: stepper, corrections, evaluation."""
+"""Assembly of what solves a prepared scene: stepper, effects, evaluation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
-from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
+from rigidsim.solve.driver import Driver
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Charts
 from rigidsim.solve.effects.effect import Effect
@@ -16,15 +17,15 @@ from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
-from rigidsim.solve.loop import IntegrationLoop
 from rigidsim.solve.pacing import MEASURED, Pacing
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import Projection, steps_between
-from rigidsim.solve.sampler import Check, Progress, Sampler, SampleReceiver
+from rigidsim.solve.sampler import Check, Progress, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.solvers.algorithm import Algorithm
+from rigidsim.solve.solvers.taylor.solver import Taylor
 from rigidsim.solve.status import Status
-from rigidsim.solve.stepper import Mark
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.turns.count import MOST_OF_A_CLOSED_FORM, radians_between
 
@@ -38,51 +39,34 @@ class Assembly:
 
     Attributes:
         stride: largest number of natural steps between corrections.
-        corrected: what takes steps and corrects them; None for a closed form, which takes none.
+        corrected: what takes the steps of the problem's algorithm, and effects in between; where it has none,
+            the start.
     """
 
     prepared: InitialValueProblem
     stride: int
     wrapping: AngleWrapping
     log: EventLog
-    corrected: CorrectedStepper[TaylorStepper] | None
+    corrected: CorrectedStepper
     evaluator: Evaluator
 
-    def steps(self) -> CorrectedStepper[TaylorStepper]:
-        """What takes steps, compiled now if there is none: for whoever steps whatever the config says, as a
-        pilot does.
+    def steps(self) -> CorrectedStepper:
+        """What takes steps, by Taylor series where the algorithm has none: for whoever steps whatever the
+        config says, as a pilot does.
         """
-        if self.corrected is None:
-            self.corrected = interruptible(
-                lambda: _stepping(self.prepared, self.wrapping, self.log, self.stride)
-            )
-        return self.corrected
+        if self.prepared.has_steps:
+            return self.corrected
+        return interruptible(lambda: _stepping(self.prepared, Taylor(), self.wrapping, self.log, self.stride))
 
     @property
-    def stepper(self) -> TaylorStepper:
-        """The stepper within ``steps()``."""
-        return self.steps().stepper
+    def stepper(self) -> Stepper:
+        """The stepper within ``corrected``."""
+        return self.corrected.stepper
 
     @property
     def order(self) -> int | None:
-        """Order of the Taylor series; None without steps."""
-        return None if self.corrected is None else int(self.stepper.integrator.order)
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """What happens between steps; without any, what the angles stand for remains."""
-        if self.corrected is not None:
-            return self.corrected.effects
-        return (self.wrapping,) if self.wrapping.positions else ()
-
-    def boundary(self) -> StepBoundary:
-        """The boundary where it stands: without steps, the start."""
-        if self.corrected is not None:
-            return self.corrected.boundary()
-        precision = self.prepared.precision
-        start = self.prepared.clock.start, precision.of_double(0.0)
-        mark = Mark(start, precision.array(self.prepared.system.initial))
-        return StepBoundary(mark, tuple(effect.memory for effect in self.effects))
+        """Order of the Taylor series; None without one."""
+        return int(self.stepper.integrator.order) if isinstance(self.stepper, TaylorStepper) else None
 
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
@@ -101,20 +85,19 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     system, precision = prepared.system, prepared.precision
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context, system.angle_unit)
     log = EventLog([c.stop for c in system.crossings], lambda: wrapping.angles)
-    corrected, countable = None, not system.turning  # samples alone can't tell what such a load does
-    if prepared.has_steps:
-        corrected = _stepping(prepared, wrapping, log, stride)
-    else:
+    corrected = _stepping(prepared, prepared.algorithm, wrapping, log, stride)
+    countable = not system.turning  # samples alone can't tell what such a load does
+    if not prepared.has_steps:
         countable = radians_between_samples(prepared) <= MOST_OF_A_CLOSED_FORM
     evaluator = Evaluator(system, precision, wrapping, countable=countable)
     return Assembly(prepared, stride, wrapping, log, corrected, evaluator)
 
 
 def _stepping(
-    prepared: InitialValueProblem, wrapping: AngleWrapping, log: EventLog, stride: int
-) -> CorrectedStepper[TaylorStepper]:
+    prepared: InitialValueProblem, algorithm: Algorithm, wrapping: AngleWrapping, log: EventLog, stride: int
+) -> CorrectedStepper:
     system, precision, start = prepared.system, prepared.precision, prepared.clock.start
-    stepper = stepper_of(system, precision, prepared.tolerance, start, log)
+    stepper = algorithm.stepper(system, precision, prepared.tolerance, start, log)
     # in the order in which they are applied
     effects: list[Effect] = []
     whole = WholeTime() if WholeTime.suits(stepper) else None
@@ -126,7 +109,7 @@ def _stepping(
         late = prepared.holds_late
         projection = Projection(system, precision, start, late=late)
         effects.append(HeldInvariants(projection, steps_between(precision, late=late)))
-    if system.partner is not None:
+    if system.partner is not None and stepper.changes_charts:
         charts = Charts(system, system.partner, precision, wrapping, whole)
         charts.watch(stepper)
         effects.append(charts)
@@ -146,8 +129,8 @@ def sampler(
     start: Position | None = None,
     pacing: Pacing = MEASURED,
     most_steps: int | None = None,
-) -> Sampler:
-    """The sampler of a prepared scene: its closed form if it has one, otherwise the integration.
+) -> Driver:
+    """What takes a prepared scene through its samples.
 
     Args:
         parts: the assembled parts.
@@ -157,26 +140,12 @@ def sampler(
         most_steps: limit of natural steps, counted from the run's beginning; a closed form
             takes none.
     """
-    clock, precision = prepared.clock, prepared.precision
+    clock = prepared.clock
     if parts.evaluator.sparse:
         check = _following(check, parts.evaluator, clock)
         pacing = _in_small_blocks(pacing, radians_between_samples(prepared))
-    if prepared.closed is None:
-        return IntegrationLoop(parts.steps(), clock, precision, receiver, check, start, pacing, most_steps)
-    from rigidsim.solve.closed_form.sampler import ClosedFormSampler
-
-    return ClosedFormSampler(
-        prepared.closed,
-        prepared.system,
-        parts.boundary(),
-        parts.wrapping.angles,
-        clock,
-        precision,
-        receiver,
-        check,
-        start,
-        pacing,
-    )
+    solver = prepared.algorithm.solver(parts.corrected, pacing)
+    return Driver(solver, clock, receiver, check, start, pacing, most_steps)
 
 
 def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
@@ -210,5 +179,4 @@ def _in_small_blocks(pacing: Pacing, radians: float) -> Pacing:
         pacing,
         patience=min(pacing.patience, _PATIENCE),
         rows_at_once=min(pacing.rows_at_once, rows),
-        wide_rows_at_once=min(pacing.wide_rows_at_once, rows),
     )

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.stepper import Mark, Stepper
 
 E = TypeVar("E", bound=Effect)
-S = TypeVar("S", bound=Stepper)
 
 STRIDE = 1024
 """Natural steps between corrections if only time is corrected: half a millisecond, so that the calls cost
@@ -48,7 +47,7 @@ _NEAR = 3
 """Number of steps (with its next guess) below which they are sooner taken one by one than together."""
 
 
-class CorrectedStepper(Generic[S]):
+class CorrectedStepper:
     """Takes steps and applies effects when they are due.
 
     Attributes:
@@ -60,7 +59,7 @@ class CorrectedStepper(Generic[S]):
         stride: largest number of natural steps between corrections; affects results within rounding.
     """
 
-    def __init__(self, stepper: S, effects: Sequence[Effect], *, stride: int = STRIDE) -> None:
+    def __init__(self, stepper: Stepper, effects: Sequence[Effect], *, stride: int = STRIDE) -> None:
         self.stepper, self.effects, self._longest_stride = stepper, tuple(effects), stride
         self._anywhere = [effect for effect in effects if effect.anywhere]
         self.whole_times = self.effect(WholeTime) is not None

@@ -1,210 +1,30 @@
-"""The four ways through the samples, and the choice of the cheapest for the next chunk of steps.
-
-All give the same bits (``rigidsim.solve.stepper``), so that whatever is chosen here changes cost alone.
-Each earns its place. CPU seconds of the loop without one way, over those with all four, by steps per sample
-(free asymmetric body, two shared cores, best of three):
-
-| | 1/16 | 1 | 16 | 100 | 2000 | 20000 |
-| --- | --- | --- | --- | --- | --- | --- |
-| double, no grids | 2.2 | 2.7 | 3.0 | 3.3 | 1.05 | 1.0 |
-| double, no skips | 1.0 | 0.9 | 1.0 | 1.0 | 1.0 | 5.0 |
-| double with events (no grids there), no blocks | 9.7 | 15 | 2.5 | 1.1 | 1.0 | 1.0 |
-| double with events, no skips | 0.9 | 1.0 | 1.0 | 1.5 | 3.1 | 3.5 |
-| double, projected, no grids | 3.3 | 7.7 | 9.4 | 9.3 | 1.0 | 1.0 |
-| double, Euler angles, no grids | 5.8 | 5.0 | 1.4 | 0.9 | 1.0 | 1.0 |
-| 80 bits, no grids | 1.4 | 1.5 | 1.6 | 1.5 | 1.0 | 1.0 |
-| 80 bits with events, no blocks | 9.2 | 10 | 1.4 | 0.9 | 1.1 | 1.0 |
-
-Single steps are what remains between the others, and all that pays beyond 80 bits, where a step is dear.
-"""
+"""How much is done at once: between two looks at guards and Ctrl-C, and in one block of samples."""
 
 from __future__ import annotations
 
-import math
-import time
 from dataclasses import dataclass
-from enum import Enum
-
-from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
-from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.sampling import SampleClock
-from rigidsim.solve.taylor_stepper import TaylorStepper
-
-_LONG = 1e-3  # seconds; a step that takes longer isn't taken twice to be measured
-_SPARE = 4  # steps that a skip of steps of mean length ends early: a few are far from the mean
-
-
-class SampleWay(Enum):
-    """A way through the samples."""
-
-    SKIP = "many steps towards a sample, without dense output"
-    GRID = "whole strides, and the states at sample times known beforehand"
-    BLOCK = "many steps with dense output"
-    STEP = "single steps with dense output"
+from typing import Any
 
 
 @dataclass(frozen=True)
 class Pacing:
-    """Parameters of the choice; a user waits for Ctrl-C no longer than for a chunk and its hand-over.
+    """Amounts; no bit depends on them. A user waits for Ctrl-C no longer than for a chunk and its hand-over.
 
     Attributes:
         chunk_seconds: time between checks of guards and Ctrl-C; well below the half second that a user waits.
         patience: seconds until samples of a slow run are handed over.
         rows_at_once: samples in a block that is evaluated; more are no faster, and take memory.
-        wide_rows_at_once: the same for a closed form beyond double, where a row takes about a millisecond.
         rows_waiting: samples in memory before they are evaluated, however fast they come; no more than are
             evaluated in the time of a chunk.
-        grid_rows: most samples in a stride, which can't be shortened, for it to be taken as a grid; bounds
-            the memory, about 8 MB in double precision.
-        grid_strides: strides per sample up to which grids (20 us each) cost less than skips (85 us).
-        least_grid_steps: fewer are cheaper one by one.
-        block_steps: most steps in a block.
-        block_spacing: steps per sample up to which blocks (1 ms each, and 0.8 us a step) cost less than
-            skipping to each.
-        least_block_steps: fewer are cheaper one by one.
-        look_ahead: samples over which their spacing is measured.
-        skip_from: steps to a sample from which skipping costs less than single steps.
-        skip_margin: share of the steps to the next sample, if all are as long as the longest recent one, that
-            are skipped at once.
-        even_margin: share of the steps to the next sample, if they are as long as those of the latest skip on
-            average, that are skipped at once if that is no more than the latest skip.
-        fading: factor per chunk by which the longest recent step fades.
+        solver: numbers by which the solver chooses its ways; None for those that were measured.
     """
 
     chunk_seconds: float = 0.05
     patience: float = 2.0
     rows_at_once: int = 8192
-    wide_rows_at_once: int = 64
     rows_waiting: int = 32768
-    grid_rows: int = 65536
-    grid_strides: float = 4.0
-    least_grid_steps: int = 8
-    block_steps: int = 4096
-    block_spacing: float = 64.0
-    least_block_steps: int = 64
-    look_ahead: int = 16
-    skip_from: float = 12.0
-    skip_margin: float = 0.9
-    even_margin: float = 0.97
-    fading: float = 0.98
+    solver: Any = None
 
 
 MEASURED = Pacing()
 """The defaults, which cost least where they were measured."""
-
-
-class WayFinder:
-    """Chooses the way for each chunk from the recent steps.
-
-    Attributes:
-        longest: longest recent step, internal units; 0 before the first.
-    """
-
-    def __init__(
-        self,
-        corrected: CorrectedStepper[TaylorStepper],
-        clock: SampleClock,
-        precision: Precision,
-        pacing: Pacing,
-    ) -> None:
-        self._corrected = corrected
-        self._clock = clock
-        self._cheap = precision.cheap
-        self._pacing = pacing
-        self._last = float(clock.at(clock.count - 1))
-        self._paces: dict[SampleWay, float] = {}  # steps per second, as measured last
-        self._alone = 0.0  # those of a step that is taken for nothing else
-        self._skipped, self._mean = 0, math.inf  # steps of the latest skip, and their mean length
-        self._even = True  # whether skips by the mean length have never gone past their sample
-        self.longest = 0.0
-
-    def measured(self, way: SampleWay, steps: int, seconds: float) -> None:
-        """Learn the duration of so many steps; single steps are measured before anything is chosen."""
-        self._paces[way] = max(steps, 1) / max(seconds, 1e-9)
-
-    def look_ahead(self, boundary: StepBoundary) -> None:
-        """Measure the duration of a step from a boundary, which is here, by one that is taken back."""
-        for _ in range(2):  # the first is slow, as is everything that is done for the first time
-            started = time.perf_counter()
-            self._corrected.stepper.step()
-            elapsed = time.perf_counter() - started
-            self._corrected.back_to(boundary)
-            if elapsed > _LONG:
-                break
-        self.measured(SampleWay.STEP, 1, elapsed)
-        self._alone = self._paces[SampleWay.STEP]
-
-    def _most(self, way: SampleWay) -> int:
-        """Number of steps in a chunk."""
-        pace = self._paces.get(way, max(self._paces[SampleWay.STEP], self._alone))
-        return max(1, int(pace * self._pacing.chunk_seconds))
-
-    def skipped(self, steps: int, span: float) -> None:
-        """Learn the length of so many steps from the time that they took the motion ahead."""
-        self._skipped, self._mean = steps, span / max(steps, 1)
-
-    def went_past(self) -> None:
-        """Note that a skip passed its sample: steps are longer than they seemed."""
-        self.longest = 1.5 * max(self.longest, self._corrected.stepper.largest)
-        self._even = False
-
-    def choose(self, following: int, upcoming: Scalar) -> tuple[SampleWay, int]:
-        """How to continue, and for how many steps at most.
-
-        The last sample is only ever skipped to, since what a grid goes past it would be taken once more.
-
-        Args:
-            following, upcoming: index and time of the next sample.
-        """
-        corrected, pacing, stepper = self._corrected, self._pacing, self._corrected.stepper
-        # steps of a tumbling body vary a lot: predict with the longest recent one, which fades slowly
-        self.longest = size = max(stepper.largest, pacing.fading * self.longest)
-        if size <= 0 or stepper.single_steps:
-            return SampleWay.STEP, self._most(SampleWay.STEP)
-        limit = 2**62
-        if self._cheap:
-            left = int(min((self._last - float(stepper.time)) / size, limit))
-            spacing = self._spacing(following)
-            if self._suits_grids(spacing) and following < self._clock.count - 1:
-                if stepper.at_whole_time and left >= pacing.least_grid_steps:
-                    return SampleWay.GRID, self._grid_steps(left)
-                limit = corrected.left  # steps to where a grid can start
-            if spacing <= pacing.block_spacing:
-                if min(left, corrected.left) >= pacing.least_block_steps:
-                    wanted = max(1, int(pacing.rows_at_once * spacing), pacing.least_block_steps)
-                    return SampleWay.BLOCK, min(pacing.block_steps, wanted, corrected.left, left)
-                limit = corrected.left  # steps to where a block is worth it again
-        rest = float(upcoming) - float(stepper.time)
-        expected = rest / size
-        if expected > pacing.skip_from:
-            steps = pacing.skip_margin * expected - 2
-            if self._even and self._mean > 0:
-                likely = pacing.even_margin * rest / self._mean - _SPARE
-                steps = max(steps, likely) if likely <= self._skipped else steps
-            return SampleWay.SKIP, max(1, int(min(steps, self._most(SampleWay.SKIP), limit)))
-        return SampleWay.STEP, min(self._most(SampleWay.STEP), limit)
-
-    def _spacing(self, following: int) -> float:
-        """Steps per sample, over the next samples."""
-        ahead = min(following + self._pacing.look_ahead, self._clock.count - 1)
-        end = self._last if ahead == self._clock.count - 1 else float(self._clock.at(ahead))
-        span = end - float(self._corrected.stepper.time)
-        return span / self.longest / max(ahead - following, 1)
-
-    def _suits_grids(self, spacing: float) -> bool:
-        stride, pacing = self._corrected.stride, self._pacing
-        fits = spacing * pacing.grid_rows >= stride
-        # the last one goes past the last sample, and back: no more of it than of the others
-        near = spacing <= pacing.grid_strides * min(stride, STRIDE)
-        return self._corrected.whole_times and self._corrected.stepper.until is None and fits and near
-
-    def _grid_steps(self, left: int) -> int:
-        """Whole strides, or all remaining steps and more, since the remainder of a grid would go step by
-        step.
-        """
-        stride = self._corrected.stride
-        most = self._most(SampleWay.GRID)
-        if 2 * most >= stride:  # the rest of a stride goes step by step
-            most = max(most, stride)
-        count = min(most, left + left // 2 + self._pacing.least_grid_steps)
-        return count - count % stride if count > stride else count

@@ -25,6 +25,7 @@ from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.projection import projected_system
 from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
 
 if TYPE_CHECKING:
     from rigidsim.model.averaged.average import Average
@@ -55,9 +56,9 @@ class InitialValueProblem:
 
     Attributes:
         tolerance: scalar of the precision, or None for its epsilon; "auto" becomes one of these.
+        algorithm: what solves it.
         python_loads: loads given from Python, unknown to the config.
         holds_late: whether invariants are projected only after a number of steps.
-        closed: the closed-form solution, if the samples are to come from it.
     """
 
     experiment: Experiment
@@ -66,19 +67,19 @@ class InitialValueProblem:
     system: System
     clock: SampleClock
     tolerance: Scalar | None
+    algorithm: Algorithm
     python_loads: tuple[Load, ...] = ()
-    closed: ClosedForm | None = None
     holds_late: bool = False
 
     @property
     def has_steps(self) -> bool:
         """Whether the motion is integrated in steps; a closed form gives the samples without any."""
-        return self.closed is None
+        return self.algorithm.method.has_steps
 
     @property
-    def solver(self) -> str:
-        """What gives the states, in words."""
-        return "heyoka Taylor, natural steps, dense output" if self.closed is None else self.closed.title
+    def closed(self) -> ClosedForm | None:
+        """The closed form that gives the states; None if none does."""
+        return self.algorithm.form
 
     @property
     def holds_invariants(self) -> bool:
@@ -165,19 +166,15 @@ def prepare_scene(
         _refuse_spectrum_by_table(system)
         if loads:
             _refuse_non_finite_start(system, precision)
-        closed = None
-        if scene.config.integrator.method == "closed_form":
-            from rigidsim.solve.closed_form.requested import requested_closed_form
-
-            closed = requested_closed_form(scene, system, driven=bool(loads))
+        algorithm = algorithm_of(scene, system, driven=bool(loads))
         late = False
         if scene.config.integrator.hold_invariants is True:
             system = projected_system(system, precision)
-        elif scene.config.integrator.hold_invariants and closed is None:
+        elif scene.config.integrator.hold_invariants and algorithm.method.has_steps:
             late = _is_worth_holding(system)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
         prepared = InitialValueProblem(
-            experiment, scene, precision, system, clock, step_control, tuple(loads), closed, late
+            experiment, scene, precision, system, clock, step_control, algorithm, tuple(loads), late
         )
         if system.requirements.formulation == "canonical":
             double_twin(prepared)  # its stability is a question of the rates, which it doesn't carry itself

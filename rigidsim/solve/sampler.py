@@ -1,12 +1,10 @@
-"""Interfaces of whatever takes a run through its samples: progress, checks and receiver."""
+"""What goes between a driver and its run: progress, checks, and the receiver of samples."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
-
-import numpy as np
 
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.corrected_stepper import StepBoundary
@@ -52,23 +50,6 @@ Check = Callable[[Progress], Status | None]
 """Checks guards and interruptions between chunks; a status ends the run."""
 
 
-States = Callable[[np.ndarray], np.ndarray]
-"""Function from sample times (n,) to states (n, states), both in internal units."""
-
-
-@dataclass(frozen=True)
-class Reach:
-    """Steps just taken whose samples are still to be taken: one step can hold any number of them.
-
-    Attributes:
-        boundary: boundary before the steps.
-        states: their dense output.
-    """
-
-    boundary: StepBoundary
-    states: States
-
-
 class SampleReceiver(Protocol):
     """Receives samples in order, and is told when they can be saved; the base class never asks for that.
 
@@ -90,15 +71,3 @@ class SampleReceiver(Protocol):
     def save(self, position: Position) -> None:
         """Save everything taken so far, and the position to resume from."""
         return None
-
-
-class Sampler(Protocol):
-    """Takes a run from its present state to its last sample (``rigidsim.solve.assembly.sampler``)."""
-
-    progress: Progress
-
-    def run(self) -> Progress:
-        """Continue until the last sample is handed over, or a check or the motion itself ends the run."""
-
-    def position(self) -> Position:
-        """Position to continue from, at a moment when every sample found was handed over."""

@@ -44,6 +44,24 @@ class Watcher(Protocol):
         """Called after each step; False ends the call that took it."""
 
 
+@dataclass(frozen=True)
+class OwnErrors:
+    """A solver's own estimate of a run's largest errors until its end.
+
+    Attributes:
+        attitude: rad; None without an attitude.
+        rates: error of the angular velocity, relative to its size.
+        how: description of the method.
+        position, velocity: m and m/s; None if the body has no position.
+    """
+
+    attitude: float | None
+    rates: float
+    how: str
+    position: float | None = None
+    velocity: float | None = None
+
+
 class Stepper:
     """Takes single natural steps with dense output; no step is ever shortened for a sample.
 
@@ -130,6 +148,10 @@ class Stepper:
     def to_whole_time(self) -> bool:
         """Go to the first of the two numbers of the time; False if that takes too many steps."""
         return True
+
+    def errors(self) -> OwnErrors | None:
+        """Its own estimate of the errors made so far; None if it has none, and then none is announced."""
+        return None
 
     # --- those that change charts -------------------------------------------------------------------------
 

@@ -19,7 +19,6 @@ from rigidsim.scene.model_table import FULL
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _PILOT_SECONDS = 0.2
 _LARGEST_CHUNK = 1024  # steps: at this length a call's overhead is negligible
@@ -68,9 +67,7 @@ def compared_levels(
     return found
 
 
-def timed_pilot(
-    prepared: InitialValueProblem, corrected: CorrectedStepper[TaylorStepper], seconds: float
-) -> Pilot:
+def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seconds: float) -> Pilot:
     """The first steps of a motion, corrections included, within so many CPU seconds."""
     return run_pilot(
         corrected.stepper,

@@ -20,7 +20,7 @@ from rigidsim.session.guards import Observer
 from rigidsim.session.progress.bar import TerminalObserver
 from rigidsim.session.progress.progress import LineObserver
 from rigidsim.session.timings import NOT_KEPT, Phases
-from rigidsim.solve.loop import Progress
+from rigidsim.solve.sampler import Progress
 
 FREE = """name = "free"
 [body]

@@ -549,7 +549,7 @@ UNUSED = (
     "{'rerun', 'xarray', 'pandas', 'matplotlib', 'dask', 'pyarrow', 'scipy', 'rich', 'tomlkit', 'h5netcdf', "
     "'html', 'email.parser'}"
 )
-OWN_MODULES = 250
+OWN_MODULES = 260
 """That a short run loads, at 0.3 ms each: what few scenes need is loaded where it is used."""
 
 
@@ -654,8 +654,8 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
     from rich.console import Console
 
     from rigidsim.session.progress.bar import TerminalObserver
-    from rigidsim.solve.loop import Progress
     from rigidsim.solve.problem import prepare
+    from rigidsim.solve.sampler import Progress
 
     prepared = prepare(rigidsim.load(config("a_name_of_more_than_twenty_four_letters", time="end = 1000")))
     screen = io.StringIO()
@@ -684,8 +684,8 @@ def test_the_bar_is_one_line(width: int, config: Config) -> None:
 
 def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[str]) -> None:
     from rigidsim.session.progress.progress import LineObserver
-    from rigidsim.solve.loop import Progress
     from rigidsim.solve.problem import prepare
+    from rigidsim.solve.sampler import Progress
 
     prepared = prepare(rigidsim.load(config(time="start = 100\nend = 500")))
     now = [0.0]

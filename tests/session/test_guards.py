@@ -24,15 +24,16 @@ from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 
 PLAIN = "estimate = false"  # which is the larger part of such short runs
 DRIVES = {
     "as measured": Pacing(),
-    "one step at a time": Pacing(chunk_seconds=0.0, grid_rows=0, least_block_steps=10**9),
+    "one step at a time": Pacing(chunk_seconds=0.0, solver=Ways(grid_rows=0, least_block_steps=10**9)),
     "short grids": Pacing(chunk_seconds=1e-5),
-    "blocks": Pacing(block_steps=13, least_block_steps=1, skip_from=1e9, grid_rows=0),
-    "skips too far": Pacing(skip_from=2.0, skip_margin=1.7, grid_rows=0),
+    "blocks": Pacing(solver=Ways(block_steps=13, least_block_steps=1, skip_from=1e9, grid_rows=0)),
+    "skips too far": Pacing(solver=Ways(skip_from=2.0, skip_margin=1.7, grid_rows=0)),
 }
 SCENES = {
     "free": config(time="end = 150\nsamples = 301"),

@@ -20,6 +20,7 @@ from rigidsim.solve.problem import prepare
 from rigidsim.solve.rows import evaluate_rows
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 
 pytestmark = pytest.mark.optimised
@@ -65,14 +66,16 @@ def test_twice_the_same_config(
 
 
 DRIVES = {
-    "one step at a time": Pacing(chunk_seconds=0.0, grid_rows=0, least_block_steps=10**9),
+    "one step at a time": Pacing(chunk_seconds=0.0, solver=Ways(grid_rows=0, least_block_steps=10**9)),
     "grids of one step": Pacing(chunk_seconds=0.0),
-    "few rows": Pacing(rows_at_once=7, block_steps=13, least_block_steps=1, grid_rows=0),
-    "blocks of three": Pacing(block_steps=3, least_block_steps=1, skip_from=1e9, grid_rows=0),
-    "skips wherever it can": Pacing(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0),
-    "skips too far": Pacing(skip_from=2.0, skip_margin=1.7, grid_rows=0),
-    "skips of even steps too far": Pacing(skip_from=2.0, skip_margin=0.2, even_margin=1.7, grid_rows=0),
-    "skips mixed with grids": Pacing(skip_from=1.0, grid_strides=0.01),
+    "few rows": Pacing(rows_at_once=7, solver=Ways(block_steps=13, least_block_steps=1, grid_rows=0)),
+    "blocks of three": Pacing(solver=Ways(block_steps=3, least_block_steps=1, skip_from=1e9, grid_rows=0)),
+    "skips wherever it can": Pacing(solver=Ways(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0)),
+    "skips too far": Pacing(solver=Ways(skip_from=2.0, skip_margin=1.7, grid_rows=0)),
+    "skips of even steps too far": Pacing(
+        solver=Ways(skip_from=2.0, skip_margin=0.2, even_margin=1.7, grid_rows=0)
+    ),
+    "skips mixed with grids": Pacing(solver=Ways(skip_from=1.0, grid_strides=0.01)),
     "impatient": Pacing(chunk_seconds=1e-7, patience=0.0),
 }
 
@@ -127,7 +130,7 @@ def test_the_bits_of_wide_numbers_do_not_depend_on_it_either(
     precision: str, tmp_path: Path, free_body: Callable[..., str]
 ) -> None:
     text = free_body("end = 20\nsamples = 21", precision=precision, formulation="euler_angles")
-    tuning = Tuning(Pacing(rows_at_once=3, chunk_seconds=1e-7, skip_from=4.0))
+    tuning = Tuning(Pacing(rows_at_once=3, chunk_seconds=1e-7, solver=Ways(skip_from=4.0)))
     again = rigidsim.run(rigidsim.parse(text), out=tmp_path / "driven", tuning=tuning)
     with again.dataset as dataset:
         same_bits(run(text, tmp_path / "plain"), dataset.load())

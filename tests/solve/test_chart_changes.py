@@ -23,6 +23,7 @@ from rigidsim.session.tuning import Tuning
 from rigidsim.solve.effects.charts import NEAR
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import precision_of
+from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.workflows.plan import plan
 from rigidsim.workflows.resume import resume
 
@@ -198,11 +199,11 @@ def test_a_pass_at_a_distance_swings_the_outer_angles() -> None:
 
 
 DRIVES = {
-    "one step at a time": Pacing(chunk_seconds=0.0, grid_rows=0, least_block_steps=10**9),
+    "one step at a time": Pacing(chunk_seconds=0.0, solver=Ways(grid_rows=0, least_block_steps=10**9)),
     "grids of one step": Pacing(chunk_seconds=0.0),
-    "few rows": Pacing(rows_at_once=7, block_steps=13, least_block_steps=1, grid_rows=0),
-    "skips wherever it can": Pacing(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0),
-    "skips too far": Pacing(skip_from=2.0, skip_margin=1.7, grid_rows=0),
+    "few rows": Pacing(rows_at_once=7, solver=Ways(block_steps=13, least_block_steps=1, grid_rows=0)),
+    "skips wherever it can": Pacing(solver=Ways(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0)),
+    "skips too far": Pacing(solver=Ways(skip_from=2.0, skip_margin=1.7, grid_rows=0)),
 }
 
 

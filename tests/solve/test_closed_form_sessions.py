@@ -15,9 +15,10 @@ from support import cases, config, same_bits
 import rigidsim
 from rigidsim.session.guards import Observer
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.assembly import Assembly, assemble
+from rigidsim.solve.assembly import assemble
 from rigidsim.solve.checkpoint_arrays import pack
 from rigidsim.solve.compiled import CodeStore, kept_in
+from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampler import Progress
@@ -25,9 +26,7 @@ from rigidsim.store import netcdf
 from rigidsim.store.segments import SegmentLimits
 
 # blocks of a few samples, each followed by a segment
-EAGER = Tuning(
-    Pacing(chunk_seconds=0.0, patience=0.0, rows_at_once=8, wide_rows_at_once=8), SegmentLimits(seconds=0.0)
-)
+EAGER = Tuning(Pacing(chunk_seconds=0.0, patience=0.0, rows_at_once=8), SegmentLimits(seconds=0.0))
 TOP = {
     "body": 'principal_moments = [1, 1, "0.3 kg m^2"]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]',
     "initial": "angular_velocity = [0.1, 0.2, 9]\neuler_angles = [0.2, 0.6, 0.7]",
@@ -116,10 +115,9 @@ def test_a_killed_run_resumes_bit_for_bit(precision: str, tmp_path: Path) -> Non
 def test_the_boundary_without_an_engine_is_the_engines_own(precision: str) -> None:
     prepared = prepare(top(precision))
     parts = assemble(prepared)
-    assert parts.corrected is None
-    without, remembered = parts.boundary(), memories(parts)
-    parts.steps()
-    engines = parts.boundary()
+    without, remembered = parts.corrected.boundary(), memories(parts.corrected)
+    stepping = parts.steps()
+    engines = stepping.boundary()
     for one, other in ((without.mark.time, engines.mark.time), (without.mark.state, engines.mark.state)):
         arrays = [
             pack(np.array(values, dtype=prepared.precision.scalar), prepared.precision, "found")
@@ -129,12 +127,13 @@ def test_the_boundary_without_an_engine_is_the_engines_own(precision: str) -> No
             assert values.tobytes() == arrays[1][name].tobytes()
     assert (without.mark.steps, without.mark.events) == (engines.mark.steps, engines.mark.events) == (0, 0)
     no_changes = {"rhythm_chart_changes": np.zeros(1)}  # where it has angles, which may be left
-    np.testing.assert_equal(no_changes | remembered, no_changes | memories(parts))
+    np.testing.assert_equal(no_changes | remembered, no_changes | memories(stepping))
 
 
-def memories(parts: Assembly) -> dict[str, np.ndarray]:
+def memories(corrected: CorrectedStepper) -> dict[str, np.ndarray]:
     """What its effects remember, as a checkpoint holds it."""
-    packed = (e.pack(memory) for e, memory in zip(parts.effects, parts.boundary().memories, strict=True))
+    remembered = corrected.boundary().memories
+    packed = (e.pack(memory) for e, memory in zip(corrected.effects, remembered, strict=True))
     return {name: values for arrays in packed for name, values in arrays.items()}
 
 

@@ -14,7 +14,7 @@ from support import EAGER, IMPATIENT, cases, config, loaded, same_bits
 import rigidsim
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.session.guards import Observer
-from rigidsim.solve import loop
+from rigidsim.solve import driver
 from rigidsim.store import atomic, provenance
 from rigidsim.store.segments import read_chain
 
@@ -419,7 +419,7 @@ def test_nothing_saved_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     text = text_with("end = 30\nsamples = 61")
     whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole")
     with monkeypatch.context() as patch:
-        patch.setattr(loop.IntegrationLoop, "run", lambda self: (_ for _ in ()).throw(Cut))
+        patch.setattr(driver.Driver, "run", lambda self: (_ for _ in ()).throw(Cut))
         with pytest.raises(Cut):
             rigidsim.run(rigidsim.parse(text), out=tmp_path / "cut")
     done = rigidsim.resume(tmp_path / "cut" / "cut")

@@ -30,8 +30,8 @@ from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.config import Experiment, parse
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.closed_form import closed_form_of
-from rigidsim.solve.loop import Progress
 from rigidsim.solve.problem import prepare_scene
+from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
 
 _SHORTEST_PASS = 4e-3  # CPU seconds: the clock's own resolution is a microsecond, a call's cost ten

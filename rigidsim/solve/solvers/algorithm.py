@@ -1,0 +1,127 @@
+"""How the methods of ``[integrator] method`` solve a scene: a registry, which one of your own can enter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.system import System
+from rigidsim.scene.methods import METHODS, Method
+from rigidsim.scene.scene import Scene
+from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.events import EventLog
+from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.solvers.solver import Solver
+from rigidsim.solve.solvers.stepwise import StepwiseSolver
+from rigidsim.solve.stepper import Stepper
+
+if TYPE_CHECKING:
+    from rigidsim.solve.closed_form import ClosedForm
+
+
+class Unsuitable(ValueError):
+    """Raised if a method can't solve a scene; the message goes on from ``given "name", ``."""
+
+
+class Algorithm:
+    """How a method solves one scene; ``solves`` registers it.
+
+    One of your own needs a ``stepper``; all else has a default.
+
+    Attributes:
+        method: what can be said of it for any scene.
+        finds_events: whether its stepper looks for ``[[events]]``, which needs steps.
+        own_errors: whether it tells its errors itself (``Stepper.errors``), or has none to tell; if not, they
+            are estimated from motions that begin beside its own, in heyoka's rounding.
+        form: the closed form that gives the states; None if none does.
+    """
+
+    method: ClassVar[Method]
+    finds_events: ClassVar[bool] = False
+    own_errors: ClassVar[bool] = True
+    form: ClosedForm | None = None
+
+    @property
+    def title(self) -> str:
+        """What gives the states, in words: the attribute ``integrator`` of datasets."""
+        return self.method.title
+
+    @classmethod
+    def of(cls, scene: Scene, system: System, *, driven: bool) -> Algorithm:
+        """The algorithm for a scene.
+
+        Args:
+            driven: whether loads given from Python act.
+
+        Raises:
+            Unsuitable: it can't solve the scene.
+        """
+        return cls()
+
+    def stepper(
+        self, system: System, precision: Precision, tolerance: Scalar | None, start: Scalar, log: EventLog
+    ) -> Stepper:
+        """What takes its steps, at the start of the motion.
+
+        Args:
+            tolerance: None for the precision's epsilon.
+            start: start time, internal units.
+            log: where events go.
+        """
+        raise NotImplementedError
+
+    def solver(self, corrected: CorrectedStepper, pacing: Pacing) -> Solver:
+        """What takes the motion along.
+
+        Args:
+            corrected: its stepper, with the effects between steps.
+        """
+        return StepwiseSolver(corrected, pacing)
+
+
+ALGORITHMS: dict[str, type[Algorithm]] = {}
+"""By the names of their methods."""
+
+A = TypeVar("A", bound=type[Algorithm])
+
+
+def solves(method: Method) -> Callable[[A], A]:
+    """Register an algorithm, so that ``[integrator] method`` finds it (a class decorator).
+
+    Raises:
+        ValueError: the method's name is taken.
+    """
+
+    def register(algorithm: A) -> A:
+        known = ALGORITHMS.get(method.name)
+        if known is not None and known.__qualname__ != algorithm.__qualname__:
+            raise ValueError(f'a method named "{method.name}" is registered already ({known.__name__})')
+        METHODS[method.name], ALGORITHMS[method.name] = method, algorithm
+        algorithm.method = method
+        return algorithm
+
+    return register
+
+
+def algorithm_of(scene: Scene, system: System, *, driven: bool) -> Algorithm:
+    """The algorithm that a scene's ``[integrator] method`` asks for.
+
+    Args:
+        driven: whether loads given from Python act.
+
+    Raises:
+        ConfigError: it can't solve the scene.
+    """
+    name = scene.config.integrator.method
+    kind = ALGORITHMS[name]
+    try:
+        found = kind.of(scene, system, driven=driven)
+        if scene.events and not kind.finds_events:
+            takes = "steps in which no" if kind.method.has_steps else "no steps in which"
+            instead = 'remove [[events]], or choose method = "taylor"'
+            raise Unsuitable(f"which takes {takes} events could be found; {instead}")
+    except Unsuitable as why:
+        raise ConfigError(Problem("[integrator] method", f'given "{name}", {why}')) from None
+    return found

@@ -1,0 +1,1 @@
+"""Taylor series of natural steps, by heyoka: the method of every config that names no other."""

@@ -1,0 +1,136 @@
+"""Taylor series step by step, by heyoka: four ways through the samples, which give the same bits."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import ClassVar, TypeAlias
+
+from rigidsim.model.system import System
+from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
+from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
+from rigidsim.solve.events import EventLog
+from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.sample_buffer import SampleBuffer
+from rigidsim.solve.sampler import Progress
+from rigidsim.solve.sampling import SampleClock
+from rigidsim.solve.solvers.algorithm import Algorithm, solves
+from rigidsim.solve.solvers.solver import Solver
+from rigidsim.solve.solvers.stepwise import Reach, StepwiseSolver
+from rigidsim.solve.solvers.taylor.ways import SampleWay, WayFinder
+from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.taylor_stepper import TaylorStepper
+
+
+class TaylorSolver(StepwiseSolver):
+    """Takes many steps at once where that costs less than single ones."""
+
+    stepper: TaylorStepper
+
+    def __init__(self, corrected: CorrectedStepper, stepper: TaylorStepper, pacing: Pacing) -> None:
+        super().__init__(corrected, pacing)
+        self.stepper = stepper
+
+    def begin(
+        self, clock: SampleClock, buffer: SampleBuffer, progress: Progress, start: StepBoundary | None
+    ) -> None:
+        """See ``Solver``."""
+        super().begin(clock, buffer, progress, start)
+        self.ways = WayFinder(self.corrected, self.stepper, clock, self.pacing)
+
+    def go_on(self, boundary: StepBoundary, most: int | None) -> bool:
+        """See ``StepwiseSolver``."""
+        if not self.ways.known:
+            self.ways.look_ahead(boundary)
+        started, before = time.perf_counter(), self.stepper.steps
+        way, count = self.ways.choose(self.buffer.count, self.buffer.upcoming)
+        finite = self._WAYS[way](self, self.allowed(count, most), boundary)
+        self.ways.measured(way, self.stepper.steps - before, time.perf_counter() - started)
+        return finite
+
+    # --- the four ways ----------------------------------------------------------------------------------
+
+    def _skip(self, count: int, boundary: StepBoundary) -> bool:
+        """Take many steps towards a sample; if they pass it, go back and repeat with fewer."""
+        if not self.corrected.skip(count) or self.stepper.unresolved:
+            return self.lost(boundary, count)
+        if self.stepper.time > self.buffer.upcoming:
+            self.progress.redone_steps += self.stepper.steps - boundary.mark.steps
+            self.ways.went_past()
+            self.corrected.back_to(boundary)
+            return True
+        mark = boundary.mark
+        self.ways.skipped(self.stepper.steps - mark.steps, float(self.stepper.time) - float(mark.time[0]))
+        self.note_steps()
+        return True
+
+    def _grid(self, count: int, boundary: StepBoundary) -> bool:
+        """Take whole strides from a whole time on, and the samples within them."""
+        most = 2 * self.ways.numbers.grid_rows
+        while count > 0:
+            part = min(count, self.corrected.left)
+            longest = self.ways.longest
+            while True:  # until the samples asked for reach as far as the steps
+                horizon = float(self.stepper.time) + 2 * part * longest
+                times = self.buffer.until(self.stepper.precision.scalar(horizon), most)
+                if len(times) == most:  # they lie closer than those by which this way was chosen
+                    return self._step(part, boundary)
+                finite, states = self.stepper.grid(times, part)
+                if not finite or self.stepper.unresolved:
+                    return self.lost(boundary, part)
+                following = self.buffer.count + len(times)
+                if following >= self.clock.count or self.clock.at(following) > self.stepper.time:
+                    break
+                longest *= 2
+                self.corrected.back_to(boundary)
+            self.note_steps()
+            self.take(times[: len(states)], states, boundary)
+            self.none_left(boundary)
+            if self.buffer.full or self.buffer.complete or self.corrected.collapsed:
+                break
+            if not self.stepper.at_whole_time:
+                break
+            count, boundary = count - part, self.corrected.boundary()
+        return True
+
+    def _block(self, count: int, boundary: StepBoundary) -> bool:
+        """Take steps with continuous output, not past the next correction."""
+        finite, output = self.stepper.block(count)
+        if not finite or self.stepper.unresolved:
+            return self.lost(boundary, count)
+        self.note_steps()
+        self.reached(Reach(boundary, output))
+        return True
+
+    def _step(self, count: int, boundary: StepBoundary) -> bool:
+        """Take single steps, until the next sample is worth a skip."""
+        return self.step_by_step(count, boundary, self.ways.numbers.skip_from)
+
+    _Take: TypeAlias = "Callable[[TaylorSolver, int, StepBoundary], bool]"
+    _WAYS: ClassVar[dict[SampleWay, _Take]] = {
+        SampleWay.SKIP: _skip,
+        SampleWay.GRID: _grid,
+        SampleWay.BLOCK: _block,
+        SampleWay.STEP: _step,
+    }
+
+
+@solves(METHODS[DEFAULT_METHOD])
+class Taylor(Algorithm):
+    """Solves any scene."""
+
+    title = "heyoka Taylor, natural steps, dense output"
+    finds_events = True
+    own_errors = False
+
+    def stepper(
+        self, system: System, precision: Precision, tolerance: Scalar | None, start: Scalar, log: EventLog
+    ) -> TaylorStepper:
+        """See ``Algorithm``."""
+        return stepper_of(system, precision, tolerance, start, log)
+
+    def solver(self, corrected: CorrectedStepper, pacing: Pacing) -> Solver:
+        """See ``Algorithm``."""
+        assert isinstance(corrected.stepper, TaylorStepper)
+        return TaylorSolver(corrected, corrected.stepper, pacing)
