@@ -129,6 +129,7 @@ class _Following:
         self._longest = np.maximum(
             2 ** np.floor(np.log2(np.maximum(starts.steps, 1) / _STRETCHES * 1.42)), _SHORTEST
         )
+        self._longest = np.minimum(self._longest, pushes.together)
         self._stride = self._longest.copy()
         self._taken = np.zeros(members)
         self.spreads = Spreads.none(members)

@@ -69,6 +69,8 @@ class Pushes:
         first: error at the start relative to the state's own size.
         clock: error of the time, for loads that depend on it.
         ahead: internal time by which the time in which such a load counts is ahead of the scene's.
+        together: most steps with the same error of the time. Over a load's period it would average out, which
+            those of single steps don't.
     """
 
     own: float = 0.4
@@ -77,6 +79,7 @@ class Pushes:
     first: float = 0.5
     clock: float = 0.3
     ahead: float = 0.0
+    together: float = math.inf
 
 
 def _length(vector: np.ndarray) -> float:
@@ -151,9 +154,9 @@ class Neighbours:
         """Set the spacing of pushes up to a time reached in so many steps."""
         fewest = max(_FEWEST_OF_ALL, min(fewest, steps / _FEWEST_STEPS))
         stretches = min(max(fewest, steps / _STEPS_AT_ONCE), _MOST_STRETCHES)
-        stretches = max(stretches, steps / _MOST_STEPS_AT_ONCE)
+        stretches = max(stretches, steps / min(_MOST_STEPS_AT_ONCE, self._pushes.together))
         self._longest = _LONGER * (end - self._time) / stretches
-        self._steps_at_once = round(max(steps / stretches, _FEWEST_STEPS))
+        self._steps_at_once = round(max(steps / stretches, min(_FEWEST_STEPS, self._pushes.together)))
         self._most_steps = self.steps + 4 * steps + _HOPELESS_STEPS
 
     def elsewhere(self, state: np.ndarray, start: float, end: float, steps: float) -> Neighbours:
