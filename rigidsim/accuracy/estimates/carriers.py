@@ -27,8 +27,8 @@ from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _OF_SERIES = 2.0
-"""Rounding of the arguments over that of time, both as errors of the time: the direction of the Moon in single
-precision is wrong by 1.5e-4 rad (root mean square, 1973 to 1982), where time is by half of that.
+"""Rounding of the arguments over that of time, both as errors of the time: the direction of the Moon in
+single precision is wrong by 1.5e-4 rad (root mean square, 1973 to 1982), where time is by half of that.
 """
 _WITHIN_MONTH = 4.0
 """Steps at least in a quarter of the Moon's month, as long as the body turns no slower than it revolves."""
