@@ -70,9 +70,7 @@ class ActiveRun:
         if folder is not None:
             limits = session.tuning.segments
             writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
-        recorder = Recorder(
-            prepared, parts.evaluator, writer, parts.log, parts.corrected.effects, session.effort
-        )
+        recorder = Recorder(prepared, parts.evaluator, writer, parts.log, parts.corrected, session.effort)
         interruption = Interruption()
         session.phases.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)

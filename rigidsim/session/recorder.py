@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ from rigidsim.session.timings import Effort
 from rigidsim.session.variables import dates_of, drift_name, put_back_name
 from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
 from rigidsim.solve.checkpoint_arrays import pack_checkpoint, pack_events
-from rigidsim.solve.effects.effect import Effect
+from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.problem import InitialValueProblem
@@ -43,7 +43,7 @@ class Recorder(SampleReceiver):
         kept: rows for the timeline; None if no timeline is asked for.
 
     Args:
-        effects: those whose memories are saved, in order.
+        corrected: what takes the steps, whose memories are saved.
     """
 
     progress: Progress
@@ -55,13 +55,13 @@ class Recorder(SampleReceiver):
         evaluator: Evaluator,
         writer: SegmentWriter | MemoryWriter,
         log: EventLog,
-        effects: Sequence[Effect],
+        corrected: CorrectedStepper,
         effort: Effort,
     ) -> None:
         self._prepared = prepared
         self._evaluator = evaluator
         self._writer = writer
-        self._log, self._effects = log, effects
+        self._log, self._corrected = log, corrected
         self._effort = effort
         self._dates = dates_of(prepared)
         self._events_saved = len(log.found)
@@ -160,7 +160,7 @@ class Recorder(SampleReceiver):
         system = self._prepared.system
         names = [invariant.name for invariant in system.invariants]
         recorded = [variable.name for variable in system.recorded]
-        return pack_checkpoint(checkpoint, self._effects, self._prepared.precision, names, recorded)
+        return pack_checkpoint(checkpoint, self._corrected, self._prepared.precision, names, recorded)
 
     def all_events(self, position: Position) -> Arrays:
         """All crossings up to a position."""

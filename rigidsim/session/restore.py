@@ -23,8 +23,7 @@ def restore(chain: Chain, prepared: InitialValueProblem, parts: Assembly) -> Che
         arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
         names = [invariant.name for invariant in prepared.system.invariants]
         recorded = [variable.name for variable in prepared.system.recorded]
-        effects, start = parts.corrected.effects, parts.stepper.mark()
-        checkpoint = unpack_checkpoint(arrays, effects, prepared.precision, names, recorded, start)
+        checkpoint = unpack_checkpoint(arrays, parts.corrected, prepared.precision, names, recorded)
         for path in chain.paths:
             if "previous_seal" in root_attributes(path):
                 saved = netcdf.read_group(path, "events")

@@ -14,8 +14,7 @@ import numpy as np
 
 from rigidsim.solve.angle_state import pack_angles, unpack_angles
 from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics, Undefined
-from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.effects.effect import Effect
+from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import FoundEvent
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Mark
@@ -80,7 +79,7 @@ def _power(precision: Precision, exponent: int) -> Scalar:
 
 def pack_checkpoint(
     checkpoint: Checkpoint,
-    effects: Sequence[Effect],
+    corrected: CorrectedStepper,
     precision: Precision,
     invariants: Sequence[str],
     recorded: Sequence[str],
@@ -88,7 +87,7 @@ def pack_checkpoint(
     """A checkpoint as arrays.
 
     Args:
-        effects: those whose memories it holds, in order.
+        corrected: what took the steps and effects whose memories it holds.
         invariants, recorded: the system's invariants and recorded variables, in order.
     """
     position, continuity, counted = checkpoint.position, checkpoint.continuity, checkpoint.statistics
@@ -97,10 +96,9 @@ def pack_checkpoint(
     arrays = pack(np.array(mark.time, dtype=precision.scalar), precision, "time")
     arrays |= pack(mark.state, precision, "state")
     arrays["counts"] = np.array([mark.steps, mark.events, position.next_sample], dtype=np.int64)
-    for effect, memory in zip(effects, boundary.memories, strict=True):
+    for effect, memory in zip(corrected.effects, boundary.memories, strict=True):
         arrays |= effect.pack(memory)
-    arrays["rhythm_switching"] = np.array(mark.switching)
-    arrays["rhythm_tiny"] = np.array([mark.tiny], dtype=np.int64)
+    arrays |= corrected.stepper.pack(mark.memory)
     arrays["joined_turns"] = continuity.turns
     if continuity.last_angles is not None:
         arrays["joined_angles"] = continuity.last_angles
@@ -124,32 +122,26 @@ def pack_checkpoint(
 
 def unpack_checkpoint(
     arrays: Mapping[str, np.ndarray],
-    effects: Sequence[Effect],
+    corrected: CorrectedStepper,
     precision: Precision,
     invariants: Sequence[str],
     recorded: Sequence[str],
-    start: Mark,
 ) -> Checkpoint:
     """A checkpoint restored from its arrays.
 
     Args:
-        effects: those of the resumed system, in order.
+        corrected: what takes the steps of the resumed system, with its effects.
         invariants, recorded: the system's invariants and recorded variables, in order.
-        start: any boundary of the resumed system, as a template of what it has to remember.
 
     Raises:
         KeyError, ValueError: the checkpoint belongs to another system or precision.
     """
     time, state = unpack(arrays, precision, "time"), unpack(arrays, precision, "state")
     steps, events, next_sample = _numbers(arrays, "counts", 3)
-    if time.shape != (2,) or state.shape != start.state.shape:
+    if time.shape != (2,) or state.shape != corrected.stepper.state.shape:
         raise ValueError("the checkpoint belongs to another system of equations")
-    switching = np.asarray(arrays.get("rhythm_switching", np.zeros(0)), dtype=np.float64)
-    if switching.shape != (len(start.switching),):
-        raise ValueError(f"the checkpoint remembers {switching.shape} numbers of switching surfaces")
-    tiny = int(arrays.get("rhythm_tiny", np.zeros(1))[0])
-    mark = Mark((time[0], time[1]), state, int(events), int(steps), tuple(switching.tolist()), tiny)
-    boundary = StepBoundary(mark, tuple(effect.unpack(arrays) for effect in effects))
+    mark = Mark((time[0], time[1]), state, int(events), int(steps), corrected.stepper.unpack(arrays))
+    boundary = StepBoundary(mark, tuple(effect.unpack(arrays) for effect in corrected.effects))
     continuity = Continuity(
         np.asarray(arrays.get("joined_turns", np.zeros(3)), dtype=np.int64),
         arrays.get("joined_angles"),

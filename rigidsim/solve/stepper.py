@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -22,16 +23,14 @@ class Mark:
         time: two numbers whose sum it is, internal units.
         state: (states,), internal units.
         events, steps: numbers of events found and steps taken so far.
-        switching: memory of a motion with switching surfaces (``rigidsim.solve.switching.sides``).
-        tiny: number of latest steps in a row that were too small (``Stepper.collapsed``).
+        memory: whatever else the stepper's later steps depend on, as a value that stays as it is.
     """
 
     time: tuple[Scalar, Scalar]
     state: np.ndarray
     events: int = 0
     steps: int = 0
-    switching: tuple[float, ...] = ()
-    tiny: int = 0
+    memory: Any = None
 
 
 class Watcher(Protocol):
@@ -139,6 +138,18 @@ class Stepper:
     def back_to(self, mark: Mark) -> None:
         """Return to a boundary."""
         raise NotImplementedError
+
+    def pack(self, memory: Any) -> dict[str, np.ndarray]:
+        """A mark's memory as arrays of a checkpoint, float64 or int64, with names that no effect uses."""
+        return {}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> Any:
+        """A mark's memory restored from a checkpoint's arrays.
+
+        Raises:
+            ValueError: they belong to another system.
+        """
+        return None
 
     @property
     def collapsed(self) -> bool:

@@ -8,7 +8,7 @@ output (about a millisecond per call); ``step`` takes one and keeps it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import heyoka as hy
@@ -153,14 +153,22 @@ class TaylorStepper(Stepper):
     def mark(self) -> Mark:
         """Remember this boundary."""
         engine, found = self._integrator, len(self.log.found)
-        return Mark(engine.dtime, np.array(engine.state), found, self.steps, tiny=self._tiny)
+        return Mark(engine.dtime, np.array(engine.state), found, self.steps, self._tiny)
 
     def back_to(self, mark: Mark) -> None:
         """Return to a boundary."""
         self._integrator.dtime = mark.time
         self._integrator.state[:] = mark.state
         self.log.back_to(mark.events)
-        self.steps, self._tiny, self.unresolved = mark.steps, mark.tiny, False
+        self.steps, self._tiny, self.unresolved = mark.steps, mark.memory, False
+
+    def pack(self, memory: int) -> dict[str, np.ndarray]:
+        """See ``Stepper``: the number of latest steps in a row that were tiny."""
+        return {"rhythm_tiny": np.array([memory], dtype=np.int64)}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> int:
+        """See ``Stepper``."""
+        return int(arrays.get("rhythm_tiny", np.zeros(1))[0])
 
     @property
     def at_whole_time(self) -> bool:

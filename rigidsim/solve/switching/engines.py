@@ -91,7 +91,8 @@ class SwitchedEngines(TaylorStepper):
 
     def mark(self) -> Mark:
         """Remember this boundary."""
-        memory = (
+        mark = super().mark()
+        sides = (
             *map(float, self._modes),
             *self._angles,
             *self._quaternion,
@@ -99,11 +100,12 @@ class SwitchedEngines(TaylorStepper):
             float(self._count),
             self._since,
         )
-        return replace(super().mark(), switching=memory)
+        return replace(mark, memory=(mark.memory, sides))
 
     def back_to(self, mark: Mark) -> None:
         """Return to a boundary."""
-        memory = list(mark.switching)
+        tiny, sides = mark.memory
+        memory = list(sides)
         s, a, q = len(self._modes), len(self._angles), len(self._quaternion)
         self._modes = [int(x) for x in memory[:s]]
         self._angles, self._quaternion = memory[s : s + a], memory[s + a : s + a + q]
@@ -111,7 +113,20 @@ class SwitchedEngines(TaylorStepper):
         self._fresh, self._count = bool(fresh), int(count)
         self.failure = ""
         self._enter()
-        super().back_to(mark)
+        super().back_to(replace(mark, memory=tiny))
+
+    def pack(self, memory: Any) -> dict[str, np.ndarray]:
+        """See ``Stepper``."""
+        tiny, sides = memory
+        return super().pack(tiny) | {"rhythm_switching": np.array(sides)}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> Any:
+        """See ``Stepper``."""
+        _, known = self.begun.memory
+        sides = np.asarray(arrays.get("rhythm_switching", np.zeros(0)), dtype=np.float64)
+        if sides.shape != (len(known),):
+            raise ValueError(f"the checkpoint remembers {sides.shape} numbers of switching surfaces")
+        return super().unpack(arrays), tuple(sides.tolist())
 
     def use(self, chart: int) -> None:
         """Continue in the system (0) or its partner (1) at the same time; the state must be set
