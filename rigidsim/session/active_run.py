@@ -6,14 +6,16 @@ import os
 from dataclasses import dataclass
 
 from rigidsim.session.attributes import root_attributes
+from rigidsim.session.checkpoints import Checkpoints
 from rigidsim.session.guards import Guards, Interruption
 from rigidsim.session.recorder import Recorder
-from rigidsim.session.restore import restore
 from rigidsim.session.session import Session
+from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.summary import cost_so_far
+from rigidsim.session.timings import RunCost
 from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.assembly import Assembly, assemble, sampler
-from rigidsim.solve.checkpoint import Checkpoint
+from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.driver import Driver
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
@@ -44,6 +46,7 @@ class ActiveRun:
     variables: list[Variable]
     writer: SegmentWriter | MemoryWriter
     recorder: Recorder
+    checkpoints: Checkpoints
     driver: Driver
     interruption: Interruption
 
@@ -60,9 +63,11 @@ class ActiveRun:
             RunFolderError: the folder can't be written, or the checkpoint belongs to another system.
         """
         parts = assemble(prepared)
-        resumed = None
-        if chain is not None:
-            resumed = restore(chain, prepared, parts)
+        system, progress = prepared.system, Progress(prepared.clock.count)
+        statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])
+        cost = RunCost(session.effort, progress)
+        checkpoints = Checkpoints(parts, statistics=statistics, cost=cost)
+        start = None if chain is None else checkpoints.restore(chain)
         run_id = os.urandom(8).hex() if chain is None else chain.run
         attributes = root_attributes(prepared, parts, run_id, session.mixed)
         variables = dataset_variables(prepared)
@@ -70,21 +75,28 @@ class ActiveRun:
         if folder is not None:
             limits = session.tuning.segments
             writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
-        recorder = Recorder(prepared, parts.evaluator, writer, parts.log, parts.corrected, session.effort)
+        recorder = Recorder(prepared, parts.evaluator, writer, statistics, checkpoints, start)
         interruption = Interruption()
         session.phases.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)
         session.observer.phase("integrate")
-        guards = Guards(prepared, recorder.statistics, interruption, session.observer)
-        start = None if resumed is None else resumed.position
-        most = _most_steps(prepared, resumed)
-        driver = sampler(prepared, parts, recorder, guards, start, session.tuning.pacing, most)
-        recorder.progress = driver.progress
-        if resumed is not None:
-            recorder.restore(resumed.statistics)
-            session.observer.resumed(driver.progress)
+        guards = Guards(prepared, statistics, interruption, session.observer)
+        pacing, most = session.tuning.pacing, _most_steps(prepared, start)
+        driver = sampler(prepared, parts, recorder, guards, start, pacing, most, progress)
+        if start is not None:
+            session.observer.resumed(progress)
         return cls(
-            prepared, folder, run_id, parts, attributes, variables, writer, recorder, driver, interruption
+            prepared,
+            folder,
+            run_id,
+            parts,
+            attributes,
+            variables,
+            writer,
+            recorder,
+            checkpoints,
+            driver,
+            interruption,
         )
 
     @property
@@ -110,9 +122,9 @@ class ActiveRun:
         return not self.interruption.requested
 
 
-def _most_steps(prepared: InitialValueProblem, resumed: Checkpoint | None) -> int | None:
+def _most_steps(prepared: InitialValueProblem, start: Position | None) -> int | None:
     """The limit of natural steps, counted from the run's beginning; it starts anew in each session."""
     most = prepared.scene.config.limits.max_steps
-    if most is None or resumed is None:
+    if most is None or start is None:
         return most
-    return most + resumed.position.boundary.mark.steps
+    return most + start.boundary.mark.steps

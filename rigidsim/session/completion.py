@@ -67,10 +67,10 @@ class Completion:
 
     def _write_dataset(self) -> None:
         self.session.observer.phase("dataset")
-        checkpoint, recorder = None, self.run.recorder
+        checkpoint, kept = None, self.run.checkpoints
         if self.run.progress.status is Status.FINISHED:
             position = self.run.driver.position()
-            arrays, events = recorder.packed(position), recorder.all_events(position)
+            arrays, events = kept.packed(position), kept.events(position)
             checkpoint = self.folder.checkpoint, arrays, events
         self.writer.complete(
             self.folder.dataset,

@@ -10,18 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidsim.session.checkpoints import Checkpoints
 from rigidsim.session.statistics import SampleStatistics
-from rigidsim.session.timings import Effort
 from rigidsim.session.variables import dates_of, drift_name, put_back_name
-from rigidsim.solve.checkpoint import Checkpoint, Position, Statistics
-from rigidsim.solve.checkpoint_arrays import pack_checkpoint, pack_events
-from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
-from rigidsim.solve.events import EventLog
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import put_back_by_invariant
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.memory import MemoryWriter
 from rigidsim.store.netcdf import CHUNK_ROWS
@@ -38,15 +35,14 @@ class Recorder(SampleReceiver):
 
     Attributes:
         statistics: what the summary needs of all samples.
-        progress: progress of the run; set when it begins.
         trail: some of this session's samples, if errors are estimated from them.
         kept: rows for the timeline; None if no timeline is asked for.
 
     Args:
-        corrected: what takes the steps, whose memories are saved.
+        checkpoints: of the run, which begins or resumes.
+        start: where it resumes; None if it begins.
     """
 
-    progress: Progress
     rows_together = CHUNK_ROWS
 
     def __init__(
@@ -54,24 +50,24 @@ class Recorder(SampleReceiver):
         prepared: InitialValueProblem,
         evaluator: Evaluator,
         writer: SegmentWriter | MemoryWriter,
-        log: EventLog,
-        corrected: CorrectedStepper,
-        effort: Effort,
+        statistics: SampleStatistics,
+        checkpoints: Checkpoints,
+        start: Position | None,
     ) -> None:
         self._prepared = prepared
         self._evaluator = evaluator
         self._writer = writer
-        self._log, self._corrected = log, corrected
-        self._effort = effort
+        self._checkpoints = checkpoints
         self._dates = dates_of(prepared)
-        self._events_saved = len(log.found)
+        self._events_saved = 0 if start is None else start.boundary.mark.events
         guard = prepared.scene.config.limits.max_drift
         self._max_drift = None if guard is None else float(guard)
-        self.statistics = SampleStatistics()
+        self.statistics = statistics
         self.trail = SampleTrail(prepared.precision)
         output, count = prepared.scene.config.output, prepared.clock.count
         shown = output.timeline and isinstance(writer, SegmentWriter)
         self.kept = _kept_rows(count, output.timeline_rows) if shown else None
+        self._note_lost_turns()
 
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples, up to the first past the guard ``max_drift``."""
@@ -133,54 +129,9 @@ class Recorder(SampleReceiver):
 
     def save(self, position: Position) -> None:
         """Write a segment; on return all samples taken, and the state to continue from, are saved."""
-        known = position.boundary.mark.events  # later ones are found again
-        events = pack_events(self._log.found[self._events_saved : known], self._prepared.precision)
-        self._writer.flush(self.packed(position), events)
-        self._events_saved = known
-
-    def packed(self, position: Position) -> Arrays:
-        """Checkpoint at a position as arrays, with the statistics of the samples so far."""
-        seen, progress, effort = self.statistics, self.progress, self._effort
-        statistics = Statistics(
-            largest_drift=seen.largest,
-            final_drift=seen.final,
-            put_back=seen.put_back,
-            nearest_singularity=seen.nearest_singularity,
-            singularity_time=seen.singularity_time,
-            smallest_step=progress.smallest_step,
-            largest_step=progress.largest_step,
-            redone_steps=progress.redone_steps,
-            sessions=effort.sessions,
-            wall_seconds=effort.wall,
-            cpu_seconds=effort.cpu,
-            integration_seconds=progress.integration_seconds,
-            undefined=seen.undefined,
-        )
-        checkpoint = Checkpoint(position, self._evaluator.continuity, statistics)
-        system = self._prepared.system
-        names = [invariant.name for invariant in system.invariants]
-        recorded = [variable.name for variable in system.recorded]
-        return pack_checkpoint(checkpoint, self._corrected, self._prepared.precision, names, recorded)
-
-    def all_events(self, position: Position) -> Arrays:
-        """All crossings up to a position."""
-        return pack_events(self._log.found[: position.boundary.mark.events], self._prepared.precision)
-
-    def restore(self, statistics: Statistics) -> None:
-        """Continue counting from an earlier session's checkpoint; ``progress`` has been set by then."""
-        seen, progress, effort = self.statistics, self.progress, self._effort
-        seen.largest |= statistics.largest_drift
-        seen.final |= statistics.final_drift
-        seen.put_back |= statistics.put_back
-        seen.undefined |= statistics.undefined
-        seen.nearest_singularity = statistics.nearest_singularity
-        seen.singularity_time = statistics.singularity_time
-        self._note_lost_turns()
-        progress.smallest_step, progress.largest_step = statistics.smallest_step, statistics.largest_step
-        progress.redone_steps = statistics.redone_steps
-        progress.integration_seconds = statistics.integration_seconds
-        effort.wall_seconds, effort.cpu_seconds = statistics.wall_seconds, statistics.cpu_seconds
-        effort.sessions = statistics.sessions + 1
+        events = self._checkpoints.events(position, self._events_saved)
+        self._writer.flush(self._checkpoints.packed(position), events)
+        self._events_saved = position.boundary.mark.events
 
 
 def _kept_rows(count: int, most: int) -> KeptRows:

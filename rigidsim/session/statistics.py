@@ -3,11 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
-from rigidsim.solve.checkpoint import Undefined
+from rigidsim.solve.checkpoint_arrays import Arrays, numbers
+
+
+@dataclass(frozen=True)
+class Undefined:
+    """Number of samples at which a recorded variable is NaN.
+
+    Attributes:
+        count: number of such samples so far.
+        leading: how many of them precede its first defined sample.
+        since: time of the first one after those (s); nan if there is none.
+    """
+
+    count: int = 0
+    leading: int = 0
+    since: float = math.nan
 
 
 @dataclass
@@ -15,6 +32,7 @@ class SampleStatistics:
     """Statistics of the samples taken so far, in all sessions.
 
     Attributes:
+        invariants, recorded: names of the system's invariants and recorded variables, in order.
         largest, final: largest and last relative drift by invariant.
         put_back: corrections put back into projected invariants before the latest sample.
         nearest_singularity: smallest absolute singular factor at a sample.
@@ -24,6 +42,8 @@ class SampleStatistics:
         undefined: NaN samples by recorded variable that has any.
     """
 
+    invariants: Sequence[str] = ()
+    recorded: Sequence[str] = ()
     largest: dict[str, float] = field(default_factory=dict)
     final: dict[str, float] = field(default_factory=dict)
     put_back: dict[str, float] = field(default_factory=dict)
@@ -31,6 +51,7 @@ class SampleStatistics:
     singularity_time: float = math.nan
     angles_wrapped_from: float = math.nan
     undefined: dict[str, Undefined] = field(default_factory=dict)
+    version: ClassVar[int] = 1
 
     def see(self, invariant: str, drifts: np.ndarray) -> None:
         """Follow one invariant through a block of samples.
@@ -75,3 +96,36 @@ class SampleStatistics:
         if size[nearest] < self.nearest_singularity:
             self.nearest_singularity = float(size[nearest])
             self.singularity_time = float(times[nearest])
+
+    def pack(self) -> Arrays:
+        """See ``SavedPart``."""
+        arrays = {
+            "watched": np.array([self._values(self.largest), self._values(self.final)]),
+            "put_back": np.array(self._values(self.put_back)),
+            "singularity": np.array([self.nearest_singularity, self.singularity_time]),
+        }
+        if self.undefined:
+            rows = [self.undefined.get(name, Undefined()) for name in self.recorded]
+            arrays["undefined"] = np.array([[row.count, row.leading, row.since] for row in rows])
+        return arrays
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See ``SavedPart``; older checkpoints hold no undefined samples."""
+        largest, final = np.reshape(arrays.get("watched", ()), (2, len(self.invariants)))
+        self.largest, self.final = self._by_name(largest), self._by_name(final)
+        self.put_back = self._by_name(arrays.get("put_back", ()))
+        self.nearest_singularity, self.singularity_time = numbers(arrays, "singularity", 2)
+        table = arrays.get("undefined", np.zeros((len(self.recorded), 3)))
+        if table.shape != (len(self.recorded), 3):
+            raise ValueError(f"the checkpoint counts undefined samples of shape {table.shape}")
+        rows = zip(self.recorded, table.tolist(), strict=True)
+        self.undefined = {name: Undefined(int(n), int(some), since) for name, (n, some, since) in rows if n}
+
+    def _values(self, found: Mapping[str, float]) -> list[float]:
+        """Values in the order of the invariants; nan for missing ones."""
+        return [found.get(name, math.nan) for name in self.invariants]
+
+    def _by_name(self, values: Iterable[float]) -> dict[str, float]:
+        """Values by invariant, without missing ones."""
+        pairs = zip(self.invariants, map(float, values), strict=False)  # older runs have none of some
+        return {name: value for name, value in pairs if not math.isnan(value)}

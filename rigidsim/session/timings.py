@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
+import numpy as np
+
+from rigidsim.solve.checkpoint_arrays import Arrays, numbers
+from rigidsim.solve.sampler import Progress
 from rigidsim.store.summary_parts import ENGINE
 
 NOT_KEPT = "attempts_not_kept"
@@ -35,6 +40,32 @@ class Effort:
     def cpu(self) -> float:
         """CPU seconds of all sessions."""
         return self.cpu_seconds + time.process_time() - self.cpu_started
+
+
+@dataclass
+class RunCost:
+    """What a run has cost in all of its sessions, as a part of checkpoints."""
+
+    effort: Effort
+    progress: Progress
+    version: ClassVar[int] = 1
+
+    def pack(self) -> Arrays:
+        """See ``SavedPart``."""
+        effort, progress = self.effort, self.progress
+        return {
+            "steps_seen": np.array([progress.smallest_step, progress.largest_step]),
+            "effort": np.array([effort.wall, effort.cpu, progress.integration_seconds]),
+            "sessions": np.array([effort.sessions, progress.redone_steps], dtype=np.int64),
+        }
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See ``SavedPart``."""
+        effort, progress = self.effort, self.progress
+        progress.smallest_step, progress.largest_step = numbers(arrays, "steps_seen", 2)
+        effort.wall_seconds, effort.cpu_seconds, progress.integration_seconds = numbers(arrays, "effort", 3)
+        sessions, redone = numbers(arrays, "sessions", 2)
+        effort.sessions, progress.redone_steps = int(sessions) + 1, int(redone)
 
 
 class Phases:

@@ -129,6 +129,7 @@ def sampler(
     start: Position | None = None,
     pacing: Pacing = MEASURED,
     most_steps: int | None = None,
+    progress: Progress | None = None,
 ) -> Driver:
     """What takes a prepared scene through its samples.
 
@@ -139,13 +140,14 @@ def sampler(
         start: where to continue; None starts at the beginning.
         most_steps: limit of natural steps, counted from the run's beginning; a closed form
             takes none.
+        progress: with what earlier sessions counted.
     """
     clock = prepared.clock
     if parts.evaluator.sparse:
         check = _following(check, parts.evaluator, clock)
         pacing = _in_small_blocks(pacing, radians_between_samples(prepared))
     solver = prepared.algorithm.solver(parts.corrected, pacing)
-    return Driver(solver, clock, receiver, check, start, pacing, most_steps)
+    return Driver(solver, clock, receiver, check, start, pacing, most_steps, progress)
 
 
 def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:

@@ -1,16 +1,17 @@
-"""A checkpoint as one value: where the integration resumes, what joins the samples, and the counts so far.
-
-``rigidsim.solve.checkpoint_arrays`` turns it into arrays for a file, and back.
-"""
+"""A checkpoint: what a run continues from, each part packed and restored by itself, under a version."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
+import numpy as np
+
+from rigidsim.solve.checkpoint_arrays import Arrays
 from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.turns.joined import Continuity
+
+_VERSION, _REGISTERED = "version_", "registered_"
 
 
 @dataclass(frozen=True)
@@ -26,56 +27,49 @@ class Position:
     next_sample: int
 
 
-@dataclass(frozen=True)
-class Undefined:
-    """Number of samples at which a recorded variable is NaN.
+class SavedPart(Protocol):
+    """A part of what a run continues from.
 
     Attributes:
-        count: number of such samples so far.
-        leading: how many of them precede its first defined sample.
-        since: time of the first one after those (s); nan if there is none.
+        version: of its arrays; an older checkpoint is refused.
     """
 
-    count: int = 0
-    leading: int = 0
-    since: float = math.nan
+    version: ClassVar[int]
+
+    def pack(self) -> Arrays:
+        """It as arrays, with names that no other part uses."""
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Continue from what was packed.
+
+        Raises:
+            KeyError, ValueError: it belongs to another system.
+        """
 
 
-@dataclass(frozen=True)
-class Statistics:
-    """Counts and extremes from a run's beginning, over all its sessions.
+def pack_versions(versions: Mapping[str, int]) -> Arrays:
+    """Versions by the names of parts."""
+    return {_VERSION + name: np.array([version]) for name, version in versions.items()}
 
-    Attributes:
-        largest_drift, final_drift: relative drifts of the samples so far, by invariant.
-        put_back: corrections put back until the latest sample, by projected invariant.
-        nearest_singularity, singularity_time: smallest singular factor of a chart of Euler angles, and when
-            (s).
-        undefined: undefined samples by recorded variable that has any.
-        smallest_step, largest_step: internal units.
-        redone_steps: steps taken back and repeated.
-        sessions: number of sessions.
-        wall_seconds, cpu_seconds, integration_seconds: time they took; the last in the engine alone.
+
+def check_versions(arrays: Mapping[str, np.ndarray], versions: Mapping[str, int]) -> None:
+    """Refuse a checkpoint of other parts, or of other versions of them.
+
+    Raises:
+        ValueError: says what differs and what to do.
     """
-
-    largest_drift: dict[str, float]
-    final_drift: dict[str, float]
-    put_back: dict[str, float]
-    nearest_singularity: float
-    singularity_time: float
-    smallest_step: float
-    largest_step: float
-    redone_steps: int
-    sessions: int
-    wall_seconds: float
-    cpu_seconds: float
-    integration_seconds: float
-    undefined: Mapping[str, Undefined] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """Everything that a later session needs."""
-
-    position: Position
-    continuity: Continuity
-    statistics: Statistics
+    found = {name: int(n[0]) for name, n in arrays.items() if name.startswith(_VERSION)}
+    found = {name.removeprefix(_VERSION): version for name, version in found.items()}
+    if not found:  # saved before there were versions, when nothing could be registered
+        found = {name: 1 for name in versions if not name.startswith(_REGISTERED)}
+    for name in sorted(found.keys() ^ versions.keys()):
+        title = name.removeprefix(_REGISTERED)
+        if name in found:
+            raise ValueError(f'it was saved with "{title}", which is missing here; import what registers it')
+        raise ValueError(f'it was saved without "{title}", which is registered here; resume it without that')
+    for name, version in versions.items():
+        if found[name] != version:
+            raise ValueError(
+                f'it holds version {found[name]} of "{name.removeprefix(_REGISTERED)}", and here is version '
+                f"{version}; resume it with the code that began it, or begin a new run"
+            )

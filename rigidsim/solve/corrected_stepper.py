@@ -10,12 +10,13 @@ whose state asks for it, likewise. Each of them is an effect (``rigidsim.solve.e
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
+from rigidsim.solve.checkpoint_arrays import Arrays, pack, unpack
 from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.precision import Scalar
@@ -99,6 +100,35 @@ class CorrectedStepper:
             effect.back_to(memory, self.stepper)
         self.stepper.back_to(boundary.mark)
         self._set_limits()
+
+    @property
+    def versions(self) -> dict[str, int]:
+        """Versions of what a checkpoint holds of the stepper and of each effect, by their names."""
+        return {"stepper": self.stepper.version, **{effect.name: effect.version for effect in self.effects}}
+
+    def pack(self, boundary: StepBoundary) -> Arrays:
+        """A boundary as arrays of a checkpoint."""
+        mark, precision = boundary.mark, self.stepper.precision
+        arrays = pack(np.array(mark.time, dtype=precision.scalar), precision, "time")
+        arrays |= pack(mark.state, precision, "state")
+        arrays["counts"] = np.array([mark.steps, mark.events], dtype=np.int64)
+        arrays |= self.stepper.pack(mark.memory)
+        for effect, memory in zip(self.effects, boundary.memories, strict=True):
+            arrays |= effect.pack(memory)
+        return arrays
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> StepBoundary:
+        """A boundary restored from them.
+
+        Raises:
+            KeyError, ValueError: they belong to another system or precision.
+        """
+        time, state = (unpack(arrays, self.stepper.precision, name) for name in ("time", "state"))
+        steps, events, *_ = (int(n) for n in arrays["counts"])
+        if time.shape != (2,) or state.shape != self.stepper.state.shape:
+            raise ValueError("the checkpoint belongs to another system of equations")
+        mark = Mark((time[0], time[1]), state, events, steps, self.stepper.unpack(arrays))
+        return StepBoundary(mark, tuple(effect.unpack(arrays) for effect in self.effects))
 
     def arrive(self, boundary: StepBoundary, moment: Scalar) -> StepBoundary:
         """Go back to a boundary before a moment, and on by the same steps to the first boundary at or past

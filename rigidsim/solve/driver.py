@@ -25,6 +25,7 @@ class Driver:
         check: called in each round, at least every tenth of a second or after each single step.
         start: where to continue; None starts at the beginning.
         most_steps: limit of natural steps, counted from the run's beginning, that is never exceeded.
+        progress: with what earlier sessions counted.
     """
 
     def __init__(
@@ -36,10 +37,12 @@ class Driver:
         start: Position | None = None,
         pacing: Pacing = MEASURED,
         most_steps: int | None = None,
+        progress: Progress | None = None,
     ) -> None:
         first = 0 if start is None else start.next_sample
         self.solver, self.clock, self.receiver, self.check = solver, clock, receiver, check
-        self.progress = Progress(clock.count, first)
+        self.progress = progress or Progress(clock.count)
+        self.progress.next_sample = first
         self.buffer = SampleBuffer(clock, receiver, pacing, first)
         self._most_steps = most_steps
         solver.begin(clock, self.buffer, self.progress, None if start is None else start.boundary)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
+from typing import ClassVar
 
 import heyoka as hy
 import mpmath
@@ -14,6 +15,7 @@ import numpy as np
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
 from rigidsim.solve.building import interruptible
+from rigidsim.solve.checkpoint_arrays import Arrays
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Lift
@@ -21,6 +23,7 @@ from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.rows import evaluate_rows
 from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.turns.continuity import Continuity
 from rigidsim.solve.turns.joined import JoinedAngles
 
 RecordedParts = dict[str, list[np.ndarray]]
@@ -109,6 +112,8 @@ class Evaluator:
     Args:
         countable: whether the motion between sparse samples can be followed.
     """
+
+    version: ClassVar[int] = 1
 
     def __init__(
         self, system: System, precision: Precision, wrapping: AngleWrapping, *, countable: bool = True
@@ -268,6 +273,14 @@ class Evaluator:
             time: time that the run has reached, internal units.
         """
         self._angles.follow(self.continuity, time)
+
+    def pack(self) -> Arrays:
+        """See ``SavedPart``."""
+        return self.continuity.pack()
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See ``SavedPart``."""
+        self.continuity = Continuity.unpacked(arrays)
 
     def initial_invariants(self) -> dict[str, list[float]]:
         """Initial values of the invariants' components in SI, nearest doubles, by name."""

@@ -7,7 +7,7 @@ too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import heyoka as hy
@@ -15,7 +15,8 @@ import numpy as np
 
 from rigidsim.errors import StoppedError
 from rigidsim.model.system import System
-from rigidsim.solve.angle_state import AngleState
+from rigidsim.solve.angle_state import AngleState, pack_angles, unpack_angles
+from rigidsim.solve.checkpoint_arrays import Arrays, pack, unpack
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.engine import TaylorEngine
 from rigidsim.solve.event_units import of_order_one
@@ -170,3 +171,34 @@ def _zero_at(system: System, start: Scalar) -> list[bool]:
     compiled = compiled_function(expressions, system.variables, compact_mode=True)
     values = compiled(np.array([float(x) for x in system.initial]), time=float(start))
     return [bool(value == 0) for value in values]
+
+
+def pack_events(found: Sequence[FoundEvent], precision: Precision) -> Arrays:
+    """Crossings as arrays."""
+    if not found:
+        return {}
+    arrays = pack(np.array([f.time for f in found], dtype=precision.scalar), precision, "time")
+    states = np.concatenate([np.asarray(f.state) for f in found]).astype(precision.scalar)
+    arrays |= pack(states, precision, "state")
+    arrays["index"] = np.array([f.index for f in found], dtype=np.int64)
+    arrays["turns"] = pack_angles([f.angles for f in found])
+    return arrays
+
+
+def unpack_events(arrays: Mapping[str, np.ndarray], precision: Precision, states: int) -> list[FoundEvent]:
+    """Crossings restored from packed arrays.
+
+    Args:
+        states: number of states.
+
+    Raises:
+        ValueError: the arrays don't belong together.
+    """
+    times = unpack(arrays, precision, "time")
+    count = len(times)
+    values = unpack(arrays, precision, "state").reshape(count, states)
+    index = arrays.get("index", np.zeros(0, dtype=np.int64))
+    if index.shape != (count,):
+        raise ValueError("events without their kind")
+    angles = unpack_angles(arrays.get("turns", np.zeros((count, 0), dtype=np.int64)))
+    return [FoundEvent(int(i), t, v, a) for i, t, v, a in zip(index, times, values, angles, strict=True)]

@@ -83,8 +83,10 @@ class Stepper:
         until: time beyond which no step may go, to be set from outside: one that would is cut short to end
             there; None for any.
         watcher: sees each step and may end a call early; None without one.
+        version: of its memory; a checkpoint with another is refused.
     """
 
+    version = 1
     single_steps = True
     changes_charts = False
 

@@ -12,8 +12,7 @@ from support import IMPATIENT
 
 import rigidsim
 from rigidsim.cli.screens.summary import print_summary
-from rigidsim.session.statistics import SampleStatistics
-from rigidsim.solve.checkpoint import Undefined
+from rigidsim.session.statistics import SampleStatistics, Undefined
 
 # spins about its middle axis and turns over: its spin leaves the cone about that axis and comes back
 FLIPPING = """

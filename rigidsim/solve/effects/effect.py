@@ -19,10 +19,17 @@ class Effect:
     that would go beyond a time given by an effect is cut short to end there.
 
     Attributes:
+        version: of its memory; a checkpoint with another is refused.
         anywhere: whether it may be due within a stride, too.
     """
 
+    version = 1
     anywhere = False
+
+    @property
+    def name(self) -> str:
+        """Name of its part of a checkpoint."""
+        return type(self).__name__
 
     @property
     def limit(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import heyoka as hy
@@ -20,6 +20,7 @@ from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.rows import evaluate_rows
 from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.turns.continuity import Continuity
 from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join, doubtful_rows, is_sparse
 from rigidsim.solve.turns.followed import FollowedSystem
 from rigidsim.solve.turns.shared import AngleSteps, at_poles
@@ -28,27 +29,6 @@ from rigidsim.solve.turns.steady import SteadyAngles, advances_steadily
 _LOOKED_AT = 2.0**-16  # singular factor, in double precision, below which it is worked out in the run's own
 _DOUBTFUL = 2.0  # rad, as in ``turn_count``
 _POLE = 1e-6  # size of an angle's sine and cosine below which dense samples aren't looked at in parts
-
-
-@dataclass
-class Continuity:
-    """What joins the variables of a block of samples to those of the block before.
-
-    Attributes:
-        turns: full turns added to the joined angles, (angles,).
-        last_angles, last_quaternion: latest sample's values, float64, the angles before those turns; None
-            before the first block.
-        last_time, last_state: the latest sample's, float64, internal units, if turns are counted from it.
-        wrapped_from: time (internal units) of the first sample with unknown turns: from there on, angles
-            are recorded within one turn; nan if all are known, and -inf for states that aren't samples.
-    """
-
-    turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
-    last_angles: np.ndarray | None = None
-    last_quaternion: np.ndarray | None = None
-    last_time: float = math.nan
-    last_state: np.ndarray | None = None
-    wrapped_from: float = math.nan
 
 
 class JoinedAngles:
