@@ -220,7 +220,8 @@ class SwitchingStepper(SurfaceRoots):
             if i not in on and abs(float(look.u[i])) <= self._probe.noise(look, i, states):
                 on.append(i)
         moments = [i for i in on if self._probe.moments[i].of_time]
-        if (again or len(moments) > 1) and any(self._unresolved(i) for i in moments):
+        alone = len(moments) == 1
+        if (again or not alone) and any(self._unresolved(i, alone) for i in moments):
             why = (
                 f"something so strong changes that two numbers of {self.precision.name} precision don't tell "
                 "its impulse"
@@ -232,14 +233,21 @@ class SwitchingStepper(SurfaceRoots):
         self._take(choice)
         return True
 
-    def _unresolved(self, j: int) -> bool:
+    def _unresolved(self, j: int, alone: bool) -> bool:
         """Whether the change of the field on a surface matters even for what two numbers leave out of its
-        moment. Where something ends the state tells its impulse, by which the rest is judged.
+        moment. Where something ends the state tells its impulse, by which the rest is judged; where it
+        begins, nothing is known yet.
+
+        Args:
+            alone: whether no other moment is at this time.
         """
-        above, below = (
-            self._probe.look(self.state, self.time, self._parameters({j: side})).field for side in (1, -1)
+        before, after = (
+            self._probe.look(self.state, self.time, self._parameters({j: side * self._modes[j]})).field
+            for side in (1, -1)
         )
-        change = max(abs(float(x)) for x in above - below)
+        if alone and float(np.abs(after).max()) > float(np.abs(before).max()):
+            return False
+        change = max(abs(float(x)) for x in after - before)
         size = max(1.0, *(abs(float(x)) for x in self.state))
         allowed, time = _MOST_LEFT_OUT * self._epsilon * size, self._integrator.dtime
         if change * self._epsilon**2 * abs(float(time[0])) <= allowed:
