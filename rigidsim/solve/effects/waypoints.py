@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from rigidsim.solve.precision import Scalar
 from rigidsim.solve.stepper import Stepper
 
 _MOST = 32
+
+Kept = tuple[Mapping[int, "Waypoint"], int]
+"""Waypoints by number of their correction, and the spacing of those numbers."""
 
 
 @dataclass(frozen=True)
@@ -23,12 +27,10 @@ class Waypoint:
     chart: int
 
 
-@dataclass
 class Waypoints(Effect):
     """Evenly spaced boundaries of corrections; the choice depends on the steps alone."""
 
-    _kept: dict[int, Waypoint] = field(default_factory=dict)
-    _spacing: int = 1
+    memory: Kept = {}, 1
 
     def apply(self, stepper: Stepper, stride: int) -> bool:
         """See ``Effect``."""
@@ -37,18 +39,39 @@ class Waypoints(Effect):
         return True
 
     def note(self, number: int, steps: int, time: Scalar, state: np.ndarray, chart: int) -> None:
-        """Note the boundary of correction ``number``, unless it is there already."""
-        if number % self._spacing:
+        """Note the boundary of correction ``number``."""
+        kept, spacing = self.memory
+        if number % spacing:
             return
         # numbers of more than 80 bits aren't numpy's own
         plain = state.astype(np.float64) if state.dtype.kind == "f" else np.array([float(x) for x in state])
-        self._kept[number] = Waypoint(steps, float(time), plain, chart)
-        if len(self._kept) > _MOST:
-            self._spacing *= 2
-            self._kept = {n: kept for n, kept in self._kept.items() if n % self._spacing == 0}
+        kept = {**kept, number: Waypoint(steps, float(time), plain, chart)}
+        if len(kept) > _MOST:
+            spacing *= 2
+            kept = {n: waypoint for n, waypoint in kept.items() if n % spacing == 0}
+        self.memory = kept, spacing
+
+    def back_to(self, memory: Kept, stepper: Stepper) -> None:
+        """See ``Effect``."""
+        self.memory = memory
+
+    def pack(self, memory: Kept) -> dict[str, np.ndarray]:
+        """See ``Effect``."""
+        kept, spacing = memory
+        rows = [(number, spacing, found.steps, found.chart) for number, found in kept.items()]
+        places = [[found.time, *found.state] for found in kept.values()]
+        return {"waypoints": np.array(rows, dtype=np.int64), "waypoint_states": np.array(places)}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> Kept:
+        """See ``Effect``; an earlier version saved none."""
+        rows, places = arrays.get("waypoints", np.zeros((0, 4))), arrays.get("waypoint_states", np.zeros(0))
+        found = {
+            number: Waypoint(steps, time, np.array(state), chart)
+            for (number, _, steps, chart), (time, *state) in zip(rows.tolist(), places.tolist(), strict=True)
+        }
+        return found, int(rows[0, 1]) if len(rows) else 1
 
     def between(self, first: float, last: float) -> list[Waypoint]:
         """Boundaries between two counts of steps, in order."""
-        return sorted(
-            (kept for kept in self._kept.values() if first <= kept.steps < last), key=lambda kept: kept.steps
-        )
+        kept = self.memory[0].values()
+        return sorted((found for found in kept if first <= found.steps < last), key=lambda found: found.steps)
