@@ -16,6 +16,7 @@ from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
+from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import Caution, WarningCode
@@ -60,6 +61,7 @@ class Diagnostics:
         trail: SampleTrail | None = None,
         corrected: CorrectedStepper | None = None,
         go_on: Callable[[], bool] = lambda: True,
+        own: Callable[[], OwnErrors | None] = lambda: None,
     ) -> Diagnostics:
         """The diagnostics with an estimate of the errors.
 
@@ -67,21 +69,32 @@ class Diagnostics:
             trail: some of the run's samples.
             corrected: what took the run's steps; left as it was.
             go_on: polled repeatedly; False ends the estimate without a result.
+            own: the estimate of the run's solver, if its algorithm has its own.
         """
-        from rigidsim.accuracy.estimates.estimate import estimate_errors
+        from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors
 
-        progress, own = self.progress, None if corrected is None else corrected.stepper
+        progress, stepper, beside = self.progress, None, ""
+        if self.prepared.algorithm.own_errors:
+            told = own()
+            return self if told is None else replace(self, estimate=Estimate(**vars(told)))
+        if corrected is not None:
+            stepper = corrected.stepper if isinstance(corrected.stepper, TaylorStepper) else None
+            acting = [effect.registered for effect in corrected.effects if effect.registered]
+            if acting:  # which a closed form knows nothing of
+                trail, beside = None, f"; they are without the effects {', '.join(acting)}"
         found = estimate_errors(
             self.prepared,
             progress.steps,
             min(progress.time, float(self.prepared.scene.samples.last)),
             trail=trail,
             waypoints=None if corrected is None else corrected.effect(Waypoints),
-            stepper=own if isinstance(own, TaylorStepper) else None,
+            stepper=stepper,
             nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
             uneven=progress.largest_step / max(progress.smallest_step, 1e-300),
             go_on=go_on,
         )
+        if found is not None and beside:
+            found = replace(found, how=found.how + beside)
         return replace(self, estimate=found)
 
     def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:

@@ -88,7 +88,7 @@ def _diagnosed(session: Session, run: ActiveRun) -> Diagnostics:
     trail, parts = run.recorder.trail, run.parts
     session.observer.phase("estimate")
     with run.interruption.dispensable():
-        found = found.estimated(trail, parts.corrected, run.wanted)
+        found = found.estimated(trail, parts.corrected, run.wanted, run.driver.solver.errors)
         found = found.compared(session.tuning.advice, run.wanted)
     session.phases.next("estimate")
     if run.prepared.system.plan.average is not None and run.progress.status is Status.FINISHED:

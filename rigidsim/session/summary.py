@@ -228,6 +228,8 @@ def _accuracy(found: Diagnostics) -> Accuracy:
     estimate, output = found.estimate, found.prepared.scene.config.output
     if estimate is None:
         why = "the run has not ended" if output.estimate else "[output] estimate = false"
+        if output.estimate and found.progress.status.final and found.prepared.algorithm.own_errors:
+            why = "its method tells no errors of its own"
         return Accuracy(
             requested=None,
             estimated_attitude_error=None,

@@ -11,7 +11,7 @@ from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
 from rigidsim.solve.driver import Driver
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Charts
-from rigidsim.solve.effects.effect import Effect
+from rigidsim.solve.effects.effect import Effect, registered_effects
 from rigidsim.solve.effects.held_invariants import HeldInvariants
 from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.effects.whole_time import WholeTime
@@ -113,6 +113,7 @@ def _stepping(
         charts = Charts(system, system.partner, precision, wrapping, whole)
         charts.watch(stepper)
         effects.append(charts)
+    effects += registered_effects(system, precision)
     return CorrectedStepper(stepper, [*effects, Waypoints()], stride=stride)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from rigidsim.errors import ConfigError
 from rigidsim.model.scaling import Drive
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.model_table import FULL
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.tracing.graph import Guard, Untraceable
@@ -21,6 +22,8 @@ from rigidsim.scene.tracing.whole import TracedWhole
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.replay import ColumnReplays, Replay
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
+from rigidsim.solve.effects.effect import registered_effects
+from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
 
 _AT_ONCE = 4096  # members whose numbers are worked out together
@@ -31,6 +34,8 @@ class Alone(Enum):
 
     PRECISION = "batches compute in double precision only"
     CLOSED_FORM = "the closed form takes no steps"
+    METHOD = "batches take the steps of Taylor series only"
+    EFFECT = "a registered effect acts between steps"
     HELD = "invariants are held between steps, which batches can't do"
     ACCURACY = "the accuracy asked for is settled run by run"
     CHART = "Euler angles may have to change their sequence on the way"
@@ -58,8 +63,10 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
         return Alone.ACCURACY
     if integrator.precision != "double":
         return Alone.PRECISION
-    if integrator.method != "taylor":
+    if not integrator.has_steps:
         return Alone.CLOSED_FORM
+    if integrator.method != DEFAULT_METHOD:
+        return Alone.METHOD
     if integrator.hold_invariants is True:
         return Alone.HELD
     if integrator.formulation in ("euler_angles", "canonical"):
@@ -84,6 +91,8 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
 
 def _reason_of_system(traced: TracedSystem) -> Alone | None:
     system = traced.system
+    if registered_effects(system, precision_of("double")):
+        return Alone.EFFECT
     if system.switches:
         return Alone.SWITCHING
     if system.pieces is not None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from rigidsim.solve.precision import Scalar
+from rigidsim.model.system import System
+from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Stepper
 
 
@@ -19,17 +20,24 @@ class Effect:
     that would go beyond a time given by an effect is cut short to end there.
 
     Attributes:
+        registered: name under which ``register_effect`` registered it; empty for rigidsim's own.
         version: of its memory; a checkpoint with another is refused.
         anywhere: whether it may be due within a stride, too.
     """
 
+    registered: ClassVar[str] = ""
     version = 1
     anywhere = False
+
+    @classmethod
+    def of(cls, system: System, precision: Precision) -> Effect | None:
+        """If it is registered, the effect for a system; None where it does nothing."""
+        return cls()
 
     @property
     def name(self) -> str:
         """Name of its part of a checkpoint."""
-        return type(self).__name__
+        return f"registered_{self.registered}" if self.registered else type(self).__name__
 
     @property
     def limit(self) -> int:
@@ -80,3 +88,33 @@ class Effect:
             times: (n,), internal units.
         """
         return {}
+
+
+EFFECTS: dict[str, type[Effect]] = {}
+"""Effects from outside by name: where their ``of`` gives one it acts after rigidsim's own."""
+
+E = TypeVar("E", bound=type[Effect])
+
+
+def register_effect(name: str) -> Callable[[E], E]:
+    """Register a class of effects (a class decorator).
+
+    Raises:
+        ValueError: the name is taken.
+    """
+
+    def register(kind: E) -> E:
+        known = EFFECTS.get(name, kind)
+        if known.__qualname__ != kind.__qualname__:
+            raise ValueError(f'an effect named "{name}" is registered already ({known.__name__})')
+        EFFECTS[name] = kind
+        kind.registered = name
+        return kind
+
+    return register
+
+
+def registered_effects(system: System, precision: Precision) -> list[Effect]:
+    """The registered effects of a system, in the order in which they were registered."""
+    made = [kind.of(system, precision) for kind in EFFECTS.values()]
+    return [effect for effect in made if effect is not None]

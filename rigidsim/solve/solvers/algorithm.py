@@ -10,9 +10,10 @@ from rigidsim.model.system import System
 from rigidsim.scene.methods import METHODS, Method
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.corrected_stepper import CorrectedStepper
+from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.pacing import Pacing
-from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.solvers.stepwise import StepwiseSolver
 from rigidsim.solve.stepper import Stepper
@@ -33,6 +34,7 @@ class Algorithm:
     Attributes:
         method: what can be said of it for any scene.
         finds_events: whether its stepper looks for ``[[events]]``, which needs steps.
+        sets_parameters: whether its stepper sets those of equations that change at surfaces or given times.
         own_errors: whether it tells its errors itself (``Stepper.errors``), or has none to tell; if not, they
             are estimated from motions that begin beside its own, in heyoka's rounding.
         form: the closed form that gives the states; None if none does.
@@ -40,6 +42,7 @@ class Algorithm:
 
     method: ClassVar[Method]
     finds_events: ClassVar[bool] = False
+    sets_parameters: ClassVar[bool] = False
     own_errors: ClassVar[bool] = True
     form: ClosedForm | None = None
 
@@ -122,6 +125,13 @@ def algorithm_of(scene: Scene, system: System, *, driven: bool) -> Algorithm:
             takes = "steps in which no" if kind.method.has_steps else "no steps in which"
             instead = 'remove [[events]], or choose method = "taylor"'
             raise Unsuitable(f"which takes {takes} events could be found; {instead}")
+        if (system.parameters or system.stepwise) and kind.method.has_steps and not kind.sets_parameters:
+            how = "takes no steps that end where the equations change, at a kink, a jump or a table's row"
+            raise Unsuitable(f'which {how}; choose method = "taylor"')
+        effects = registered_effects(system, precision_of("double"))
+        if effects and not kind.method.has_steps:
+            how = f'takes no steps between which the effect "{effects[0].registered}" could act'
+            raise Unsuitable(f'which {how}; choose method = "taylor"')
     except Unsuitable as why:
         raise ConfigError(Problem("[integrator] method", f'given "{name}", {why}')) from None
     return found

@@ -82,6 +82,7 @@ class InClosedForm(Algorithm):
     """Solves a free body or a heavy symmetric top in theta functions."""
 
     form: ClosedForm
+    own_errors = False
 
     @classmethod
     def of(cls, scene: Scene, system: System, *, driven: bool) -> InClosedForm:

@@ -121,7 +121,7 @@ class Taylor(Algorithm):
     """Solves any scene."""
 
     title = "heyoka Taylor, natural steps, dense output"
-    finds_events = True
+    finds_events = sets_parameters = True
     own_errors = False
 
     def stepper(
