@@ -19,6 +19,7 @@ from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.driver import Driver
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
+from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryWriter
@@ -66,7 +67,8 @@ class ActiveRun:
         system, progress = prepared.system, Progress(prepared.clock.count)
         statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])
         cost = RunCost(session.effort, progress)
-        checkpoints = Checkpoints(parts, statistics=statistics, cost=cost)
+        trail = SampleTrail(prepared.precision)
+        checkpoints = Checkpoints(parts, statistics=statistics, cost=cost, trail=trail)
         start = None if chain is None else checkpoints.restore(chain)
         run_id = os.urandom(8).hex() if chain is None else chain.run
         attributes = root_attributes(prepared, parts, run_id, session.mixed)
@@ -75,7 +77,7 @@ class ActiveRun:
         if folder is not None:
             limits = session.tuning.segments
             writer = SegmentWriter(folder.segments, variables, attributes.as_dict(), chain, limits)
-        recorder = Recorder(prepared, parts.evaluator, writer, statistics, checkpoints, start)
+        recorder = Recorder(prepared, parts.evaluator, writer, statistics, trail, checkpoints, start)
         interruption = Interruption()
         session.phases.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)

@@ -35,7 +35,7 @@ class Recorder(SampleReceiver):
 
     Attributes:
         statistics: what the summary needs of all samples.
-        trail: some of this session's samples, if errors are estimated from them.
+        trail: some of the samples, if errors are estimated from them.
         kept: rows for the timeline; None if no timeline is asked for.
 
     Args:
@@ -51,6 +51,7 @@ class Recorder(SampleReceiver):
         evaluator: Evaluator,
         writer: SegmentWriter | MemoryWriter,
         statistics: SampleStatistics,
+        trail: SampleTrail,
         checkpoints: Checkpoints,
         start: Position | None,
     ) -> None:
@@ -63,7 +64,7 @@ class Recorder(SampleReceiver):
         guard = prepared.scene.config.limits.max_drift
         self._max_drift = None if guard is None else float(guard)
         self.statistics = statistics
-        self.trail = SampleTrail(prepared.precision)
+        self.trail = trail
         output, count = prepared.scene.config.output, prepared.clock.count
         shown = output.timeline and isinstance(writer, SegmentWriter)
         self.kept = _kept_rows(count, output.timeline_rows) if shown else None

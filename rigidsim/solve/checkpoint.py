@@ -60,8 +60,8 @@ def check_versions(arrays: Mapping[str, np.ndarray], versions: Mapping[str, int]
     """
     found = {name: int(n[0]) for name, n in arrays.items() if name.startswith(_VERSION)}
     found = {name.removeprefix(_VERSION): version for name, version in found.items()}
-    if not found:  # saved before there were versions, when nothing could be registered
-        found = {name: 1 for name in versions if not name.startswith(_REGISTERED)}
+    # a part that an older checkpoint lacks begins anew
+    found = {name: 1 for name in versions if not name.startswith(_REGISTERED)} | found
     for name in sorted(found.keys() ^ versions.keys()):
         title = name.removeprefix(_REGISTERED)
         if name in found:

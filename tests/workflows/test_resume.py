@@ -273,15 +273,22 @@ def test_a_guard_can_be_moved_when_resuming(limits: str, tmp_path: Path) -> None
     assert limits in done.folder.config.read_text()  # the config is the one that was given
 
 
-def test_its_announced_errors_are_those_of_the_run_in_one_go(tmp_path: Path) -> None:
-    """They are followed from boundaries along the whole run, of which a later session knew its own alone."""
-    load = 'kind = "torque"\ncomponents = ["0", "0", "0.1*sin(0.3*t)"]'
-    extended, time = 'precision = "extended"', "end = 3000\nsamples = 9"
-    text = config(time=time, integrator=extended, estimate=True, loads=load)
+@pytest.mark.parametrize(
+    ("load", "integrator", "end", "steps"),
+    [
+        ('kind = "torque"\ncomponents = ["0", "0", "0.1*sin(0.3*t)"]', 'precision = "extended"', 3000, 4000),
+        ("", 'method = "taylor"', 4000, 4000),  # held against its closed form
+    ],
+)
+def test_its_announced_errors_are_those_of_the_run_in_one_go(
+    load: str, integrator: str, end: int, steps: int, tmp_path: Path
+) -> None:
+    """They are told from boundaries and samples all along it, of which a later session knew its own."""
+    text = config(loads=load, integrator=integrator, time=f"end = {end}\nsamples = 200", estimate=True)
     whole = rigidsim.run(rigidsim.parse(text), out=None)
-    cut = rigidsim.run(rigidsim.parse(text + "[limits]\nmax_steps = 4000\n"), out=tmp_path)
-    assert 4000 < whole.summary["cost"]["steps"] < 9000
-    done = rigidsim.resume(cut.folder.path, overrides=["limits.max_steps=9000"])
+    cut = rigidsim.run(rigidsim.parse(text + f"[limits]\nmax_steps = {steps}\n"), out=tmp_path)
+    assert steps < whole.summary["cost"]["steps"] < 10000
+    done = rigidsim.resume(cut.folder.path, overrides=["limits.max_steps=10000"])
     assert done.summary["accuracy"] == whole.summary["accuracy"]
 
 
