@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,6 +21,9 @@ from rigidsim.solve.stepper import Mark, Stepper
 
 if TYPE_CHECKING:
     from rigidsim.solve.closed_form import ClosedForm
+
+
+_WIDE_ROWS = 64  # at once beyond double precision, where one takes about a millisecond
 
 
 class AtStart(Stepper):
@@ -63,11 +65,9 @@ class ClosedFormSolver(Solver):
         """See ``Solver``."""
         begin, buffer = self._corrected.stepper, self.buffer
         narrow, last = begin.precision.narrow, self.clock.at(self.clock.count - 1)
-        started = time.perf_counter()
-        times = buffer.until(last, self._rows if narrow else min(self._rows, buffer.room))
+        times = buffer.until(last, self._rows if narrow else min(self._rows, _WIDE_ROWS))
         states = self._form.states(begin.system, begin.precision, times, begin.time)
         buffer.take(self._corrected.samples(buffer.count, times, states), boundary)
-        buffer.took("closed form", len(times), time.perf_counter() - started)
         self.settle(boundary, times[-1])
         return Status.FINISHED if buffer.complete else None
 
