@@ -150,7 +150,7 @@ def plan(
             "timeline_bytes": room.timeline,
             "free_bytes": room.free,
             "attitude_error_rad": None
-            if system.requirements.formulation == "rates"
+            if system.requirements.formulation == "rates" or prepared.algorithm.own_errors
             else (held_error(prepared, int(steps), rate, duration, growth) if held else plain_error),
             "held": held,
             "amplification": growth.at(duration),

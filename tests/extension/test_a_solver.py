@@ -188,6 +188,14 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     assert announced[0] == announced[1]
 
 
+def test_a_plan_is_of_its_steps_and_forecasts_no_errors(tmp_path: Path) -> None:
+    """Which error laws would tell of Taylor series."""
+    plan = rigidsim.plan(rigidsim.parse(text()), out=tmp_path)
+    run = run_text(text())
+    assert plan["predicted"]["steps"] == pytest.approx(run.summary["cost"]["steps"], rel=1e-3)
+    assert plan["predicted"]["attitude_error_rad"] is None
+
+
 def test_it_goes_on_after_any_step(tmp_path: Path) -> None:
     given = text(1e-3, **SHORT)
     run = run_text(given + "[limits]\nmax_steps = 13\n", out=tmp_path)

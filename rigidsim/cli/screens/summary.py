@@ -241,11 +241,8 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     on.line("recorded", ", ".join(plan["recorded"]))
     predicted, pilot = plan["predicted"], plan["pilot"]
     held = ", invariants held" + _from_step(plan["hold_from_step"]) if plan["hold_invariants"] else ""
-    on.line(
-        "settings",
-        f"{plan['precision']} precision, tolerance {plan['tolerance']:.3g}, Taylor order "
-        f"{plan['taylor_order']}{held}",
-    )
+    order = "" if plan["taylor_order"] is None else f", Taylor order {plan['taylor_order']}"
+    on.line("settings", f"{plan['precision']} precision, tolerance {plan['tolerance']:.3g}{order}{held}")
     if not method_named(plan["method"]).has_steps:
         on.line("method", f"{plan['closed_form']}: no steps are taken")
     elif plan["closed_form"] is not None:
