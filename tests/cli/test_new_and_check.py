@@ -14,6 +14,7 @@ import rigidsim
 from rigidsim.cli import completion
 from rigidsim.cli.commands import COMMANDS
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.methods import METHODS
 from rigidsim.workflows import templates
 from rigidsim.workflows.check import check
 
@@ -159,10 +160,8 @@ def test_completion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_co
     assert completion.runs("runs/t") == ["runs/two"]
     assert [name for name, _ in completion.scenes("t")] == ["top", "thrusters", "torque"]
     assert completion.settings("integrator.euler_s") == ["integrator.euler_sequence"]
-    assert completion.settings("integrator.method=") == [
-        "integrator.method=taylor",
-        "integrator.method=closed_form",
-    ]
+    methods = completion.settings("integrator.method=")
+    assert methods == [f"integrator.method={name}" for name in METHODS]  # also those that a test registers
     assert "integrator.precision=quadruple" in completion.settings("integrator.precision=")
     assert completion.settings("output.timeline=f") == ["output.timeline=false"]
     assert completion.settings("body.preset=ea") == ["body.preset=earth"]
