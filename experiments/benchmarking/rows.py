@@ -165,12 +165,12 @@ def rows(*, quick: bool) -> list[Row]:
             many.run, few.run, measure="peak", plain=False,
         ),
         Row(
-            "tiny", "tiny scene, whole process, no timeline", '`python -c "import heyoka, h5py"`', 2.2,
+            "tiny", "tiny scene, whole process, no timeline", '`python -c "import heyoka, h5py"`', 3.0,
             tiny.command, imports("heyoka", "h5py"), plain=False,
         ),
         Row(
             "tiny_timeline", "tiny scene, whole process, with timeline",
-            '`python -c "import heyoka, h5py, rerun"`', 2.0,
+            '`python -c "import heyoka, h5py, rerun"`', 2.1,
             Scene(1.0, 11, timeline=True).command, imports("heyoka", "h5py", "rerun"), plain=False,
         ),
         Row(
