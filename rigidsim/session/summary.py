@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.session.abrupt import why_it_broke
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words, told_loads
@@ -178,9 +177,12 @@ def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Asse
             # they go with the distance to the power of the order, and some
             text += ", where coefficients of the series exceed the range of single precision (3.4e38)"
         text += ': choose formulation = "quaternion"'
-    elif reason := why_it_broke(prepared, progress.time):
-        text += reason
     else:
+        from rigidsim.session.abrupt import why_it_broke
+
+        reason = why_it_broke(prepared, progress.time)
+        if reason:
+            return text + reason
         if any(load.roots(prepared.system.mechanics) for load in prepared.system.plan.loads):
             text += (
                 "; a root of zero has no series: if one of the loads vanished there, such as a norm, write "
