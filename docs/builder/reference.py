@@ -270,7 +270,7 @@ def python_page() -> str:
     parts = [
         "# Python\n\nWhat `import rigidsim` offers, and what loads and observables of your own are made of. "
         "How they are used: [from Python](../howto/python.md), [a load](../howto/own_load.md), "
-        "[an observable](../howto/own_observable.md).",
+        "[an observable](../howto/own_observable.md), [a solver](../howto/own_solver.md).",
         "## Functions\n\n"
         + "\n\n".join(_directive("autofunction", f"rigidsim.{name}") for name in functions),
         "## Runs, experiments and errors\n\n"
