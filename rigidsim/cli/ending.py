@@ -28,7 +28,7 @@ def exit_code(command: Callable[[], int]) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
-    except BaseException as error:
+    except (KeyboardInterrupt, ImportError) as error:
         if not _is_interruption(error):
             raise
         print("rigidsim: interrupted", file=sys.stderr)
@@ -43,7 +43,7 @@ def exit_code(command: Callable[[], int]) -> int:
 
 
 def _is_interruption(error: BaseException | None) -> bool:
-    """Whether it comes from Ctrl-C, which ends the import of a library as an ImportError, for one."""
+    """Whether it comes from Ctrl-C, which libraries make an ImportError of while they are loaded."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
