@@ -21,10 +21,10 @@ from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon, setting_of
 from rigidsim.accuracy.trial import Told
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.integrator_table import LARGEST_DIGITS
+from rigidsim.scene.readable_time import span_text
 
 _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
 """Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""

@@ -15,9 +15,9 @@ from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
 from rigidsim.accuracy.reference import STANDARD, Policy, exact_beyond, stepped_reference
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import Told, Trial, Trials
-from rigidsim.look.readable_time import span_text
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.scene import build_scene
 
 _BASE_TOLERANCE = 1e-8  # of the trial that all other tolerances are first forecast from

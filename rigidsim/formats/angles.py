@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.look.angle_units import ANGLE_UNITS, AngleUnit
+from rigidsim.scene.readable_units import ANGLE_UNITS, AngleUnit
 
 RADIAN = "rad"
 _GUARD_BITS = 64

@@ -19,7 +19,6 @@ Importing this package loads nothing heavy.
 | `roles` | residuals, drifts and what was put back, by the variables' attributes |
 | `plots` | which variable goes into which plot |
 | `clock` | seconds to the viewer's integer timelines |
-| `readable_time` | spans in the unit that suits them, instants as dates, the axis of time |
 | `page` | the summary page |
 | `figures` | figures of a run by name, dataset to matplotlib, PNG or SVG: a package of its own |
 | `figure_names` | their names, without any import |
@@ -27,7 +26,6 @@ Importing this package loads nothing heavy.
 | `viewer` | `open_viewer`, `HeadlessViewer`, `screenshot` |
 | `symbols` | toy tops, globes, edges and meridians |
 | `coasts` | the Earth's continents |
-| `si_prefixes` | the prefix with which values of an SI unit read well |
 | `solids` | triangle meshes of bodies, from the outlines of their shapes |
 | `rows` | what pictures need of a dataset, as arrays |
 | `thinning` | reading a bounded number of rows of a dataset of any length |

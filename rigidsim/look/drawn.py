@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from rigidsim.look.clock import Clock, build_clock
 from rigidsim.look.page import config_page, notes_page, summary_page
 from rigidsim.look.plots import Plot, Series, plan_plots
-from rigidsim.look.readable_time import TimeWords
 from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Plane
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.thinning import thinned_indices
+from rigidsim.scene.readable_time import TimeWords
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look.plots import pretty_unit
-from rigidsim.look.readable_time import TimeWords
 from rigidsim.look.roles import drifts, in_words, is_averaged
+from rigidsim.scene.readable_time import TimeWords
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable

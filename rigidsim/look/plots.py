@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.angle_units import angle_unit
 from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
-from rigidsim.look.si_prefixes import si_scale
+from rigidsim.scene.readable_units import angle_unit, si_scale
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look.figures.style import STYLE
-from rigidsim.look.readable_time import DAY, YEAR, TimeUnit, unit_for
+from rigidsim.scene.readable_time import DAY, YEAR, TimeUnit, unit_for
 
 if TYPE_CHECKING:
     import xarray

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look.figures.style import STYLE
-from rigidsim.look.readable_time import span_text
 from rigidsim.scene.methods import method_named
+from rigidsim.scene.readable_time import span_text
 
 if TYPE_CHECKING:
     import xarray

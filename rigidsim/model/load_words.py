@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from rigidsim.look.readable_time import number_text, span_text
 from rigidsim.scene.known_bodies import known_body
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.readable_time import number_text, span_text
 
 _DIGITS = 4
 _KILOMETRES = 1e4  # m, from where on km read better

@@ -8,13 +8,13 @@ import math
 from collections.abc import Iterator
 from fractions import Fraction
 
-from rigidsim.look.readable_time import span_text
 from rigidsim.model.averaged.hansen import hansen
 from rigidsim.model.plausibility import meant_body
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, dot, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import PACES, KeplerOrbit, Orbit
+from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution, WarningCode
 

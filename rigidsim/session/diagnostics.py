@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rigidsim.accuracy.estimates.growth import UNCERTAIN
-from rigidsim.look.readable_time import TimeWords, span_text
+from rigidsim.scene.readable_time import TimeWords, span_text
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.tuning import AdviceLimits
 from rigidsim.session.understood import time_words

@@ -24,7 +24,7 @@ _PART_BITS = 53  # bits of a double: a value held by n of them has at most n tim
 if TYPE_CHECKING:
     import xarray
 
-    from rigidsim.look.angle_units import AngleUnit
+    from rigidsim.scene.readable_units import AngleUnit
     from rigidsim.store.sweeps.run import SavedSweep
 
 
@@ -50,7 +50,7 @@ def export(
             go to long tables beside it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
         force: replace existing files.
         naming: epoch, axes and names that the run's config leaves open, for aem and oem; empty for sweeps.
-        angle_unit: unit of angles, one of ``rigidsim.look.angle_units.ANGLE_UNITS``; rad by
+        angle_unit: unit of angles, one of ``rigidsim.scene.readable_units.ANGLE_UNITS``; rad by
             default. For csv, parquet and zarr.
         block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
 

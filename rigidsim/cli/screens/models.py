@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rigidsim.cli.screens.page import Page, Styled
-from rigidsim.look.readable_time import span_text
+from rigidsim.scene.readable_time import span_text
 from rigidsim.store.summary_parts import Modelling, TableErrors
 
 _YEAR = 365.25 * 86400  # s

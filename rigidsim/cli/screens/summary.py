@@ -13,8 +13,8 @@ from rigidsim.cli.screens.page import Page, Styled, page
 from rigidsim.cli.screens.understood import understood
 from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
-from rigidsim.look.readable_time import TimeWords, span_text
 from rigidsim.scene.methods import method_named
+from rigidsim.scene.readable_time import TimeWords, span_text
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift
 from rigidsim.store.understood import Span, Start, UnderstoodBody

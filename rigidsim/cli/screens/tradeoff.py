@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rigidsim.cli.screens.page import Page, page
-from rigidsim.look.readable_time import span_text
+from rigidsim.scene.readable_time import span_text
 
 
 def print_tradeoff(result: dict[str, Any]) -> None:

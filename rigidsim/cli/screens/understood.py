@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from rigidsim.look.readable_time import (
+from rigidsim.scene.readable_time import (
     TimeUnit,
     epoch_of,
     instant_text,

@@ -11,7 +11,7 @@ from rigidsim.look import signals
 from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures.scales import number, si_scale
 from rigidsim.look.figures.style import INK, PALE, X, Y, Z, curve, square, titled
-from rigidsim.look.readable_time import span_text
+from rigidsim.scene.readable_time import span_text
 
 if TYPE_CHECKING:
     import xarray

@@ -1,16 +1,22 @@
-"""Readable units of axes: prefixed SI units, and deg to microarcseconds for angles."""
+"""Readable units of axes: time, prefixed SI units, and deg to microarcseconds for angles."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.angle_units import ANGLE_UNITS, angle_unit
-from rigidsim.look.si_prefixes import largest, si_scale
+from rigidsim.scene.epochs import J2000
+from rigidsim.scene.readable_time import YEAR, TimeUnit, epoch_of, julian_year, unit_of
+from rigidsim.scene.readable_units import ANGLE_UNITS, angle_unit, largest, si_scale
 
-__all__ = ["angle_scale", "angle_text", "largest", "number", "si_scale"]
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["TimeAxis", "angle_scale", "angle_text", "number", "si_scale", "time_axis_of"]
 
 Array = NDArray[np.float64]
 
@@ -42,3 +48,29 @@ def number(value: float, digits: int = 4) -> str:
     if "e" in text and 1e-4 <= abs(value) < 1e6:
         text = f"{value:.0f}"
     return text.replace("-", "−")
+
+
+@dataclass(frozen=True)
+class TimeAxis:
+    """Times along an axis: their unit, its label, and the number that stands for time 0."""
+
+    unit: TimeUnit
+    label: str
+    origin: float = 0.0
+
+    def numbers(self, seconds: Array) -> Array:
+        """Numbers along the axis for times of the scene, s."""
+        return np.asarray(self.origin + np.asarray(seconds) / self.unit.seconds, dtype=np.float64)
+
+
+def time_axis_of(dataset: xarray.Dataset) -> TimeAxis:
+    """The axis for a dataset's times: years of the calendar, time since the epoch, or time alone."""
+    ends = [float(dataset["time"][i]) for i in (0, -1)] if dataset.sizes["time"] else [0.0]
+    unit = unit_of(dataset.attrs, max(map(abs, ends)))
+    epoch = epoch_of(dataset.attrs)
+    if epoch is None:
+        return TimeAxis(unit, f"time [{unit.symbol}]")
+    if unit.seconds == YEAR:
+        return TimeAxis(unit, f"year ({epoch.uniform().scale})", julian_year(epoch))
+    since = "J2000" if epoch == J2000 else str(epoch)
+    return TimeAxis(unit, f"time since {since} [{unit.symbol}]")

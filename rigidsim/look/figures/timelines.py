@@ -10,10 +10,17 @@ from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.figures.fits import secular
-from rigidsim.look.figures.scales import angle_scale, angle_text, number, si_scale
+from rigidsim.look.figures.scales import (
+    TimeAxis,
+    angle_scale,
+    angle_text,
+    number,
+    si_scale,
+    time_axis_of,
+)
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key, titled
-from rigidsim.look.readable_time import DAY, TimeAxis, named_unit, span_text, time_axis_of, unit_for
 from rigidsim.look.solids import rotation_matrix
+from rigidsim.scene.readable_time import DAY, named_unit, span_text, unit_for
 
 if TYPE_CHECKING:
     import xarray

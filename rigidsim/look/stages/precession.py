@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.angle_units import angle_unit
 from rigidsim.look.page import read_config
-from rigidsim.look.readable_time import span_text
 from rigidsim.look.roles import is_averaged
 from rigidsim.look.stages.bodies import Subject, direction_of, source_arrows
 from rigidsim.look.stages.parts import (
@@ -31,6 +29,8 @@ from rigidsim.look.stages.parts import (
     circle,
     quaternion_of,
 )
+from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable_units import angle_unit
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table

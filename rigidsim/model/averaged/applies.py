@@ -16,13 +16,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.look.readable_time import span_text
 from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.model.load import Load
 from rigidsim.scene.model_table import ORBIT_AVERAGED
+from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
 

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.look.readable_time import span_text
 from rigidsim.model.averaged.course import PARAMETER, SWING, NoCourse, PolhodeCourse, Wave, follow, wave_of
 from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
 from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed
@@ -24,6 +23,7 @@ from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm
+from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.scene import Scene
 
 EPSILON = 2.0**-60

@@ -19,12 +19,12 @@ from dataclasses import replace
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.look.readable_time import span_text
 from rigidsim.model.averaged.applies import refuse_frequencies
 from rigidsim.model.averaged.course import SWING
 from rigidsim.model.averaged.driven import Driven
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
+from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.scene import Scene
 
 _PLACES = 48  # along the course

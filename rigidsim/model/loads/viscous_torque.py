@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from rigidsim.look.readable_time import number_text
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, Triple
+from rigidsim.scene.readable_time import number_text
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 

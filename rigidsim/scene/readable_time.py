@@ -10,16 +10,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from rigidsim.scene.epochs import J2000, Epoch, parse_epoch
 from rigidsim.scene.units import time_unit
-
-if TYPE_CHECKING:
-    import xarray
 
 DAY = 86400.0
 YEAR = 365.25 * DAY
@@ -33,12 +27,7 @@ _CLOSE = 1 + 1e-9  # a span this near below a unit counts as one
 
 @dataclass(frozen=True)
 class TimeUnit:
-    """A unit of time.
-
-    Attributes:
-        symbol: as written after a number.
-        seconds: its length, s.
-    """
+    """A unit of time: its symbol, as written after a number, and its length in s."""
 
     symbol: str
     seconds: float
@@ -126,13 +115,7 @@ def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
 
 @dataclass(frozen=True)
 class TimeWords:
-    """Wording of the times of one run.
-
-    Attributes:
-        unit: unit of all times.
-        epoch: date of time 0, if known, so that dates are given too.
-        span: length of the run, s; dates resolve a thousandth of it.
-    """
+    """Wording of the times of one run: their unit, the date of time 0 if known, and the run's length, s."""
 
     unit: TimeUnit
     epoch: Epoch | None
@@ -140,12 +123,7 @@ class TimeWords:
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any], start: float, end: float) -> TimeWords:
-        """Wording for a run.
-
-        Args:
-            attributes: attributes with ``time_unit`` and ``epoch``, if known.
-            start, end: start and end of the run, s.
-        """
+        """Wording for a run from ``start`` to ``end`` (s) whose attributes may have a unit and an epoch."""
         largest = max(abs(start), abs(end))
         suiting = unit_for(largest)
         if 1.0 < suiting.seconds < DAY:  # 5000 s rather than 83.3333333 min
@@ -177,39 +155,3 @@ def julian_year(epoch: Epoch) -> float:
     """Julian year in the epoch's scale (TT for UTC): 2000 at J2000, one more every 365.25 days."""
     uniform = epoch.uniform()
     return _J2000_YEAR + float(uniform.julian_date() - J2000.julian_date()) / 365.25
-
-
-@dataclass(frozen=True)
-class TimeAxis:
-    """Presentation of times along an axis.
-
-    Attributes:
-        unit: unit of the numbers.
-        label: label with the unit.
-        origin: number that stands for time 0.
-    """
-
-    unit: TimeUnit
-    label: str
-    origin: float = 0.0
-
-    def numbers(self, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Numbers along the axis for times of the scene, s."""
-        return np.asarray(self.origin + np.asarray(seconds) / self.unit.seconds, dtype=np.float64)
-
-
-def time_axis_of(dataset: xarray.Dataset) -> TimeAxis:
-    """The axis for a dataset's times: years of the calendar, time since the epoch, or time alone.
-
-    Args:
-        dataset: dataset of a run, whose first and last time are read.
-    """
-    ends = [float(dataset["time"][i]) for i in (0, -1)] if dataset.sizes["time"] else [0.0]
-    unit = unit_of(dataset.attrs, max(map(abs, ends)))
-    epoch = epoch_of(dataset.attrs)
-    if epoch is None:
-        return TimeAxis(unit, f"time [{unit.symbol}]")
-    if unit.seconds == YEAR:
-        return TimeAxis(unit, f"year ({epoch.uniform().scale})", julian_year(epoch))
-    since = "J2000" if epoch == J2000 else str(epoch)
-    return TimeAxis(unit, f"time since {since} [{unit.symbol}]")

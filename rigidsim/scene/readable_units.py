@@ -1,9 +1,14 @@
-"""Units of angle for tables, figures and exports; datasets hold rad."""
+"""Units in which numbers read well: of angles, and SI units with prefixes. Datasets hold rad and plain SI."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,7 @@ ANGLE_UNITS: dict[str, AngleUnit] = {
 _MANY_TURNS = 20 * math.pi
 _SMALL = math.radians(0.1)  # 6'
 _TINY = math.radians(0.1 / 3600)
+_PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f", 3: "k", 6: "M", 9: "G", 12: "T"}
 
 
 def angle_unit(size: float) -> AngleUnit:
@@ -57,3 +63,19 @@ def angle_unit(size: float) -> AngleUnit:
     if size >= _SMALL:
         return ANGLE_UNITS["deg"]
     return ANGLE_UNITS["arcsec" if size >= _TINY else "mas"]
+
+
+def largest(values: Array) -> float:
+    """Largest magnitude of all finite values; 0 if there are none."""
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def si_scale(values: Array, unit: str) -> tuple[float, str]:
+    """Divisor and prefixed unit for values of a plain SI unit such as m or rad/s."""
+    size = largest(values)
+    if size == 0 or 0.1 <= size < 1e3:
+        return 1.0, unit
+    exponent = 3 * math.floor(math.log10(size) / 3 + 1e-9)
+    if exponent in _PREFIXES:
+        return 10.0**exponent, _PREFIXES[exponent] + unit
+    return 10.0**exponent, f"1e{exponent} {unit}"
