@@ -20,8 +20,8 @@ from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import Trial, try_setting
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve import compiled
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import prepare
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 from rigidsim.store.segments import SegmentLimits
@@ -36,7 +36,7 @@ EAGER = Tuning(IMPATIENT.pacing, SegmentLimits(seconds=0.0))
 OFTEN = """
 import functools, rigidsim.workflows.run as workflow
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.sampler import Pacing
 from rigidsim.store.segments import SegmentLimits
 tuning = Tuning(Pacing(patience=0.05), SegmentLimits(seconds=0.05))
 workflow.run = functools.partial(workflow.run, tuning=tuning)

@@ -10,7 +10,7 @@ import xarray
 
 import rigidsim
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.sampler import Pacing
 from rigidsim.store.segments import SegmentLimits
 
 BODY = """

@@ -54,7 +54,7 @@ def _leave_builds(code: int) -> None:
     seconds, and Ctrl-C promises half a second), and the usual way of ending would unload the compiler's own
     library beneath it.
     """
-    threads = sys.modules.get("rigidsim.solve.building")  # not loaded, nothing was compiled
+    threads = sys.modules.get("rigidsim.solve.compiled")  # not loaded, nothing was compiled
     if threads is not None and threads.building():
         sys.stdout.flush()
         sys.stderr.flush()

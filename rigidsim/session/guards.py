@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rigidsim.session.statistics import SampleStatistics
-from rigidsim.solve.building import building, give_up, take_up
+from rigidsim.solve.compiled import building, give_up, take_up
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.sampler import Pacing
 from rigidsim.store.segments import SegmentLimits
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint import Position
+from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
 from rigidsim.solve.driver import Driver
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
@@ -17,10 +17,9 @@ from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.events import EventLog
-from rigidsim.solve.pacing import MEASURED, Pacing
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import Projection, steps_between
-from rigidsim.solve.sampler import Check, Progress, SampleReceiver
+from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm
 from rigidsim.solve.solvers.taylor.solver import Taylor

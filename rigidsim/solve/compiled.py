@@ -1,33 +1,87 @@
-"""Cache of what heyoka compiles: code compiled for a trial or an earlier run in this process is reused.
+"""What heyoka compiles: kept for its next use, made without blocking Ctrl-C, and evaluated row by row.
 
-Code compiled by other processes is found on disk (``HEYOKA_CACHE_DIR``), in a cache that is kept small here.
-Even with compiled code in heyoka's own cache, an engine or a function takes some 10 ms to assemble, which
-is more than many runs take.
+Code compiled for a trial or an earlier run in this process is reused; that of other processes is found on
+disk (``HEYOKA_CACHE_DIR``), in a cache that is kept small here. Even from heyoka's own cache, an engine or a
+function takes some 10 ms to assemble, which is more than many runs take.
 """
 
 from __future__ import annotations
 
 import copy
 import pickle
+import threading
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from threading import Lock
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import heyoka as hy
+import numpy as np
 
-from rigidsim.solve.engine import CompiledFunction, TaylorEngine
+from rigidsim.solve.precision import Scalar
 
 T = TypeVar("T")
+
+_BUILD = "rigidsim build"  # name of threads
+_LOOK = 0.05  # seconds between checks
+_GROUP = 64  # rows; a multiple of every SIMD width
+_given_up = threading.Event()
 
 _HEYOKAS_LIMIT = 20 << 30
 DISK_LIMIT = 256 << 20
 """Largest size of compiled code on disk (bytes), enough for some five hundred scenes. heyoka's own limit is
 20 GiB; compiling takes ten times as long when the cache has grown to a few of them.
 """
+
+
+class CompiledFunction(Protocol):
+    """Function returned by ``heyoka.cfunc``.
+
+    Attributes:
+        llvm_states: the compiled modules (in compact mode one for all), which print what they were compiled
+            for.
+    """
+
+    llvm_states: Any
+
+    def __call__(self, *inputs: Any, **options: Any) -> np.ndarray:
+        """From inputs (k,) or (k, n) to outputs, in its own precision."""
+
+
+class TaylorEngine(Protocol):
+    """Integrator returned by ``heyoka.taylor_adaptive``.
+
+    Attributes:
+        time, dtime: current time, internal units; the second as two numbers whose sum it is.
+        state, pars: (states,) and parameters up to the last that is read; views that can be assigned to.
+        order, tol: order and tolerance of the Taylor series.
+        tc: (states, order + 1), Taylor coefficients of the latest step that was asked to keep them.
+        decomposition: terms of which a step's derivatives consist.
+    """
+
+    time: Scalar
+    dtime: tuple[Scalar, Scalar]
+    state: np.ndarray
+    pars: np.ndarray
+    order: int
+    tol: Scalar
+    tc: np.ndarray
+    decomposition: list[Any]
+
+    def step(self, max_delta_t: Scalar, *, write_tc: bool = False) -> tuple[Any, Scalar]:
+        """Take one step: its outcome and size."""
+
+    def propagate_until(self, t: Scalar, **options: Any) -> tuple[Any, ...]:
+        """Take many steps: outcome, smallest and largest step, their count, dense output and the callback."""
+
+    def propagate_grid(self, grid: np.ndarray, **options: Any) -> tuple[Any, ...]:
+        """Take many steps; the last item is the states at given times instead of dense output."""
+
+    def update_d_output(self, t: Scalar) -> np.ndarray:
+        """State at a time within the latest step, in a buffer that is reused."""
 
 
 class Kept(Generic[T]):
@@ -122,3 +176,95 @@ def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> T
         lambda: hy.taylor_adaptive(list(equations), initial, **options),
     )
     return copy.deepcopy(made)
+
+
+def interruptible(work: Callable[[], T]) -> T:
+    """Run work that releases Python's lock, such as compiling, and wait for it interruptibly.
+
+    In the main thread, the only one that signals reach, another thread does the work. A signal handler that
+    raises ends the wait; the work itself goes on and its result is lost.
+
+    Raises:
+        KeyboardInterrupt: after ``give_up``, before any work begins.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return work()
+    if _given_up.is_set():
+        raise KeyboardInterrupt
+    made: list[T] = []
+    failed: list[BaseException] = []
+    done = threading.Event()
+
+    def build() -> None:
+        try:
+            made.append(work())
+        except BaseException as error:
+            failed.append(error)
+        finally:
+            done.set()
+
+    threading.Thread(target=build, name=_BUILD, daemon=True).start()
+    while not done.wait(_LOOK):  # a signal that comes just before the wait isn't heeded within it
+        pass
+    if failed:
+        raise failed[0]
+    return made[0]
+
+
+def building() -> bool:
+    """Whether such work is under way, even if nobody waits for it any more."""
+    return any(thread.name == _BUILD for thread in threading.enumerate())
+
+
+def give_up() -> None:
+    """Begin no more such work for the main thread until ``take_up``, since nobody would wait for it."""
+    _given_up.set()
+
+
+def take_up() -> None:
+    """Allow such work again."""
+    _given_up.clear()
+
+
+def evaluate_rows(
+    function: CompiledFunction,
+    states: np.ndarray,
+    constants: np.ndarray | None = None,
+    times: np.ndarray | None = None,
+) -> np.ndarray:
+    """Evaluate a compiled function at each row of states.
+
+    In single and double precision heyoka takes rows several at a time and the rest one by one, which differs
+    in the last bit. Rows are padded to whole groups there, so that a row's bits don't depend on the block
+    that it came in.
+
+    Args:
+        states: (n, states).
+        constants: the function's parameters, (k,) for all rows or (k, n).
+        times: (n,), internal units, where the function may depend on them.
+
+    Returns:
+        (outputs, n).
+    """
+    count = len(states)
+    group = _GROUP if states.dtype in (np.float32, np.float64) else 1
+    padded = -(-count // group) * group
+    # compiled expressions without parameters don't accept an array of them
+    arguments = {}
+    if times is not None and getattr(function, "is_time_dependent", False):
+        arguments["time"] = _padded(np.asarray(times, dtype=states.dtype), padded)
+    if constants is not None:
+        table = np.repeat(constants[:, None], padded, axis=1) if constants.ndim == 1 else constants
+        arguments["pars"] = _padded(table, padded)
+    return np.asarray(function(_padded(states.T, padded), **arguments))[:, :count]
+
+
+def _padded(values: np.ndarray, count: int) -> np.ndarray:
+    """An array, contiguous, whose last axis is filled up to a length with its last value."""
+    given = values.shape[-1]
+    if given == count:
+        return np.ascontiguousarray(values)
+    filled = np.empty((*values.shape[:-1], count), dtype=values.dtype)
+    filled[..., :given] = values
+    filled[..., given:] = values[..., -1:]
+    return filled

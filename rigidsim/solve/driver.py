@@ -6,9 +6,8 @@ import time
 
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.pacing import MEASURED, Pacing
 from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Check, Progress, SampleReceiver
+from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status

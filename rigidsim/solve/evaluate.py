@@ -14,14 +14,11 @@ import numpy as np
 
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.solve.building import interruptible
 from rigidsim.solve.checkpoint_arrays import Arrays
-from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.compiled import CompiledFunction, compiled_function, evaluate_rows, interruptible
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Lift
-from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
-from rigidsim.solve.rows import evaluate_rows
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.turns.continuity import Continuity
 from rigidsim.solve.turns.joined import JoinedAngles

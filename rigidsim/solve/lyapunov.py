@@ -21,7 +21,7 @@ import numpy as np
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.model.tangents import moving_names, own_names
-from rigidsim.solve.building import interruptible
+from rigidsim.solve.compiled import interruptible
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth
 _CHUNK, _MOST_CHUNKS = 4096, 256  # steps between two looks at Ctrl-C, and such chunks in an interval

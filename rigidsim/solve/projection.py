@@ -31,9 +31,8 @@ import numpy as np
 from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System
 from rigidsim.model.two_part import in_two_parts
-from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.compiled import CompiledFunction, compiled_function
 from rigidsim.solve.correction import correction, damping_between, freedoms_of, lacking_rates
-from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
 LATE = 8192

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.solve.engine import TaylorEngine
+from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import Scalar
 
 

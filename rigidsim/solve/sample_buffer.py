@@ -8,16 +8,13 @@ from bisect import bisect_left
 import numpy as np
 
 from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.sampler import Pacing, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 
 _FEWEST_ROWS = 8  # that may wait: some tens of milliseconds at 250 digits
 _GROWTH = 4  # largest growth of the waiting rows from one hand-over to the next
-_LIMITS = 3  # for which the times of samples are worked out at once
-_FIRST_ROWS = 16  # looked at for those before a limit, at least
 
 
 class SampleBuffer:
@@ -39,7 +36,6 @@ class SampleBuffer:
         self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
         self._upcoming: tuple[int, Scalar] | None = None
-        self._known = first, clock.internal(0, 0)  # the times worked out last, and the first one's index
         self._found = 0  # found before the last limit: the next call expects about as many
 
     @property
@@ -67,16 +63,11 @@ class SampleBuffer:
     def until(self, limit: Scalar, most: int) -> np.ndarray:
         """Times of the next samples at or before ``limit``, at most ``most``."""
         position = first = self.count
-        if self._found <= 1 and most > 0 and position < self._clock.count:  # one is likely all there is
-            one = self._clock.none_or_one(position, limit)
-            if one is not None:
-                self._found = len(one)
-                return one
-        pieces = []
-        rows = min(max(_FIRST_ROWS, self._found + self._found // 8), self._pacing.rows_at_once)
+        rows = min(self._found + 1, self._pacing.rows_at_once)
         stop = min(self._clock.count, position + max(most, 0))
+        pieces = [self._clock.internal(0, 0)]
         while position < stop:
-            times = self._times(position, min(position + rows, stop))
+            times = self._clock.internal(position, min(position + rows, stop))
             inside = int(np.count_nonzero(times <= limit))
             pieces.append(times[:inside])
             position += inside
@@ -84,18 +75,7 @@ class SampleBuffer:
                 break
             rows = min(_GROWTH * rows, self._pacing.rows_at_once)
         self._found = position - first
-        return np.concatenate(pieces) if pieces else self._clock.internal(0, 0)
-
-    def _times(self, first: int, stop: int) -> np.ndarray:
-        """Times of samples, or of the first of them: those that were worked out before, if there are any.
-
-        A limit is often looked for again past a few of the samples before the last one.
-        """
-        begin, known = self._known
-        if not begin <= first < begin + len(known):
-            ahead = min(first + min(_LIMITS * self._found, self._pacing.rows_at_once), self._clock.count)
-            self._known = begin, known = first, self._clock.internal(first, max(stop, ahead))
-        return known[first - begin : stop - begin]
+        return np.concatenate(pieces)
 
     def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
         """Take the next samples, with a step boundary before them."""

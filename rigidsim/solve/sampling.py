@@ -2,28 +2,22 @@
 
 Sample i of a grid lies at the rational number (a + i b) / d, with whole a, b and d. Where these fit the
 significand, one division of two exact numbers is the nearest number to it, and a block of samples costs three
-operations of arrays. Elsewhere a block is summed in numbers of twice the length, and what lies too near the
-middle between two numbers to be told from it (one sample in 2^30) is a division of long integers, as all are
-beyond 80 bits.
+operations of arrays; elsewhere, and beyond 80 bits, each is a division of long integers.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from fractions import Fraction
-from typing import Any
 
 import mpmath
 import numpy as np
 from mpmath.libmp import from_rational, round_nearest
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.exact import fraction_of, rounded
+from rigidsim.scene.exact import rounded
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.solve.precision import Precision, Scalar, precision_of
-
-_BLOCK = 1 << 16
 
 
 class SampleClock:
@@ -71,17 +65,6 @@ class SampleClock:
             return (whole[0] + precision.scalar(index) * whole[1]) / whole[2] * self._per_second
         return self.internal(index, index + 1)[0]
 
-    def none_or_one(self, index: int, limit: Scalar) -> np.ndarray | None:
-        """Times of the samples from ``index`` on that lie at or before a limit, as from ``internal``; None if
-        there are several.
-        """
-        time = self.at(index)
-        if time > limit:
-            return self._precision.zeros((0,))
-        if index + 1 < self.count and self.at(index + 1) <= limit:
-            return None
-        return np.array([time], dtype=self._precision.scalar)
-
     def label(self, index: int) -> float:
         """One sample's time in seconds, as in the dataset's coordinate."""
         return float(self.labels(index, index + 1)[0])
@@ -118,9 +101,6 @@ class SampleClock:
             whole = self._whole[precision.bits]
             if whole is not None and self._fits(max(stop - 1, 0), precision):
                 return (whole[0] + precision.indices(first, stop) * whole[1]) / whole[2]
-            if precision.cheap and stop - first > 1:
-                blocks = range(first, stop, _BLOCK)
-                return np.concatenate([self._summed(i, min(i + _BLOCK, stop), precision) for i in blocks])
         return np.array(
             [_nearest(n, d, precision) for n, d in self._rationals(first, stop)], dtype=precision.scalar
         )
@@ -135,23 +115,6 @@ class SampleClock:
         if max(abs(a), b, d) > 2**precision.bits:
             return None
         return _nearest(a, 1, precision), _nearest(b, 1, precision), _nearest(d, 1, precision)
-
-    def _summed(self, first: int, stop: int, precision: Precision) -> np.ndarray:
-        """Like ``_seconds``, for at most ``_BLOCK`` samples of a grid: the first one plus multiples of the
-        step.
-        """
-        spare = _BLOCK.bit_length()  # bits that products with an index take
-        base, base_rest = _in_two(Fraction(self._numerator(first), self._divisor), precision)
-        step, step_rest = _in_two(Fraction(self._step, self._divisor), precision, spare)
-        index = precision.indices(0, stop - first)
-        total, low = _with_error(base, index * step)
-        times, rest = _with_error(total, low + (base_rest + index * step_rest))
-        # left out: the third parts of both numbers, and the roundings of the sum of second parts
-        left_out = 2.0 ** (3 + spare - 2 * precision.bits) * (abs(base) + index[-1] * step)
-        half = np.spacing(np.nextafter(np.abs(times), 0)) / 2
-        for i in np.flatnonzero(~(np.abs(rest) + left_out < half)):
-            times[i] = _nearest(self._numerator(first + int(i)), self._divisor, precision)
-        return times
 
     def _narrowed(self, doubles: np.ndarray, first: int, precision: Precision) -> np.ndarray:
         """The narrower numbers nearest to exact values, from the doubles nearest to them."""
@@ -193,23 +156,6 @@ class SampleClock:
                             "choose a higher precision",
                         )
                     )
-
-
-def _in_two(value: Fraction, precision: Precision, spare: int = 0) -> tuple[Scalar, Scalar]:
-    """Two numbers whose sum is close to a value, the first with ``spare`` bits less than the precision."""
-    parts = []
-    for bits in (precision.bits - spare, precision.bits):
-        part = from_rational(*value.as_integer_ratio(), bits, round_nearest)
-        parts.append(precision.number(mpmath.mp.make_mpf(part)))
-        value -= fraction_of(mpmath.mp.make_mpf(part))
-    return parts[0], parts[1]
-
-
-def _with_error(a: Any, b: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Rounded sum and its rounding error (Knuth 1969, section 4.2.2, theorem B)."""
-    total = a + b
-    of_b = total - a
-    return total, (a - (total - of_b)) + (b - of_b)
 
 
 def _nearest(numerator: int, denominator: int, precision: Precision) -> Scalar:

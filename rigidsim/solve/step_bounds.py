@@ -14,7 +14,6 @@ _SPARSE = 1.5
 """Largest ratio of the step suggested by the last two terms to that of the terms before, in proportion to an
 exponential's terms: 1.5^20 is three digits.
 """
-_SURELY = 1e-9  # far above rounding, of logarithms
 # A motion whose Taylor series ends (free fall without rotation) would have infinite steps. Natural steps are
 # of the order of one internal unit, far below this, so that the bound changes no other motion.
 _LONGEST_BITS = 30
@@ -51,24 +50,12 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
 def bounds_of_sparse_series(sizes: np.ndarray) -> np.ndarray:
     """The same bounds for many motions side by side, (members,).
 
-    Those that it may act on are sorted out together, and their bounds worked out one by one: numpy's last
-    bits may depend on the place in an array.
+    Worked out one by one: numpy's last bits may depend on the place in an array.
 
     Args:
         sizes: size of the largest coefficient of each term, (order + 1, members).
     """
-    order, bounds = len(sizes) - 1, np.full(sizes.shape[1], np.inf)
-    if order < 5:  # no terms to compare the last two with
-        return bounds
-    with np.errstate(divide="ignore", invalid="ignore"):
-        term = np.arange(order // 2 + 1, order + 1)[:, None]
-        radii = (np.log(np.maximum(sizes[0], 1.0)) - np.log(sizes[order // 2 + 1 :])) / term
-        entire = np.array([math.lgamma(m + 1) / m for m in term[:, 0]])[:, None]
-        expected = (radii - entire)[:-2].min(axis=0) + entire[-1]
-        acts = radii[-2:].min(axis=0) > expected + math.log(_SPARSE) - _SURELY
-    for member in np.flatnonzero(acts).tolist():
-        bounds[member] = _bound(sizes[:, member].tolist())
-    return bounds
+    return np.array([_bound(sizes[:, member].tolist()) for member in range(sizes.shape[1])])
 
 
 def _bound(sizes: list[float]) -> float:

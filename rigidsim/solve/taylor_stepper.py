@@ -15,9 +15,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.solve.building import interruptible
-from rigidsim.solve.compiled import compiled_engine
-from rigidsim.solve.engine import TaylorEngine
+from rigidsim.solve.compiled import TaylorEngine, compiled_engine, interruptible
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import after_each_step, requirement_of

@@ -19,7 +19,7 @@ from support import cases, same_bits
 import rigidsim
 from rigidsim.errors import RunFolderError
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.sampler import Pacing
 from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.segments import SegmentLimits

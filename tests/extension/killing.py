@@ -10,8 +10,7 @@ from pathlib import Path
 import rigidsim
 from rigidsim.session.guards import Observer
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.pacing import Pacing
-from rigidsim.solve.sampler import Progress
+from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store.segments import SegmentLimits
 
 # a segment after every few samples

@@ -20,10 +20,9 @@ from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.neighbours.lanes import StepperLanes
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.solve.sampler import Pacing, Progress, SampleReceiver
 from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 

@@ -14,12 +14,11 @@ from support import cases, same_bits
 import rigidsim
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.compiled import evaluate_rows
 from rigidsim.solve.evaluate import Evaluator
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.rows import evaluate_rows
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.sampler import Pacing, SampleReceiver
 from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 

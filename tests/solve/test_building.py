@@ -13,8 +13,7 @@ import pytest
 from support import config, run_text, same_bits
 
 import rigidsim
-from rigidsim.solve.building import building, give_up, interruptible, take_up
-from rigidsim.solve.compiled import compiled_engine
+from rigidsim.solve.compiled import building, compiled_engine, give_up, interruptible, take_up
 
 PLAIN = "estimate = false"
 AWAKE = 60.0  # seconds that nobody waits for

@@ -21,8 +21,8 @@ from rigidsim.scene.attitude import AXES, quaternion_from_euler, rotation_matrix
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.effects.charts import NEAR
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import precision_of
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.workflows.plan import plan
 from rigidsim.workflows.resume import resume

@@ -19,9 +19,8 @@ from rigidsim.solve.assembly import assemble
 from rigidsim.solve.checkpoint_arrays import pack
 from rigidsim.solve.compiled import CodeStore, kept_in
 from rigidsim.solve.corrected_stepper import CorrectedStepper
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.sampler import Progress
+from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store import netcdf
 from rigidsim.store.segments import SegmentLimits
 

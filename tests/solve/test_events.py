@@ -17,7 +17,7 @@ import rigidsim
 from rigidsim.cli.screens.summary import print_summary
 from rigidsim.errors import ConfigError
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
 
 FLIPS = """

@@ -23,8 +23,8 @@ from rigidsim.errors import ConfigError
 from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.two_part import TwoPart, as_factor, in_two_parts
 from rigidsim.scene.arithmetic import context_for
+from rigidsim.solve.correction import least_correction
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
-from rigidsim.solve.least_correction import least_correction
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import (

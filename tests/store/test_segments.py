@@ -17,7 +17,7 @@ from support import cases, same_bits
 import rigidsim
 from rigidsim.errors import RunFolderError
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.pacing import Pacing
+from rigidsim.solve.sampler import Pacing
 from rigidsim.store import chunks, netcdf, segments
 from rigidsim.store.segments import SegmentLimits, SegmentWriter, read_chain, segment_paths
 from rigidsim.store.variables import SCHEMA_VERSION, Variable, time_variable

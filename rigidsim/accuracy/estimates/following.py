@@ -16,7 +16,7 @@ from rigidsim.accuracy.estimates.course import Course, Followed
 from rigidsim.accuracy.estimates.growth import power_of_time
 from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.accuracy.estimates.slow_motion import power_of_slow_motion
-from rigidsim.solve.building import interruptible
+from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.effects.waypoints import Waypoint
 from rigidsim.solve.neighbours.lanes import (
     LOOSE,

@@ -14,8 +14,7 @@ import numpy as np
 
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function
-from rigidsim.solve.event_units import STATES, TIMES, exponents_of
-from rigidsim.solve.events import BESIDE
+from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
 
 _BITS = 53
 

@@ -20,10 +20,9 @@ from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, dot
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
-from rigidsim.solve.closed_form.jacobi import Jacobi, jacobi
 from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot, right_handed
 from rigidsim.solve.closed_form.theta import Lattice, Theta, first_kind, lattice, theta
-from rigidsim.solve.closed_form.theta_quotients import Argument, phase_slope, turn
+from rigidsim.solve.closed_form.theta_quotients import Argument, Jacobi, jacobi, phase_slope, turn
 
 
 @dataclass(frozen=True)

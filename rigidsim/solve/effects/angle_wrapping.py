@@ -13,9 +13,9 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from rigidsim.solve.angle_state import AngleState, pack_angles, unpack_angles
 from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.precision import Precision
+from rigidsim.solve.sample_block import AngleState, pack_angles, unpack_angles
 from rigidsim.solve.stepper import Stepper
 
 STEPS_BETWEEN = 32

@@ -26,13 +26,12 @@ import numpy as np
 from rigidsim.model.euler_charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
 from rigidsim.model.system import System
 from rigidsim.scene.attitude import quaternion_from_euler
-from rigidsim.solve.angle_state import Angles, AngleState
-from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.compiled import CompiledFunction, TaylorEngine, compiled_function
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.effects.whole_time import WholeTime
-from rigidsim.solve.engine import CompiledFunction, TaylorEngine
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.sample_block import Angles, AngleState
 from rigidsim.solve.stepper import Stepper
 
 NEAR = 0.5

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.solve.building import interruptible
+from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.projection import LATE, NOTED, Projection
 from rigidsim.solve.stepper import Stepper

@@ -17,7 +17,7 @@ import numpy as np
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
-from rigidsim.solve.engine import TaylorEngine
+from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.requirements import propagation
 from rigidsim.solve.steppers import stepper_of

@@ -12,8 +12,8 @@ from rigidsim.scene.scene import Scene
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.events import EventLog
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import Precision, Scalar, precision_of
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.solvers.stepwise import StepwiseSolver
 from rigidsim.solve.stepper import Stepper

@@ -12,8 +12,8 @@ from rigidsim.scene.methods import METHODS
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import EventLog
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.algorithm import Algorithm, Unsuitable, solves
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status

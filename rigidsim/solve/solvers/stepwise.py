@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Progress
+from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status

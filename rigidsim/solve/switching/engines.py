@@ -16,10 +16,8 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.solve.building import interruptible
-from rigidsim.solve.engine import TaylorEngine
-from rigidsim.solve.event_units import of_order_one
-from rigidsim.solve.events import BESIDE, EventLog, engine_events
+from rigidsim.solve.compiled import TaylorEngine, interruptible
+from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Mark
 from rigidsim.solve.switching.resting import Meeting

@@ -32,9 +32,7 @@ from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
 from rigidsim.scene.scene import SampleTimes
-from rigidsim.solve.building import interruptible
-from rigidsim.solve.compiled import compiled_engine, compiled_function
-from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.compiled import CompiledFunction, compiled_engine, compiled_function, interruptible
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper

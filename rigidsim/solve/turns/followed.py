@@ -13,8 +13,7 @@ import numpy as np
 
 from rigidsim.model.assembly import RATES
 from rigidsim.model.system import System
-from rigidsim.solve.building import interruptible
-from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.compiled import CompiledFunction, interruptible
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sample_block import SampleBlock
 

@@ -14,11 +14,9 @@ import numpy as np
 from rigidsim.model.euler_poles import UNDEFINED
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.solve.building import interruptible
+from rigidsim.solve.compiled import CompiledFunction, evaluate_rows, interruptible
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
-from rigidsim.solve.engine import CompiledFunction
 from rigidsim.solve.precision import Precision
-from rigidsim.solve.rows import evaluate_rows
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.turns.continuity import Continuity
 from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join, doubtful_rows, is_sparse

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.solve.engine import CompiledFunction
+from rigidsim.solve.compiled import CompiledFunction
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.turns.count import Place
 

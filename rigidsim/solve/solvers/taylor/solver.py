@@ -10,10 +10,9 @@ from rigidsim.model.system import System
 from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import EventLog
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Progress
+from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm, solves
 from rigidsim.solve.solvers.solver import Solver

@@ -26,8 +26,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
-from rigidsim.solve.pacing import Pacing
 from rigidsim.solve.precision import Scalar
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
