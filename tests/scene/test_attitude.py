@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import math
 
-import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from support import run_text
 
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import context_for, multiply, transpose
+from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import parse
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.solve.problem import prepare
@@ -40,11 +38,6 @@ def difference(a: list, b: list) -> float:
     return max(abs(x - y) for r, s in zip(a, b, strict=True) for x, y in zip(r, s, strict=True))
 
 
-def test_there_are_twelve_sequences() -> None:
-    assert len(EULER_SEQUENCES) == 12
-    assert sum(sequence[0] == sequence[2] for sequence in EULER_SEQUENCES) == 6  # the proper ones
-
-
 @pytest.mark.parametrize("sequence", EULER_SEQUENCES)
 @given(angles=st.tuples(turns, turns, turns))
 def test_quaternion_from_euler_is_intrinsic(sequence: str, angles: tuple[float, float, float]) -> None:
@@ -53,28 +46,6 @@ def test_quaternion_from_euler_is_intrinsic(sequence: str, angles: tuple[float, 
     np.testing.assert_allclose(numbers(attitude.rotation_matrix(q)), expected.as_matrix(), rtol=0, atol=CLOSE)
     x, y, z, w = expected.as_quat()
     assert abs(abs(float(q[0]) * w + float(q[1]) * x + float(q[2]) * y + float(q[3]) * z) - 1) <= CLOSE
-
-
-@given(quaternions)
-def test_rotation_matrix_against_scipy(q: tuple[int, ...]) -> None:
-    w, x, y, z = q
-    expected = Rotation.from_quat([x, y, z, w]).as_matrix()
-    np.testing.assert_allclose(numbers(attitude.rotation_matrix(unit(q))), expected, rtol=0, atol=CLOSE)
-
-
-@given(quaternions)
-def test_rotation_matrix_is_a_rotation(q: tuple[int, ...]) -> None:
-    r = attitude.rotation_matrix(unit(q))
-    one = [[CONTEXT.mpf(i == j) for j in range(3)] for i in range(3)]
-    assert difference(multiply(r, transpose(r)), one) <= LAST
-    assert np.linalg.det(numbers(r)) > 0
-
-
-@given(quaternions, quaternions)
-def test_products_compose_rotations(p: tuple[int, ...], q: tuple[int, ...]) -> None:
-    both = attitude.rotation_matrix(attitude.product(unit(p), unit(q)))
-    one_by_one = multiply(attitude.rotation_matrix(unit(p)), attitude.rotation_matrix(unit(q)))
-    assert difference(both, one_by_one) <= LAST
 
 
 @given(quaternions)
@@ -157,10 +128,6 @@ euler_sequence = "{sequence}"
     ).scene
 
 
-def test_the_default_attitude_is_the_identity() -> None:
-    assert scene("angular_velocity = [1, 0, 0]").quaternion == [1, 0, 0, 0]
-
-
 def test_a_quaternion_is_normalised_in_the_scenes_precision() -> None:
     found = scene("angular_velocity = [1, 0, 0]\nquaternion = [1, 1, 1, 0]").quaternion
     third = 1 / CONTEXT.sqrt(3)
@@ -172,15 +139,6 @@ def test_sixty_degrees_have_an_exact_sine() -> None:
     expected = [CONTEXT.sqrt(3) / 2, 0, 0, CONTEXT.mpf(1) / 2]
     assert max(abs(a - b) for a, b in zip(found.quaternion, expected, strict=True)) <= LAST
     assert abs(found.euler_angles[0] - CONTEXT.pi / 3) <= LAST
-
-
-@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
-def test_the_scene_reads_angles_in_its_sequence(sequence: str) -> None:
-    found = scene("angular_velocity = [1, 0, 0]\neuler_angles = [0.3, 0.5, 0.7]", sequence)
-    expected = Rotation.from_euler(sequence.upper(), [0.3, 0.5, 0.7]).as_matrix()
-    np.testing.assert_allclose(
-        numbers(attitude.rotation_matrix(found.quaternion)), expected, rtol=0, atol=CLOSE
-    )
 
 
 def test_angular_momentum_is_given_in_space_axes() -> None:
@@ -215,39 +173,9 @@ def test_tiny_angles_that_are_meant_are_kept() -> None:
     assert abs(cosine / CONTEXT.cos(off) - 1) < CONTEXT.mpf(10) ** -35
 
 
-def test_floats_are_left_as_they_are() -> None:
-    assert attitude.quaternion_from_euler(mpmath.fp, [math.pi, 0.0, 0.0], "xyz")[0] == math.cos(math.pi / 2)
-
-
-QUARTERS = """
-name = "quarters"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 1.0, 0.05]
-euler_angles = {angles}
-[time]
-end = 1
-samples = 2
-[integrator]
-precision = "single"
-formulation = "{formulation}"
-"""
-
-
-@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles"])
 @pytest.mark.parametrize(
-    "angles", [["90 deg", "90 deg", "180 deg"], ["0", "180 deg", "0"], ["pi", "pi/2", "pi"]]
+    ("formulation", "sequence", "sign"), [("euler_angles", "zxz", -1), ("canonical", "zyx", 1)]
 )
-def test_single_precision_takes_exact_right_angles(angles: list[str], formulation: str) -> None:
-    prepared = prepare(parse(QUARTERS.format(angles=angles, formulation=formulation)))
-    if formulation != "euler_angles":
-        assert min(abs(x) for x in prepared.system.initial[3:] if x != 0) > 0.4
-
-
-@pytest.mark.parametrize("formulation", ["euler_angles", "canonical"])
-@pytest.mark.parametrize("sequence", ["zxz", "zyx"])
-@pytest.mark.parametrize("sign", [1, -1])
 def test_recorded_quaternions_begin_with_the_one_given(formulation: str, sequence: str, sign: int) -> None:
     given = [0.3 * sign, -0.5 * sign, 0.2 * sign, 0.75 * sign]
     text = (

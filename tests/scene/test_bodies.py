@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rigidsim.scene.arithmetic import context_for, cross, diagonal, dot, eigen, multiply, transpose
-from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
-from rigidsim.scene.bodies.pieces import parallel_axis
+from rigidsim.scene.bodies.body import RigidBody, build_body
 from rigidsim.scene.bodies.shapes import SHAPES
 from rigidsim.scene.config import parse
 from rigidsim.scene.scene import build_scene
@@ -135,25 +134,10 @@ SOLIDS = {
     "ring": ("radius = 1.3", lambda: ring(1.3)),
     "torus": ("major_radius = 1.9\nminor_radius = 0.6", lambda: torus(1.9, 0.6)),
 }
-PLANE = ("plate", "disk", "ring")
-LANDMARKS = [(name, mark) for name, shape in SHAPES.items() for mark in shape.landmarks]
 
 
 def test_every_shape_is_tested() -> None:
     assert SOLIDS.keys() == SHAPES.keys()
-
-
-@pytest.mark.parametrize("name", SOLIDS)
-def test_shape_is_the_integral_over_its_volume(name: str) -> None:
-    """The rules are exact for these polynomials, so that rounding alone is left."""
-    dimensions, rule = SOLIDS[name]
-    points, weights = rule()
-    _, center = moments_of(points, weights, 1.0)
-    expected, _ = moments_of(points - center, weights, 2.5)
-    solid = body(f'shape = "{name}"\nmass = 2.5\n{dimensions}')
-    np.testing.assert_allclose(numbers(solid.inertia), expected, rtol=0, atol=CLOSE * expected.max())
-    assert solid.center_of_mass == [0, 0, 0]
-    assert solid.mass == number(Fraction(5, 2))
 
 
 @pytest.mark.parametrize("name", SOLIDS)
@@ -166,13 +150,6 @@ def test_shape_about_another_point_is_the_integral_from_there(name: str) -> None
     solid = body(f'shape = "{name}"\nmass = 2.5\n{dimensions}\nreference = [0.3, -0.8, 1.1]')
     np.testing.assert_allclose(numbers(solid.inertia), expected, rtol=0, atol=CLOSE * expected.max())
     np.testing.assert_allclose(numbers(solid.center_of_mass), seen, rtol=0, atol=CLOSE)
-
-
-@pytest.mark.parametrize("name", PLANE)
-def test_perpendicular_axes(name: str) -> None:
-    plane = body(f'shape = "{name}"\nmass = 2.5\n{SOLIDS[name][0]}')
-    x, y, z = plane.principal_moments
-    assert abs(x + y - z) <= LAST
 
 
 def test_cone_has_its_apex_below() -> None:
@@ -192,13 +169,6 @@ def test_cone_about_its_apex() -> None:
     top = body('shape = "cone"\nmass = 2\nradius = 0.3\nheight = 0.7\nreference = "apex"')
     r2, h2 = Fraction(9, 100), Fraction(49, 100)
     across, along = 3 * 2 * (r2 / 4 + h2) / 5, 3 * 2 * r2 / 10
-    assert_same(top.inertia, diagonal([number(across), number(across), number(along)]))
-
-
-def test_cone_about_its_centre_of_mass() -> None:
-    top = body('shape = "cone"\nmass = 2\nradius = 0.3\nheight = 0.7')
-    r2, h2 = Fraction(9, 100), Fraction(49, 100)
-    across, along = 3 * 2 * (r2 + h2 / 4) / 20, 3 * 2 * r2 / 10
     assert_same(top.inertia, diagonal([number(across), number(across), number(along)]))
 
 
@@ -236,28 +206,6 @@ def test_square_plate_has_its_diagonals_as_axes() -> None:
     assert [last_bit(abs(x)) for x in across] == [last_bit(x) for x in (half, half, zero)]
     assert across[0] * across[1] < 0
     assert [last_bit(abs(x)) for x in normal] == [last_bit(x) for x in (zero, zero, CONTEXT.one)]
-
-
-def test_the_cuboid_of_the_table() -> None:
-    m, a, b, c = 2, Fraction(7, 10), Fraction(19, 10), Fraction(31, 10)
-    found = body('shape = "cuboid"\nmass = 2\nsize = [0.7, 1.9, 3.1]')
-    expected = [m * (b * b + c * c) / 12, m * (a * a + c * c) / 12, m * (a * a + b * b) / 12]
-    assert_same(found.inertia, diagonal([number(x) for x in expected]))
-
-
-@given(st.lists(st.integers(1, 1000), min_size=6, max_size=6))
-def test_parallel_axis_theorem(values: list[int]) -> None:
-    a, b, c, *arm = (CONTEXT.mpf(v) for v in values)
-    shifted = parallel_axis(diagonal([a + b, a + c, b + c]), CONTEXT.mpf(3), arm)
-    x, y, z = arm
-    steiner = [
-        [y * y + z * z, -x * y, -x * z],
-        [-x * y, x * x + z * z, -y * z],
-        [-x * z, -y * z, x * x + y * y],
-    ]
-    central = diagonal([a + b, a + c, b + c])
-    expected = [[central[i][j] + 3 * steiner[i][j] for j in range(3)] for i in range(3)]
-    assert_same(shifted, expected, 10**7)
 
 
 # ---- points -----------------------------------------------------------------------------------------------
@@ -305,17 +253,6 @@ def test_no_moment_is_more_than_the_other_two(cloud: tuple[list[int], list[tuple
     small, middle, large = sorted(found.principal_moments)
     assert small >= 0
     assert small + middle >= large * (1 - LAST)
-
-
-@given(clouds)
-def test_moving_the_reference_is_steiner(cloud: tuple[list[int], list[tuple[int, int, int]]]) -> None:
-    masses, positions = cloud
-    assume(not on_a_line(positions, (0, 0, 0)))
-    central = body(points_table(masses, positions))
-    moved = body(points_table(masses, positions, "reference = [0, 0, 0]"))
-    expected = parallel_axis(central.inertia, central.mass, moved.center_of_mass)
-    assert_same(moved.inertia, expected, 10**8)
-    assert central.center_of_mass == [0, 0, 0]
 
 
 def test_water_is_plane() -> None:
@@ -415,27 +352,6 @@ def test_principal_axes_reproduce_the_tensor(values: tuple[int, ...]) -> None:
     assert_same(multiply(axes, transpose(axes)), one)
     assert abs(dot(cross(axes[0], axes[1]), axes[2]) - 1) <= LAST  # right-handed
     assert min(moments) > 0
-
-
-@given(st.tuples(*[entries] * 3))
-def test_a_diagonal_tensor_keeps_its_axes(values: tuple[int, ...]) -> None:
-    tensor = diagonal([CONTEXT.mpf(x) for x in values])
-    moments, axes = eigen(CONTEXT, tensor)
-    assert moments == list(values)
-    assert axes == diagonal([CONTEXT.one] * 3)
-
-
-def test_a_tensor_stays_in_the_users_axes() -> None:
-    found = body("inertia_tensor = [[2, 0.1, 0.2], [0.1, 3, 0.3], [0.2, 0.3, 4]]")
-    tenth = [number(Fraction(n, 10)) for n in (20, 1, 2, 1, 30, 3, 2, 3, 40)]
-    assert found.inertia == [tenth[0:3], tenth[3:6], tenth[6:9]]
-    inverse = inverse_inertia(CONTEXT, found)
-    assert_same(multiply(inverse, found.inertia), diagonal([CONTEXT.one] * 3), 10)
-
-
-def test_a_rods_inverse_leaves_its_axis_alone() -> None:
-    rod = body('shape = "rod"\nmass = 12\nlength = 1')
-    assert inverse_inertia(CONTEXT, rod) == diagonal([CONTEXT.one, CONTEXT.one, CONTEXT.zero])
 
 
 # ---- the Earth --------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from rigidsim.errors import ConfigError
-from rigidsim.scene import units
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import parse
 from rigidsim.scene.exact import ExactNumber, parse_quantity
@@ -25,25 +24,7 @@ from rigidsim.scene.expressions.tree import (
 from rigidsim.scene.scene import build_scene
 
 PAGE = Path(__file__).parents[2] / "docs" / "expressions.md"
-NAMES = [
-    "t",
-    "wx",
-    "wy",
-    "wz",
-    "qw",
-    "qx",
-    "qy",
-    "qz",
-    "phi",
-    "theta",
-    "psi",
-    "x",
-    "y",
-    "z",
-    "vx",
-    "vy",
-    "vz",
-]
+NAMES = ["t", "wx", "wy", "wz", "qw", "qx", "qy", "qz", "phi", "theta", "psi", *"xyz", "vx", "vy", "vz"]
 GIVEN = {
     "k": "0.25", "c": "2e-4 N m s", "tau": "0.1 N m", "w0": "30 deg/s", "m": "2", "l": "10 cm", "T": "3 T",
 }  # fmt: skip
@@ -143,13 +124,6 @@ def test_what_fits_is_taken(text: str, unit: str | None) -> None:
 )
 def test_what_does_not_fit_is_refused(text: str, unit: str | None, message: str) -> None:
     assert message in refused(text, unit)
-
-
-def test_expressions_without_units_need_no_library_of_units() -> None:
-    units._registry.cache_clear()
-    units._to_si.cache_clear()
-    parse_expression("k*sin(2*t)^2 + wz - 3*x", NAMES, parameters={"k": PARAMETERS["k"]}, unit="N m")
-    assert units._registry.cache_info().currsize == 0
 
 
 def config(parameters: str, component: str, event: str) -> str:

@@ -64,12 +64,6 @@ def test_a_decimal_is_the_fraction_that_it_shows(number: Decimal) -> None:
     assert parse_number(f"{number} g", "kg") == ExactNumber(exact / 1000)
 
 
-@given(st.integers(-(10**40), 10**40))
-def test_int_decimal_text_and_exponent_are_one_number(number: int) -> None:
-    forms = [number, Decimal(number), str(number), f"{number}.0", f"{number}e0", f"{number}000e-3"]
-    assert {parse_number(form, "m") for form in forms} == {ExactNumber(Fraction(number))}
-
-
 @given(decimals.filter(lambda d: d > 0))
 def test_toml_keeps_the_digits(number: Decimal) -> None:
     plain = format(number, "f")
@@ -90,24 +84,6 @@ def test_powers(base: int, power: int) -> None:
     expected = Fraction(base) ** power
     assert parse_number(f"{base}^{power}", "1").rational == expected
     assert parse_number(f"{base}**{power} kg", "kg").rational == expected
-
-
-def test_third_and_dyadic() -> None:
-    assert parse_number("1/3", "1").rational == Fraction(1, 3)
-    assert parse_number("2^-20", "1").rational == Fraction(1, 2**20)
-    assert parse_number("1_000.5", "1").rational == Fraction(2001, 2)
-    assert parse_number("+.5", "1").rational == Fraction(1, 2)
-    assert parse_number("-5.", "1").rational == -5
-
-
-def test_a_float_is_the_binary_number_that_it_is() -> None:
-    """Scenes built in code may hand over floats; nothing guesses what was meant."""
-    assert parse_number(0.1, "1").rational == Fraction(0.1) != Fraction(1, 10)
-
-
-def test_a_number_is_returned_as_it_is() -> None:
-    number = ExactNumber(Fraction(1, 7), 2)
-    assert parse_number(number, "kg") is number
 
 
 # ---- units ------------------------------------------------------------------------------------------------
@@ -191,26 +167,7 @@ def test_a_number_knows_whether_its_unit_was_written() -> None:
     assert parse_number(40, "1").assumed == ""
 
 
-@given(any_decimals.filter(lambda d: d != 0))
-def test_pi_is_not_rounded_before_the_run_asks(number: Decimal) -> None:
-    degrees = parse_number(f"{number} deg", "rad")
-    assert degrees == ExactNumber(Fraction(number) / 180, 1)
-    there_and_back = degrees.rational * 180
-    assert there_and_back == Fraction(number)
-
-
 # ---- into the working precision ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_tenth_is_a_tenth(name: str | int) -> None:
-    """Rounded to nearest: within half a unit in the last place, for 0.1 that is 2^-4 2^-bits."""
-    precision = precision_of(name)
-    scalar = precision.number(parse_number("0.1", "1").at(context_for(name)))
-    error = as_fraction(precision.exact(scalar)) - Fraction(1, 10)
-    assert abs(error) <= Fraction(2) ** (-4 - working_bits(name))
-    if working_bits(name) > 53:  # and so it isn't the double next to a tenth
-        assert as_fraction(precision.exact(scalar)) != Fraction(0.1)
 
 
 @given(any_decimals)
@@ -293,9 +250,3 @@ def test_tolerance_as_text() -> None:
     prepared = prepare(parse(scene_text(integrator='precision = 50\ntolerance = "1e-40"')))
     error = as_fraction(prepared.precision.exact(prepared.tolerance)) - Fraction(1, 10**40)
     assert abs(error) <= Fraction(1, 10**40) * Fraction(2) ** -prepared.precision.bits
-
-
-def test_the_global_context_of_mpmath_is_left_alone() -> None:
-    before = mpmath.mp.prec
-    prepare(parse(scene_text(rate='"1 deg/s"', integrator="precision = 100")))
-    assert mpmath.mp.prec == before

@@ -23,7 +23,6 @@ from rigidsim.scene.expressions.tree import (
     ExpressionError,
     Name,
     Operation,
-    constant_value,
     evaluate,
     fold,
     names_used,
@@ -108,19 +107,6 @@ def test_decimals_and_parameters_stay_exact() -> None:
     assert parse("2*pi*3").root == parse("6*pi").root
 
 
-def test_a_product_has_one_exact_number() -> None:
-    two_thirds = Constant(ExactNumber(Fraction(2, 3)), (0, 0))
-    expected = Operation("product", (two_thirds, Name("wx", (0, 0))), (0, 0))
-    for text in "2*wx/3", "wx*2/3", "wx/3*2", "(2/3)*wx", "2/3*wx":
-        assert parse(text).root == expected
-
-
-def test_a_chain_is_one_operation() -> None:
-    root = parse("+".join(["wx", "wy"] * 300)).root
-    assert isinstance(root, Operation)
-    assert len(root.operands) == 600
-
-
 rational = st.recursive(
     st.sampled_from([*NAMES, "2", "3", "0.1", "1.5e-1", "7."]),
     lambda inner: st.one_of(
@@ -169,28 +155,6 @@ def test_functions_are_mpmaths_own() -> None:
         assert abs(value("sigmoid(wx)", wx=y) - 1 / (1 + CONTEXT.exp(-y))) < CLOSE
     assert value("sigmoid(wx)", wx=-(10**9)) >= 0
     assert abs(value("e^(1/2)*pi") - CONTEXT.sqrt(CONTEXT.e) * CONTEXT.pi) < CLOSE
-
-
-def test_values_follow_the_contexts_precision() -> None:
-    expression = parse("sin(1/3)*sqrt(2)")
-    for digits in 20, 300:
-        context = context_for(digits)
-        expected = context.sin(context.mpf(1) / 3) * context.sqrt(2)
-        assert abs(evaluate(expression, {}, context) - expected) < context.mpf(2) ** (4 - context.prec)
-
-
-def test_names_used_and_constants() -> None:
-    assert names_used(parse("k*sin(t)^2 + wx - pi + e")) == {"t", "wx"}
-    assert names_used(parse("k")) == frozenset()
-    assert constant_value(parse("2*wx"), CONTEXT) is None
-    assert abs(constant_value(parse("cos(pi/3)"), CONTEXT) - CONTEXT.mpf("0.5")) < CLOSE
-
-
-def test_fold_needs_no_recursion() -> None:
-    """2000 characters of left-associative divisions are a tree a thousand levels deep."""
-    expression = parse("/".join(["t"] * 1000))
-    assert fold(expression, lambda _, operands: 1 + max(operands, default=0)) == 1000
-    assert value(expression.text, t=1) == 1
 
 
 # ---- refusals ---------------------------------------------------------------------------------------------

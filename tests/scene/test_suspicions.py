@@ -73,12 +73,6 @@ time.end = "1 day"
     assert codes == {"mars": ["ephemeris_of_earth"], "earth": []}
 
 
-def test_it_has_a_code() -> None:
-    scene = build_scene(parse(CONFIG.format(angles="[0, 7, 0]", inclination="0", anomaly="0")))
-    (caution,) = cautions_of(scene)
-    assert caution.code.value == "angle_without_unit"
-
-
 @pytest.mark.parametrize(
     ("time", "said"),
     [

@@ -6,13 +6,12 @@ from decimal import Decimal
 from fractions import Fraction
 from math import sqrt
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigidsim.errors import ConfigError
-from rigidsim.scene.exact import decimal_text, parse_number
+from rigidsim.scene.exact import decimal_text
 from rigidsim.scene.sweep_table import AxisTable
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.sweeps.values import axis_values
@@ -38,12 +37,6 @@ def swept(table: str, base: str = BASE) -> Sweep:
 
 def values(sweep: Sweep) -> list[tuple[str, ...]]:
     return [sweep.texts(member) for member in range(sweep.count)]
-
-
-@given(st.fractions(max_denominator=10**30), st.integers(-60, 60))
-def test_a_number_reads_back_from_its_text(value: Fraction, exponent: int) -> None:
-    scaled = value * Fraction(10) ** exponent
-    assert parse_number(decimal_text(scaled), "1").rational == scaled
 
 
 def test_whole_numbers_stay_whole_and_decimals_decimal() -> None:
@@ -99,13 +92,6 @@ def test_a_prolonged_space_of_the_same_step_keeps_its_values() -> None:
     assert decades[10] == ("0.1",)
 
 
-def test_random_values_depend_on_seed_and_key() -> None:
-    one = axis("uniform", 5, 1)
-    assert one != axis("uniform", 5, 2)
-    table = AxisTable.model_validate({"uniform": [-1, 1], "count": 5})
-    assert one != [axis_values(table, "time.end", 1, 0).text(index) for index in range(5)]
-
-
 def test_draws_have_the_distribution_asked_for() -> None:
     count = 2000
     table = f'mode = "zip"\n{RATE} = {{normal = [2, 0.5], count = {count}}}\n'
@@ -120,23 +106,6 @@ def test_draws_have_the_distribution_asked_for() -> None:
     assert max(uniform) < 5
     below = sum(x < 2 for x in normal)  # binomial with one half
     assert abs(below - count / 2) < 5 * sqrt(count) / 2
-
-
-def test_many_draws_at_once_are_the_draws_one_by_one() -> None:
-    table = 'mode = "zip"\n'
-    table += 'axes."initial.angular_velocity" = {normal = [[1, 0, -2], [0.1, 1, "1/3"]], count = 9}\n'
-    table += 'axes."time.end" = {uniform = ["3 min", "5 min"], count = 9}\n'
-    table += 'axes."initial.quaternion" = {uniform = [["0 deg", 0, 0, 0], ["1 deg", 1, 1, 1]], count = 9}'
-    vectors, times, turned = swept(table).axes
-    for axis in (vectors, times):
-        assert axis.values.drawn is not None
-        some = [7, 0, 3]
-        for component, drawn in enumerate(axis.values.drawn):
-            assert [drawn.value(index) for index in some] == [
-                axis.exact(index)[component].rational for index in some
-            ]
-            assert drawn.draw.many(np.array(some)).tolist() == [drawn.draw(index) for index in some]
-    assert turned.values.drawn is None  # multiples of pi aren't rational
 
 
 def test_directions_lie_on_the_sphere_and_cover_it() -> None:
