@@ -12,7 +12,7 @@ import xarray
 import rigidsim
 from experiments.durability.scenes import same
 from rigidsim.errors import RigidsimError, RunFolderError
-from rigidsim.store import segments
+from rigidsim.store import netcdf
 
 
 @dataclass
@@ -64,7 +64,7 @@ def saved_rows(folder: Path) -> int:
     if last is None:
         return 0
     try:
-        labels = segments.root_attributes(folder / "segments" / last)
+        labels = netcdf.root_attributes(folder / "segments" / last)
     except RunFolderError:  # gone meanwhile: the dataset took its place
         return saved_rows(folder)
     return int(labels.get("first_sample", 0)) + int(labels["rows"])

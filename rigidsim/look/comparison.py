@@ -17,7 +17,7 @@ from rigidsim.look.drawn import DrawnRun
 from rigidsim.look.page import legible
 from rigidsim.look.plots import Plot, Series
 from rigidsim.look.recording import STRETCH, recording_to
-from rigidsim.look.thinning import AnyTable, thin, thinned_indices
+from rigidsim.look.thinning import thin, thinned_indices
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table
@@ -30,7 +30,7 @@ COLORS = ((92, 148, 235), (240, 190, 60), (104, 190, 110), (225, 115, 190), (80,
 _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
 
-def write_comparison(named: Sequence[tuple[str, AnyTable]], path: Path, *, rows: int = ROWS) -> int:
+def write_comparison(named: Sequence[tuple[str, Table]], path: Path, *, rows: int = ROWS) -> int:
     """Write several datasets as one recording on one clock, their first stages side by side.
 
     Args:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.roles import is_residual
-from rigidsim.look.rows import Rows
 
 if TYPE_CHECKING:
     import xarray
-
-AnyTable = TypeVar("AnyTable", "xarray.Dataset", Rows)
 
 ROWS_AT_ONCE = 1 << 21
 
@@ -79,7 +76,9 @@ class KeptRows:
         return {name: np.concatenate(pieces) for name, pieces in self._pieces.items()}
 
 
-def thin(dataset: AnyTable, rows: int, at_once: int = ROWS_AT_ONCE, kept: KeptRows | None = None) -> AnyTable:
+def thin(
+    dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE, kept: KeptRows | None = None
+) -> xarray.Dataset:
     """The rows of `thinned_indices`, in memory; residuals are left out.
 
     Only variables that have a time dimension, and of those only the rows asked for, are read:
@@ -92,6 +91,8 @@ def thin(dataset: AnyTable, rows: int, at_once: int = ROWS_AT_ONCE, kept: KeptRo
     Raises:
         ValueError: no `time` dimension or coordinate, or see `thinned_indices`.
     """
+    import xarray
+
     if "time" not in dataset.dims or "time" not in dataset.coords:
         raise ValueError("the dataset has no time coordinate: nothing to show along time")
     count = dataset.sizes["time"]
@@ -101,6 +102,16 @@ def thin(dataset: AnyTable, rows: int, at_once: int = ROWS_AT_ONCE, kept: KeptRo
         for name, variable in dataset.data_vars.items()
         if "time" in variable.dims and variable.dtype.kind in "fiub" and not is_residual(variable)
     ]
+    wanted = dataset[names]
+    known = None if kept is None else kept.columns(count)
+    if known is not None and known.keys() >= {"time", *names}:
+        fields = {
+            name: (found.dims, known[str(name)].reshape(-1, *found.shape[1:]), found.attrs)
+            for name, found in wanted.data_vars.items()
+        }
+        labels = {name: found for name, found in wanted.coords.items() if "time" not in found.dims}
+        time = {"time": ("time", known["time"].reshape(-1), wanted["time"].attrs)}
+        return xarray.Dataset(fields, labels | time, dataset.attrs)
     stride = _stride(count, rows)
     # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
     # kilobytes of notes for every chunk that it touches, hence pieces.
@@ -108,17 +119,9 @@ def thin(dataset: AnyTable, rows: int, at_once: int = ROWS_AT_ONCE, kept: KeptRo
     slices = [slice(first, min(first + piece, count), stride) for first in range(0, count, piece)]
     if (count - 1) % stride:
         slices.append(slice(count - 1, count))
-    if isinstance(dataset, Rows):
-        known = None if kept is None else kept.columns(count)
-        if known is not None and known.keys() >= {"time", *names}:
-            return dataset.replaced(names, known)
-        return dataset.taken(names, slices)
-    wanted = dataset[names]
     parts = [wanted.isel(time=part).load() for part in slices]
     if len(parts) == 1:
         return parts[0]
-    import xarray
-
     joined = xarray.concat(parts, dim="time", data_vars="all", combine_attrs="override")
     if joined.sizes["time"] != len(indices):  # concat must neither merge nor sort
         raise AssertionError("thinning lost rows")

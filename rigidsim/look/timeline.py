@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rigidsim.look.drawn import DrawnRun
 from rigidsim.look.page import title_of
 from rigidsim.look.recording import STRETCH, check_room, recording_to
-from rigidsim.look.thinning import AnyTable, KeptRows, thin, thinned_indices
+from rigidsim.look.thinning import KeptRows, thin, thinned_indices
+
+if TYPE_CHECKING:
+    import xarray
 
 
 def write_timeline(
-    dataset: AnyTable, path: Path, *, rows: int = 100_000, kept: KeptRows | None = None
+    dataset: xarray.Dataset, path: Path, *, rows: int = 100_000, kept: KeptRows | None = None
 ) -> int:
     """Write a dataset as a rerun recording with its own layout.
 

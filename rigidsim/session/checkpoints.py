@@ -10,7 +10,7 @@ from rigidsim.solve.checkpoint import Position, SavedPart, check_versions, pack_
 from rigidsim.solve.checkpoint_arrays import Arrays, numbers
 from rigidsim.solve.events import pack_events, unpack_events
 from rigidsim.store import netcdf
-from rigidsim.store.segments import Chain, root_attributes
+from rigidsim.store.segments import Chain
 
 
 class Checkpoints:
@@ -57,7 +57,7 @@ class Checkpoints:
             for part in self._parts.values():
                 part.restore(arrays)
             for path in chain.paths:
-                if "previous_seal" in root_attributes(path):
+                if "previous_seal" in netcdf.root_attributes(path):
                     saved = netcdf.read_group(path, "events")
                     self._log.found += unpack_events(saved, self._precision, len(self._system.states))
             if boundary.mark.events != len(self._log.found) or next_sample != chain.rows:

@@ -16,7 +16,6 @@ from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.recorded_rows import recorded_rows
 from rigidsim.store.segments import SegmentWriter
 from rigidsim.store.summary import Summary
 from rigidsim.store.variables import Extra
@@ -122,11 +121,12 @@ def with_timeline(
     if not output.timeline or not summary.samples:
         return summary
     from rigidsim.look.timeline import write_timeline
+    from rigidsim.store.reader import open_dataset
 
     path = folder.timeline
     observer.phase("timeline")
     try:
-        with recorded_rows(folder.dataset) as dataset:
+        with open_dataset(folder.dataset, indexed=False) as dataset:
             write_timeline(dataset, path, rows=output.timeline_rows, kept=kept)
     except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
         why = error.strerror if isinstance(error, OSError) else None

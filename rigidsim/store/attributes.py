@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store import segments
+from rigidsim.store import netcdf
 
 
 class Use(Enum):
@@ -160,7 +160,7 @@ def read_attributes(path: Path) -> RootAttributes:
         RunFolderError: the file isn't one of rigidsim's.
     """
     try:
-        return RootAttributes.model_validate(segments.root_attributes(path))
+        return RootAttributes.model_validate(netcdf.root_attributes(path))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(step)[:40] for step in first["loc"])

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from rigidsim.store import viewing
 from rigidsim.store.collected import JoinedBlocks
 from rigidsim.store.netcdf import Block
 from rigidsim.store.run import Run
@@ -86,10 +85,6 @@ class MemoryRun(Run):
         coordinates |= {n: found.pop(n) for n in list(found) if found[n].dims == (n,)}
         told = xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))
         return xarray.decode_cf(told)  # dates, and coordinates besides time
-
-    def view(self, *, web: bool = False) -> int:
-        """See ``Run``; the timeline is discarded when the viewer closes."""
-        return viewing.view(self, None, web=web)
 
     def concluded(self, outcome: Brief) -> Self:
         """The same run with another summary."""

@@ -104,6 +104,26 @@ def reading(path: Path) -> Iterator[Any]:
         raise RunFolderError(f"{path}: can't be read ({error})") from None
 
 
+def root_attributes(path: Path) -> dict[str, Any]:
+    """Root attributes of a dataset or segment as Python values, and its ``rows``.
+
+    Raises:
+        RunFolderError: the file isn't a dataset.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            found = {
+                str(key): value.item()
+                if isinstance(value, np.generic | np.ndarray) and value.size == 1
+                else value
+                for key, value in file.attrs.items()
+                if not key.startswith("_")
+            }
+            return {**found, "rows": int(file["time"].shape[0])}
+    except (OSError, KeyError, AttributeError, IndexError, RuntimeError, ValueError) as error:
+        raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
+
+
 def read_group(path: Path, name: str) -> dict[str, np.ndarray]:
     """The plain arrays of a group; empty if there is no such group.
 

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import html
 import sys
+import tempfile
 from abc import abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
-from rigidsim.store import provenance, segments, viewing
+from rigidsim.look import viewer
+from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder, find_run
-from rigidsim.store.joined_segments import join_segments
-from rigidsim.store.seal import check_whole, read_seal
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.validated_open import open_dataset
-from rigidsim.store.variables import SCHEMA_VERSION
+from rigidsim.store.sweeps.folder import is_sweep
 
 if TYPE_CHECKING:
     import xarray
@@ -68,13 +70,43 @@ class Run:
         with self.dataset as dataset:
             return figure(dataset, what)
 
-    @abstractmethod
     def view(self, *, web: bool = False) -> int:
-        """Open the timeline in the viewer or the browser and wait until it is closed; returns the exit code.
+        """Open the timeline in the viewer, or in the browser (served on loopback, until Ctrl-C), and wait
+        until it is closed.
+
+        Returns:
+            The viewer's exit code; 130 after Ctrl-C.
 
         Raises:
-            RunFolderError: the timeline can't be drawn, or no viewer is installed.
+            RunFolderError: the timeline can't be drawn, no viewer is installed, or there is no screen for it.
         """
+        with self.recording() as timeline:
+            try:
+                return viewer.open_viewer(timeline, web=web)
+            except (FileNotFoundError, viewer.NoDisplay) as error:
+                raise RunFolderError(str(error)) from None
+
+    @contextmanager
+    def recording(self) -> Iterator[Path]:
+        """The timeline: the run's own, or one drawn for this purpose.
+
+        Raises:
+            RunFolderError: the timeline can't be drawn.
+        """
+        with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
+            timeline = Path(scratch) / "timeline.rrd"
+            self._draw(timeline)
+            yield timeline
+
+    def _draw(self, timeline: Path) -> None:
+        from rigidsim.look.timeline import write_timeline
+
+        try:
+            with self.dataset as dataset, atomic.replacing(timeline) as new:
+                write_timeline(dataset, new)
+        except (OSError, RuntimeError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise RunFolderError(f"{timeline}: can't be written: {why}") from None
 
     @abstractmethod
     def concluded(self, outcome: Brief) -> Self:
@@ -84,8 +116,6 @@ class Run:
         return f"<Run {self.outcome.name!r} ({self.place}): {self.status}>"
 
     def _repr_html_(self) -> str:
-        import html
-
         title = f"{html.escape(self.outcome.name)}: {html.escape(self.status)}"
         return f"<b>{title}</b> ({html.escape(self.place)}){_table(self.outcome)}"
 
@@ -107,9 +137,18 @@ class SavedRun(Run):
         """Path of the run's folder."""
         return str(self.folder.path)
 
-    def view(self, *, web: bool = False) -> int:
-        """See ``Run``; a timeline that had to be drawn is kept in the folder."""
-        return viewing.view(self, self.folder, web=web)
+    @contextmanager
+    def recording(self) -> Iterator[Path]:
+        """See ``Run``; one that had to be drawn is kept in the folder, if that can be written."""
+        timeline = self.folder.timeline
+        if not timeline.exists():
+            if self.folder.read_only is not None:
+                with super().recording() as drawn:
+                    yield drawn
+                return
+            self._draw(timeline)
+            self.folder.note_timeline(self.outcome, timeline)
+        yield timeline
 
     def concluded(self, outcome: Brief) -> Self:
         """The same run with the given summary, which is written."""
@@ -136,10 +175,12 @@ class SavedRun(Run):
         Raises:
             RunFolderError: it is damaged, edited, or another run's.
         """
+        from rigidsim.store.reader import refuse_damaged
+
         if self.folder.dataset.exists():
             # a run completed again after a crash still has the summary of the first time, or none
             claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest
-            _refuse_damaged(self.folder.dataset, claimed)
+            refuse_damaged(self.folder.dataset, claimed)
 
     def opened(self, *, indexed: bool = True) -> xarray.Dataset:
         """The dataset as in ``dataset``; without ``indexed``, sample times aren't loaded and can't be
@@ -148,6 +189,8 @@ class SavedRun(Run):
         Raises:
             RunFolderError: nothing was saved, or a file is damaged.
         """
+        from rigidsim.store.reader import open_dataset
+
         if self.folder.dataset.exists():
             self.refuse_damaged()
             return open_dataset(self.folder.dataset, indexed=indexed)
@@ -158,36 +201,7 @@ class SavedRun(Run):
             lost = self.outcome.dataset_digest is not None
             what = f"its dataset.h5 is missing; run it again with {FORCE}" if lost else "nothing was saved"
             raise RunFolderError(f"{self.folder.path}: {what}")
-        return join_segments(chain.paths, status=self.status, indexed=indexed)
-
-
-def _refuse_damaged(path: Path, expected: str | None) -> None:
-    """Check a dataset's seal; datasets of the first schema version have none.
-
-    Args:
-        expected: SHA-256 of the file, if the summary beside it gives one.
-
-    Raises:
-        RunFolderError: the file is damaged, edited, replaced, or of a newer version than this rigidsim.
-    """
-    try:
-        unsealed = read_seal(path) is None
-        digest = provenance.file_sha256(path) if unsealed else check_whole(path)[1]
-    except OSError as error:
-        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
-    labels = segments.root_attributes(path)
-    version = labels.get("schema_version")
-    if not isinstance(version, int) or version > SCHEMA_VERSION:
-        raise RunFolderError(
-            f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
-            "install a newer one"
-        )
-    if version > 1 and unsealed:
-        raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
-    if "segment" in labels:
-        raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
-    if expected not in (None, digest):
-        raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
+        return open_dataset(*chain.paths, status=self.status, indexed=indexed)
 
 
 def open_run(path: str | Path) -> SavedRun:
@@ -196,8 +210,6 @@ def open_run(path: str | Path) -> SavedRun:
     Raises:
         RunFolderError: no run there, or a damaged summary.
     """
-    from rigidsim.store.sweeps.folder import is_sweep
-
     if is_sweep(path):
         what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
         raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")
@@ -207,8 +219,6 @@ def open_run(path: str | Path) -> SavedRun:
 
 def _table(outcome: Brief) -> str:
     """HTML table of a summary's warnings, attitude error and invariants, for a notebook."""
-    import html
-
     if not isinstance(outcome, Summary):
         return f"<p>{html.escape(outcome.message)}</p>"
     lines = [f"warning: {html.escape(text)}" for text in outcome.warnings]

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
@@ -250,7 +249,7 @@ def read_chain(folder: Path) -> Chain:
         try:
             refuse_special(path)
             found = check_seal(path)
-            labels = root_attributes(path)
+            labels = netcdf.root_attributes(path)
             run = run or str(labels.get("run_id", ""))
             damage = _misfit(path, labels, number, rows, run, last)
             if damage is None:
@@ -275,26 +274,6 @@ def _misfit(path: Path, labels: Mapping[str, Any], number: int, rows: int, run: 
     if any(labels.get(key) != value for key, value in expected.items()):
         return f"{path}: doesn't follow the segment before it; one of them was exchanged"
     return None
-
-
-def root_attributes(path: Path) -> dict[str, Any]:
-    """Root attributes of a dataset or segment as Python values, and its ``rows``.
-
-    Raises:
-        RunFolderError: the file isn't a dataset.
-    """
-    try:
-        with h5py.File(path, "r") as file:
-            found = {
-                str(key): value.item()
-                if isinstance(value, np.generic | np.ndarray) and value.size == 1
-                else value
-                for key, value in file.attrs.items()
-                if not key.startswith("_")
-            }
-            return {**found, "rows": int(file["time"].shape[0])}
-    except (OSError, KeyError, AttributeError, IndexError, RuntimeError, ValueError) as error:
-        raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
 
 
 def _copy(path: Path, chunks: Mapping[str, ChunkedVariable]) -> None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
-
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.store import netcdf
 from rigidsim.store.attributes import RootAttributes, read_attributes
+from rigidsim.store.reader import open_dataset
 
 _WITHOUT_DIRECTIONS = 4
 """Earlier schema versions recorded no axes, their angles or polar motion by default, and don't say what they
@@ -33,8 +31,8 @@ def as_begun(experiment: Experiment, saved: Path) -> Experiment:
     if found.recorded:
         names = [name for name in found.recorded.split() if name in OBSERVABLES]
     elif found.schema_version < _WITHOUT_DIRECTIONS:
-        with netcdf.reading(saved) as file:
-            names = [name for name in OBSERVABLES if isinstance(file.get(name), h5py.Dataset)]
+        with open_dataset(saved, indexed=False) as dataset:
+            names = [name for name in OBSERVABLES if name in dataset.variables]
     else:
         return experiment
     config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})

@@ -24,12 +24,14 @@ from rigidsim.session.tuning import Tuning
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
-from rigidsim.store import atomic, netcdf
+from rigidsim.store import atomic
 from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.netcdf import root_attributes
+from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.seal import check_seal
-from rigidsim.store.segments import Chain, read_chain, root_attributes
+from rigidsim.store.segments import Chain, read_chain
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.store.variables import SCHEMA_VERSION
@@ -300,15 +302,11 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
 
 def _same_times(prepared: InitialValueProblem, chain: Chain) -> None:
     """Require that a grid to a later end begins with exactly the times that are saved."""
-    first = 0
-    for path in chain.paths:
-        with netcdf.reading(path) as file:
-            saved = file["time"]
-            for start in range(0, saved.shape[0], _ROWS_AT_ONCE):
-                times = np.asarray(saved[start : start + _ROWS_AT_ONCE])
-                if not np.array_equal(prepared.clock.labels(first, first + len(times)), times):
-                    raise RunFolderError(
-                        f"{_UNTIL}: the longer grid's first sample times differ from those saved by a "
-                        "rounding; choose an end that is a multiple of the old one, or [time] every"
-                    )
-                first += len(times)
+    with open_dataset(*chain.paths, indexed=False) as saved:
+        for first in range(0, saved.sizes["time"], _ROWS_AT_ONCE):
+            times = saved["time"][first : first + _ROWS_AT_ONCE].values
+            if not np.array_equal(prepared.clock.labels(first, first + len(times)), times):
+                raise RunFolderError(
+                    f"{_UNTIL}: the longer grid's first sample times differ from those saved by a rounding; "
+                    "choose an end that is a multiple of the old one, or [time] every"
+                )

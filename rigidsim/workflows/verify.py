@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
+import xarray
 
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.config import Experiment, parse, parse_earlier
 from rigidsim.session.guards import Observer
 from rigidsim.solve.status import Status
-from rigidsim.store import netcdf, provenance
+from rigidsim.store import provenance
 from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.netcdf import root_attributes
+from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal, read_seal
-from rigidsim.store.segments import root_attributes
-from rigidsim.store.variables import is_bare_dimension
 from rigidsim.workflows.recorded_then import as_begun
 from rigidsim.workflows.run import run
 from rigidsim.workflows.verify_summary import summary_problems, timeline_problems
@@ -212,15 +212,14 @@ def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Differe
     """Names of the variables that differ, the earliest difference, and the number of samples."""
     differing: list[str] = []
     earliest: Difference | None = None
-    with netcdf.reading(saved) as one, netcdf.reading(again) as other:
-        names = {*_numbers(one), *_numbers(other)}
-        if version < 4:  # no dates
-            names -= {n for n in names if n not in one and _is_date(other[n])}
-        if version < 3:  # no corrections put back along time
-            names -= {n for n in names if n not in one and "put_back_of" in other[n].attrs}
-        samples = int(one["time"].shape[0])
+    stored: Any = {"indexed": False, "decoded": False}
+    with open_dataset(saved, **stored) as one, open_dataset(again, **stored) as other:
+        names = {str(n) for file in (one, other) for n, v in file.variables.items() if v.dtype.kind == "f"}
         for name in sorted(names):
-            if name not in one or name not in other or one[name].shape != other[name].shape:
+            if name not in one.variables and _recorded_since(name, other[name], version):
+                continue
+            known = name in one.variables and name in other.variables
+            if not known or one[name].shape != other[name].shape:
                 differing.append(name)
                 continue
             try:
@@ -232,24 +231,21 @@ def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Differe
                 differing.append(name)
                 if earliest is None or found.sample < earliest.sample:
                     earliest = found
-    return differing, earliest, samples
+        return differing, earliest, one.sizes["time"]
 
 
-def _numbers(file: h5py.File) -> Iterator[str]:
-    for name, item in file.items():
-        if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not is_bare_dimension(item):
-            yield name
+def _recorded_since(name: str, variable: xarray.DataArray, version: int) -> bool:
+    """Whether a dataset of an earlier schema version lacks a variable because no run recorded it then: dates
+    (residuals name what they belong to), and corrections put back along time.
+    """
+    date = "time_scale" in variable.attrs or variable.attrs.get("residual_of") == "julian_date"
+    return (date and version < 4) or ("put_back_of" in variable.attrs and version < 3)
 
 
-def _is_date(item: h5py.Dataset) -> bool:
-    """Whether a variable follows from the epoch and the time alone; residuals name what they belong to."""
-    return "time_scale" in item.attrs or item.attrs.get("residual_of") == "julian_date"
-
-
-def _first_difference(name: str, one: h5py.Dataset, other: h5py.Dataset) -> Difference | None:
+def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray) -> Difference | None:
     for first in range(0, one.shape[0] if one.ndim else 1, _ROWS_AT_ONCE):
-        rows = slice(first, first + _ROWS_AT_ONCE) if one.ndim else ()
-        a, b = np.asarray(one[rows], dtype="<f8"), np.asarray(other[rows], dtype="<f8")
+        rows: Any = slice(first, first + _ROWS_AT_ONCE) if one.ndim else ()
+        a, b = (np.asarray(of[rows].values, dtype="<f8") for of in (one, other))
         unequal = (a.view(np.int64) != b.view(np.int64)).reshape(max(len(a), 1) if a.ndim else 1, -1)
         if unequal.any():
             row, column = (int(i) for i in np.argwhere(unequal)[0])

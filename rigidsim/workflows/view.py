@@ -12,7 +12,6 @@ from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.store import atomic
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
-from rigidsim.store.viewing import drawn
 
 if TYPE_CHECKING:
     import xarray
@@ -134,8 +133,7 @@ def recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
         RunFolderError: a run can't be drawn.
     """
     if len(named) == 1:
-        run = named[0][1]
-        with drawn(run, run.folder if isinstance(run, SavedRun) else None) as timeline:
+        with named[0][1].recording() as timeline:
             yield timeline
         return
     from rigidsim.look.comparison import write_comparison

@@ -14,7 +14,6 @@ pytest.importorskip("rerun")
 import rigidsim
 from rigidsim.look.drawing import OLDER
 from rigidsim.look.recording import CHUNK, STRETCH
-from rigidsim.look.rows import Column, Rows
 from rigidsim.look.stages.bodies import plane_view
 from rigidsim.look.thinning import KeptRows, thin
 from rigidsim.look.timeline import write_timeline
@@ -41,15 +40,6 @@ def page(path: Path, name: str = "summary") -> str:
     return str(component(path, f"/{name}", "TextDocument:text")[0])
 
 
-def as_rows(dataset: xarray.Dataset) -> Rows:
-    columns = {
-        str(name): Column(str(name), tuple(map(str, variable.dims)), variable.attrs, variable.values, {})
-        for name, variable in dataset.variables.items()
-    }
-    coords = {name: columns.pop(name) for name in map(str, dataset.coords)}
-    return Rows(dataset.attrs, columns, coords)
-
-
 @pytest.mark.parametrize(("cuts", "rows"), [([1001], 77), ([1, 499, 500, 1], 100), ([300, 701], 2000)])
 def test_rows_kept_on_the_way_are_those_that_would_be_read(
     symmetric_top: Build, cuts: list[int], rows: int
@@ -62,8 +52,7 @@ def test_rows_kept_on_the_way_are_those_that_would_be_read(
         block = {name: dataset[name].values[first : first + size].reshape(size, -1) for name in names}
         kept.take(first, {**block, "time": block["time"][:, 0]})
         first += size
-    table = as_rows(dataset)
-    shown, wanted = thin(table, rows, kept=kept), thin(dataset, rows)
+    shown, wanted = thin(dataset, rows, kept=kept), thin(dataset, rows)
     assert list(shown.data_vars) == list(wanted.data_vars)
     for name in ("time", *shown.data_vars):
         assert shown[name].attrs == wanted[name].attrs
@@ -74,7 +63,7 @@ def test_rows_kept_on_the_way_are_those_that_would_be_read(
     assert late.columns(1001) is None
 
 
-def test_a_run_draws_what_it_kept(tmp_path: Path, read_back: Read, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_draws_what_it_kept(tmp_path: Path, read_back: Read) -> None:
     """And what is drawn from its dataset later is the same."""
     text = """
         name = "kept"
@@ -83,9 +72,7 @@ def test_a_run_draws_what_it_kept(tmp_path: Path, read_back: Read, monkeypatch: 
         time = {end = 20, samples = 20_003}
         output.timeline_rows = 300
     """
-    with monkeypatch.context() as patch:
-        patch.setattr(Column, "taken", None)  # nothing is read
-        run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
+    run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
     with run.dataset as dataset:
         assert write_timeline(dataset, tmp_path / "later.rrd", rows=300) == 300
     for entity in ("/scene/body", "/plots/angular_momentum", "/plots/drift/all"):

@@ -28,7 +28,7 @@ from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
-from rigidsim.store.validated_open import open_dataset
+from rigidsim.store.reader import open_dataset
 
 PRECISIONS = ['"single"', '"double"', '"extended"', '"quadruple"', "50"]
 PARTS = {'"single"': 1, '"double"': 1, '"extended"': 2, '"quadruple"': 3, "50": 4}

@@ -54,14 +54,12 @@ class SavedSweep:
         Raises:
             RunFolderError: the sweep isn't finished, or its dataset is damaged.
         """
-        import xarray
-
-        from rigidsim.store.xarray_reader import NetcdfBackend
+        from rigidsim.store.reader import open_dataset
 
         if not self.folder.dataset.exists():
             raise RunFolderError(f"{self.place}: has no dataset.h5 yet; {RESUME} completes it")
         self._refuse_damaged_dataset()
-        return xarray.open_dataset(self.folder.dataset, engine=NetcdfBackend, chunks=None)
+        return open_dataset(self.folder.dataset)
 
     def refuse_damaged(self) -> None:
         """Check the files of a complete sweep against their seals, which reads all of them.

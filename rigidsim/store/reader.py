@@ -1,0 +1,222 @@
+"""The one reader of datasets: a run's, a sweep's, or what the segments of an unfinished run hold, lazily.
+
+Files are opened with distrust. One may be torn, foreign, from a newer version, or made to hurt: declare rows
+that it doesn't hold (a few kilobytes that unpack to terabytes of zeros), or point to other files, whose
+content it would show as data. Whatever isn't a whole dataset of rigidsim is refused before it is read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import xarray
+from xarray.backends import AbstractDataStore, BackendArray
+from xarray.core import indexing
+
+from rigidsim.errors import RunFolderError
+from rigidsim.store.netcdf import reading, root_attributes
+from rigidsim.store.provenance import file_sha256
+from rigidsim.store.seal import check_whole, read_seal
+from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, is_bare_dimension
+
+_MOST_VARIABLES = 10_000
+_GROUPS = ("checkpoint", "events")
+
+
+def open_dataset(
+    path: Path, *more: Path, status: str | None = None, indexed: bool = True, decoded: bool = True
+) -> xarray.Dataset:
+    """A dataset, of which only the requested rows are read, whatever their number.
+
+    Args:
+        path: the file; whether its content is what its seal says has been checked already.
+        more: segments that follow, if it is one.
+        status: the run's status, in place of the file's attribute.
+        indexed: whether ``time`` becomes an index, which holds all sample times in memory.
+        decoded: whether dates become dates; otherwise every variable is as it is stored.
+
+    Returns:
+        Values beyond double precision have residuals beside them, see ``variables.parts_in``.
+
+    Raises:
+        RunFolderError: a file is damaged, foreign, of a newer schema version, or lacks what it declares.
+    """
+    try:
+        inspect(path)
+        options: Any = {"decode_cf": decoded, "create_default_indexes": indexed}
+        if more or status is not None:
+            opened = xarray.open_dataset(_Segments([path, *more], status), engine="store", **options)
+        else:
+            opened = xarray.open_dataset(path, engine="h5netcdf", **options)
+    except RunFolderError:
+        raise
+    except Exception as error:  # HDF5 and its readers raise many kinds on files that aren't whole
+        text = str(error).strip() or type(error).__name__
+        raise RunFolderError(f"{path}: can't be read ({text.splitlines()[0][:200]})") from None
+    return opened
+
+
+def refuse_damaged(path: Path, expected: str | None) -> None:
+    """Check a run's complete dataset against its seal; those of the first schema version have none.
+
+    Args:
+        expected: SHA-256 of the file, if the summary beside it gives one.
+
+    Raises:
+        RunFolderError: the file is damaged, edited, replaced, or of a newer version than this rigidsim.
+    """
+    try:
+        unsealed = read_seal(path) is None
+        digest = file_sha256(path) if unsealed else check_whole(path)[1]
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
+    labels = root_attributes(path)
+    version = labels.get("schema_version")
+    if not isinstance(version, int) or version > SCHEMA_VERSION:
+        raise RunFolderError(
+            f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
+            "install a newer one"
+        )
+    if version > 1 and unsealed:
+        raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
+    if "segment" in labels:
+        raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
+    refuse_other(path, digest, expected)
+
+
+def refuse_other(path: Path, digest: str, expected: str | None) -> None:
+    """Refuse a whole dataset that isn't the one of the summary beside it."""
+    if expected not in (None, digest):
+        raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
+
+
+def inspect(path: Path) -> None:
+    """Refuse a file whose content doesn't match what its metadata declare.
+
+    Raises:
+        RunFolderError: the content doesn't match.
+    """
+    if path.is_symlink():
+        raise RunFolderError(f"{path}: is a symbolic link; a run's files are files of its folder")
+    with h5py.File(path, "r") as file:
+        _check_version(file.attrs.get("schema_version"), path)
+        if len(file) > _MOST_VARIABLES:
+            raise RunFolderError(f"{path}: holds {len(file)} variables; it is no dataset of rigidsim")
+        of_sweep = file.attrs.get("kind") == "sweep"
+        for name in file:
+            link = file.get(name, getlink=True)
+            item = file[name] if isinstance(link, h5py.HardLink) else None
+            if name in _GROUPS and isinstance(item, h5py.Group):
+                continue  # of a segment; read by themselves, as plain numbers
+            if not isinstance(item, h5py.Dataset):
+                raise RunFolderError(f"{path}: {name!a} is no variable, but a link or a group")
+            if item.is_virtual or item.external:
+                raise RunFolderError(f"{path}: the variable {name!a} lies in another file")
+            if name in LABELS and item.shape != (len(LABELS[name]),):
+                raise RunFolderError(f"{path}: the coordinate {name} isn't labelled {LABELS[name]}")
+            names = item.ndim == 1 and item.dtype.kind == "O" and (of_sweep or name in OF_THE_RUN)
+            if name not in LABELS and not names:
+                _check_numbers(item, name, path)
+        if not of_sweep and ("time" not in file or file["time"].ndim != 1):
+            raise RunFolderError(f"{path}: has no coordinate time; it is no dataset of rigidsim")
+
+
+def _check_version(found: Any, path: Path) -> None:
+    """Refuse schema versions that this version of rigidsim doesn't know."""
+    version = found.item() if hasattr(found, "item") else found
+    if not isinstance(version, int) or isinstance(version, bool):
+        raise RunFolderError(f"{path}: names no schema version; it is no dataset of rigidsim")
+    if version > SCHEMA_VERSION:
+        raise RunFolderError(
+            f"{path}: has schema version {version}, newer than this rigidsim reads ({SCHEMA_VERSION}); "
+            "update rigidsim"
+        )
+    if version < 1:
+        raise RunFolderError(f"{path}: has schema version {version}, which never was one")
+
+
+def _check_numbers(item: Any, name: str, path: Path) -> None:
+    """Require that every declared row is stored, so that none is read as a fill value."""
+    if item.dtype.kind not in "fiuSOV" or item.dtype.hasobject:
+        raise RunFolderError(f"{path}: the variable {name!a} holds no numbers")
+    if name != "time" and is_bare_dimension(item):
+        return
+    size = item.size or 0
+    if item.chunks is None:
+        lacking = item.id.get_storage_size() < size * item.dtype.itemsize
+    else:
+        chunks = [-(-length // chunk) for length, chunk in zip(item.shape, item.chunks, strict=True)]
+        lacking = item.id.get_num_chunks() < math.prod(chunks)
+    if lacking:
+        raise RunFolderError(f"{path}: the variable {name!a} declares {size} numbers that it lacks")
+
+
+class _Segments(AbstractDataStore):
+    """Segments of an unfinished run as one file, for xarray."""
+
+    def __init__(self, paths: Sequence[Path], status: str | None) -> None:
+        self._paths, self._status = paths, status
+
+    def load(self) -> tuple[dict[str, xarray.Variable], dict[str, Any]]:
+        """Variables along time and labels, and the attributes of the first segment."""
+        rows = [root_attributes(path)["rows"] for path in self._paths]
+        starts = np.concatenate([[0], np.cumsum(rows)])
+        with open_dataset(self._paths[0], indexed=False, decoded=False) as first:
+            found: dict[str, xarray.Variable] = {}
+            unused = _not_begun(first, self._paths[-1])
+            for name, variable in first.variables.items():
+                if variable.dims[:1] == ("time",) and name not in unused:
+                    along = indexing.LazilyIndexedArray(_Joined(self._paths, starts, str(name), variable))
+                    found[str(name)] = xarray.Variable(variable.dims, along, variable.attrs)
+                elif name in LABELS or name in OF_THE_RUN:
+                    found[str(name)] = variable.load()
+            return found, dict(first.attrs, **({} if self._status is None else {"status": self._status}))
+
+
+def _not_begun(first: xarray.Dataset, last: Path) -> set[str]:
+    """Names of the variables of corrections put back in a run that ends before its projection begins: they
+    are zero throughout, and the dataset leaves them out.
+    """
+    if "hold_from_step" not in first.attrs:
+        return set()
+    names = {str(name) for name, variable in first.variables.items() if "put_back_of" in variable.attrs}
+    with reading(last) as file:
+        begun = any(file[name].shape[0] and float(file[name][-1]) != 0.0 for name in names)
+    return set() if begun else names
+
+
+class _Joined(BackendArray):
+    """One variable along all segments, read on access."""
+
+    def __init__(self, paths: Sequence[Path], starts: np.ndarray, name: str, like: xarray.Variable) -> None:
+        self._paths, self._starts, self._name = paths, starts, name
+        self.shape, self.dtype = (int(starts[-1]), *like.shape[1:]), like.dtype
+
+    def __getitem__(self, key: Any) -> Any:
+        basic = indexing.IndexingSupport.BASIC
+        return indexing.explicit_indexing_adapter(key, self.shape, basic, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> np.ndarray:
+        wanted, rest = key[0], key[1:]
+        if not isinstance(wanted, slice):
+            row = range(self.shape[0])[wanted]
+            return np.asarray(self._rows(range(row, row + 1), rest)[0])
+        rows = range(*wanted.indices(self.shape[0]))
+        return self._rows(rows, rest) if rows.step > 0 else self._rows(rows[::-1], rest)[::-1]
+
+    def _rows(self, rows: range, rest: tuple[Any, ...]) -> np.ndarray:
+        """Rows, from the segments that hold them."""
+        pieces: list[np.ndarray] = []
+        for path, start, stop in zip(self._paths, self._starts[:-1], self._starts[1:], strict=True):
+            first, end = (-(-max(edge - rows.start, 0) // rows.step) for edge in (start, stop))
+            inside = rows[first:end]
+            if len(inside) or (not pieces and path == self._paths[-1]):
+                part = slice(inside.start - start, inside.stop - start, inside.step) if inside else slice(0)
+                with reading(path) as file:
+                    pieces.append(np.asarray(file[self._name][(part, *rest)]))
+        return np.concatenate(pieces)
