@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import mpmath
 import numpy as np
 import pytest
 from equations import EPS, Random, matrix
@@ -12,7 +11,7 @@ from scipy.integrate import solve_ivp
 from support import config
 
 from rigidsim.errors import ConfigError
-from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
+from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, nutation, plane_vectors, second_order
 from rigidsim.model.averaged.spectrum import body_spectrum
 from rigidsim.scene.arithmetic import context_for, dot
@@ -86,40 +85,6 @@ def test_the_tensor_turns_as_its_harmonics_say(momentum: list[float]) -> None:
         assert np.abs(integral).max() < 10
 
 
-def test_principal_rotation_has_the_moments_themselves() -> None:
-    about = {0: 1.0 - (2.0 + 2.5) / 2, 2: 2.5 - (1.0 + 2.0) / 2}
-    for axis, excess in about.items():
-        momentum = [0.0, 0.0, 0.0]
-        momentum[axis] = -2.0
-        motion = motion_of(momentum)
-        assert motion.excess == excess  # three dyadic numbers
-        assert motion.parameter == 0
-        assert float(motion.precession_rate) > 0
-    symmetric = motion_of([0.6, 0.0, 0.8], np.array([1.0, 1.0, 1.5]))
-    # (C - A) (3 cos^2 J - 1) / 2
-    assert float(symmetric.excess) == pytest.approx(0.5 * (3 * 0.64 - 1) / 2, rel=10 * EPS)
-    assert symmetric.symmetric
-
-
-def test_nothing_averages_about_the_intermediate_axis() -> None:
-    with pytest.raises(Separatrix):
-        motion_of([0.0, 1.0, 0.0])
-
-
-def test_small_wobbles_lose_no_digits() -> None:
-    """<sn^2> of a parameter of 1e-30 is a half less 1e-30 / 16, whatever the precision."""
-    context = context_for("quadruple")
-    tilted = free_motion(context, body(MOMENTS), [context.mpf("1e-15"), context.zero, context.one])
-    share = tilted.squares[0] + tilted.squares[1]
-    with mpmath.workprec(context.prec):
-        # to first order in the squared tilt a: M1^2 / 2 + M2^2 / 2 with (L^2 - 2 E I3) / L^2 = a (1 - 2.5)
-        expected = mpmath.mpf("1e-30") * (1 + 1.5 * 2 / 0.5) / 2
-        assert abs(share / expected - 1) < 1e-28
-
-
-ORBIT = {"eccentricity": "0.3", "inclination": "0.4", "node": "0.7", "periapsis": "1.1", "anomaly": "0.2"}
-
-
 def orbit(eccentricity: str) -> KeplerOrbit:
     m = CONTEXT.mpf
     values = [m(eccentricity), m("0.4"), m("0.7"), m("1.1"), m("0.2")]
@@ -158,18 +123,6 @@ def rate(eccentricity: str, time: float, s: np.ndarray = S) -> np.ndarray:
     normal = np.array([float(x) for x in orbit(eccentricity).normal(CONTEXT)])
     whole = 3 * np.cross(source(eccentricity, time)[0] @ s, s)
     return np.asarray(whole + 3 * mean * (normal @ s) * np.cross(normal, s))
-
-
-@pytest.mark.parametrize("eccentricity", ["0", "0.3", "0.8"])
-def test_the_nutation_is_what_the_mean_leaves_of_the_torque(eccentricity: str) -> None:
-    for time in (0.1, 0.5, 1.3, 2.2):
-        step = 1e-5
-        slope = (nod(eccentricity, time + step) - nod(eccentricity, time - step)) / (2 * step)
-        # third derivatives of (a/r)^3, which is 125 at the pericentre of e = 0.8, times step^2 / 6
-        np.testing.assert_allclose(slope, rate(eccentricity, time), atol=1e-7)
-    # one turn takes pi; 400 points resolve harmonics to e^400 of an analytic function
-    turn = np.linspace(0, np.pi, 400, endpoint=False)
-    np.testing.assert_allclose(np.mean([nod(eccentricity, t) for t in turn], axis=0), 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("eccentricity", ["0", "0.3", "0.6"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import mpmath
 import numpy as np
 import pytest
 from equations import EPS, Random, derivative, matrix
@@ -13,18 +12,13 @@ from support import config
 
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.driven import Driven
-from rigidsim.model.averaged.polhode import mean_square_sine, means_needed, nodes_needed
 from rigidsim.scene.config import parse
-from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
-PARAMETERS = [0.0, 1e-12, 0.3, 0.9, 0.98]
 MOMENTS, RATES = [1.7, 1.0, 2.0], [0.4, 0.5, 1.2]
 DAMPING = [1e-4, 2e-4, 1.5e-4]
 VISCOUS = 'kind = "viscous_torque"\ncoefficients = [1e-4, 2e-4, 1.5e-4]'
 AS_FORMULAS = 'kind = "torque"\ncomponents = ["-1e-4*wx", "-2e-4*wy", "-1.5e-4*wz"]'
-DRAG = """kind = "torque"
-components = ["-1e-4*wx*sqrt(wx^2 + wy^2)", "-2e-4*wy^3 + 1e-5", "-1.5e-4*wz + 2e-5*wx*wy"]"""
 Q = Random(5).quaternion()
 
 
@@ -54,72 +48,6 @@ def driven(problem: InitialValueProblem) -> Driven:
 # --- means over a polhode ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("parameter", PARAMETERS)
-@pytest.mark.parametrize("digits", [15, 33])
-def test_the_mean_of_the_squared_sine_is_that_of_elliptic_integrals(parameter: float, digits: int) -> None:
-    epsilon = 10.0**-digits
-    with mpmath.workdps(digits + 30):
-        k2 = mpmath.mpf(parameter)
-        first, second = mpmath.ellipk(k2), mpmath.ellipe(k2)
-        exact = (first - second) / (k2 * first) if parameter else mpmath.mpf(1) / 2
-        found = mean_square_sine(k2, mpmath.sqrt, means_needed(parameter, epsilon))
-        # beyond the means' own bound only the working digits, of which k^2 of 1e-12 costs the exact one some
-        assert abs(found - exact) < 2 * epsilon
-        if parameter == 0.98:  # and fewer wouldn't do
-            assert abs(mean_square_sine(k2, mpmath.sqrt, 2) - exact) > epsilon
-
-
-def test_a_torque_whose_mean_vanishes_leaves_the_amplitudes() -> None:
-    """wx wy has one sign in as many quarters of a turn as the other."""
-    odd = 'kind = "torque"\ncomponents = ["0", "0", "1e-4*wx*wy"]'
-    problem = prepared(odd)
-    changes = driven(problem).torques.mean(1.3, 0.4, 64)
-    assert np.abs(changes).max() < 1e-4 * EPS
-
-
-@pytest.mark.parametrize("parameter", PARAMETERS)
-@pytest.mark.parametrize("digits", [15, 33])
-def test_sums_over_nodes_err_by_less_than_their_bound(parameter: float, digits: int) -> None:
-    """<1 / dn> over the amplitude is 2 K / pi."""
-    with mpmath.workdps(digits + 10):
-        k2, count = mpmath.mpf(parameter), nodes_needed(parameter, 10.0**-digits)
-        angles = [2 * mpmath.pi * (j + mpmath.mpf(1) / 2) / count for j in range(count)]
-        found = sum(1 / mpmath.sqrt(1 - k2 * mpmath.sin(f) ** 2) for f in angles) / count
-        assert abs(found - 2 * mpmath.ellipk(k2) / mpmath.pi) < mpmath.mpf(10) ** -digits
-
-
-def amplitudes(moments: np.ndarray, momentum: np.ndarray) -> np.ndarray:
-    """P and Q from energy and size of the momentum, the third axis being circled."""
-    first, second, third = moments
-    size, twice = float(momentum @ momentum), float(momentum @ (momentum / moments))
-    across = (twice - size / third) / (1 / second - 1 / third)
-    ratio = first * (second - third) / (second * (first - third))
-    return np.array([math.sqrt(size - ratio * across), math.sqrt(across)])
-
-
-@pytest.mark.parametrize("rates", [RATES, [0.1, 1.5, 0.2]], ids=["short axis", "long axis"])
-def test_torques_change_the_amplitudes_as_they_change_energy_and_momentum(rates: list[float]) -> None:
-    """P' and Q' at places of the polhode against differences of energy and size of the momentum."""
-    problem = prepared(DRAG, rates=rates)
-    of = driven(problem)
-    unit = 2.0**-problem.system.scaling.inertia
-    moments = np.array([float(x) for x in of.polhodes.moments]) * unit
-    axial, transverse = of.course.amplitudes[0]
-    ratio = float(of.polhodes.ratio)
-    for angle in (0.2, 1.5, 2.9, 4.4):
-        delta = math.sqrt(1 - (1 - ratio) * (transverse / axial * math.sin(angle)) ** 2)
-        parts = [math.sqrt(ratio) * transverse * math.cos(angle), transverse * math.sin(angle), axial * delta]
-        momentum = np.array(parts)
-        np.testing.assert_allclose(amplitudes(moments, momentum), [axial, transverse], rtol=1e-12)
-        torque = of.torques.at(momentum[:, None])[:, 0]
-        step = 1e-5 / np.abs(torque).max()
-        ahead, behind = (amplitudes(moments, momentum + s * step * torque) for s in (1, -1))
-        slope = (ahead - behind) / (2 * step)
-        found = of.torques.change(axial, transverse, np.array([angle]))[:, 0]
-        # central differences over 1e-5 of the momentum: its square, and rounding over it
-        np.testing.assert_allclose(found, slope, atol=1e-8 * np.abs(torque).max())
-
-
 def test_a_viscous_torque_averages_to_the_same_by_closed_means_and_by_nodes() -> None:
     for rates in (RATES, [0.1, 1.5, 0.2]):
         closed, summed = (prepared(loads, rates=rates).system for loads in (VISCOUS, AS_FORMULAS))
@@ -130,20 +58,6 @@ def test_a_viscous_torque_averages_to_the_same_by_closed_means_and_by_nodes() ->
         assert (one[3:] < 0).all()
         # sums of some hundred terms
         np.testing.assert_allclose(other[3:], one[3:], rtol=50 * EPS)
-
-
-def test_more_digits_take_more_nodes_and_agree() -> None:
-    double, quadruple = (prepared(AS_FORMULAS, precision=p) for p in ("double", "quadruple"))
-    assert driven(quadruple).course.nodes > 1.5 * driven(double).course.nodes
-    closed = prepared(VISCOUS, precision="quadruple")
-    found = []
-    for problem in (closed, quadruple):
-        of, system = problem.precision, problem.system
-        rates = compiled_function([r for _, r in system.equations], system.variables, **of.options)
-        found.append(
-            [of.exact(x) for x in rates(of.array(closed.system.initial), time=of.number(mpmath.mpf(0)))]
-        )
-    assert all(abs(x - y) <= 1e-31 * abs(x) for x, y in zip(*found, strict=True))
 
 
 # --- the start ----------------------------------------------------------------------------------------------
@@ -211,13 +125,6 @@ def test_what_has_no_average_is_refused_with_the_reason(given: dict[str, object]
         prepared(**given)  # type: ignore[arg-type]
     assert said in str(found.value)
     assert "choose" in str(found.value)
-
-
-def test_what_torques_do_within_a_rotation_is_not_added_back() -> None:
-    with pytest.raises(
-        ConfigError, match=r"\[model\] short_period: given true, but what viscous_torque does"
-    ):
-        prepared(more="short_period = true")
 
 
 def test_the_time_at_which_the_separatrix_comes_near_is_told() -> None:

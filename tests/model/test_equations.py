@@ -16,7 +16,6 @@ from equations import (
     array,
     derivative,
     general_body,
-    internal,
     matrix,
     observed,
     prepared,
@@ -32,22 +31,7 @@ from rigidsim.solve.problem import prepare
 # ---- (a) Euler's equations --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(10))
-@pytest.mark.parametrize("size", [1.0, 1e-6, 3e5])
-def test_free_rotation_in_any_body_axes(seed: int, size: float) -> None:
-    """I w' = (I w) x w."""
-    random = Random(seed)
-    tensor, start = random.tensor(), random.vector(size)
-    system = prepared(
-        general_body(tensor), f"angular_velocity = {array(start)}", integrator='formulation = "rates"'
-    ).system
-    w = random.vector(size)
-    expected = np.linalg.solve(tensor, np.cross(tensor @ w, w))
-    amplification = np.linalg.cond(tensor) * size**2
-    np.testing.assert_allclose(derivative(system, w), expected, rtol=0, atol=CLOSE * amplification)
-
-
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles", "rates"])
 def test_gravity_about_a_fixed_point(seed: int, formulation: str) -> None:
     """I w' = (I w) x w + com x (M R^T g), and of the vertical alone g' = g x w (Euler-Poisson)."""
@@ -87,36 +71,6 @@ def test_two_loads_of_gravity_add_up() -> None:
     assert scene.scene.gravity == [0, 3, -4]
     got = derivative(scene.system, np.array([0, 0, 0, 1.0, 0, 0, 0]))
     np.testing.assert_allclose(got[:3], [-3.0, 0, 0], atol=CLOSE)  # com x g = (-3, 0, 0) over I = 1
-
-
-def test_principal_axes_have_no_cross_terms() -> None:
-    """A zero product of inertia adds nothing: w1' is a multiple of w2 w3."""
-    system = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [1, 1, 1]").system
-    names = ["wx", "wy", "wz"]
-    for i, (_, rhs) in enumerate(system.equations[:3]):
-        assert hy.get_variables(rhs) == [name for name in names if name != names[i]]
-        product = hy.make_vars(names[(i + 1) % 3]) * hy.make_vars(names[(i + 2) % 3])
-        ratio = hy.cfunc([rhs / product], hy.make_vars(*names))
-        coefficients = ratio(np.array([[0.5, 2.0], [0.25, 8.0], [4.0, 1.0]]))[0]
-        moments = np.array([1, 2, 2.5])
-        j, k = (i + 1) % 3, (i + 2) % 3
-        np.testing.assert_allclose(coefficients, (moments[j] - moments[k]) / moments[i], rtol=4 * EPS)
-
-
-def test_symmetric_top_keeps_its_spin_and_a_sphere_all_rates() -> None:
-    top = prepared("principal_moments = [1, 1, 2]", "angular_velocity = [1, 1, 1]").system
-    assert [str(rhs) == "0.0000000000000000" for _, rhs in top.equations[:3]] == [False, False, True]
-    ball = prepared("principal_moments = [2, 2, 2]", "angular_velocity = [1, 1, 1]").system
-    assert [hy.get_variables(rhs) for _, rhs in ball.equations[:3]] == [[], [], []]
-
-
-def test_products_of_inertia_do_add_cross_terms() -> None:
-    """The counterpart of the test on principal axes: the same body turned needs all rates."""
-    system = prepared(
-        "inertia_tensor = [[1, 0.1, 0.2], [0.1, 2, 0.3], [0.2, 0.3, 2.5]]", "angular_velocity = [1, 1, 1]"
-    ).system
-    for _, rhs in system.equations[:3]:
-        assert hy.get_variables(rhs) == ["wx", "wy", "wz"]
 
 
 def test_a_rod_gains_no_spin() -> None:
@@ -170,46 +124,6 @@ def test_euler_kinematics(sequence: str) -> None:
             assert mpmath.mnorm(change - expected, mpmath.inf) <= 4 * CLOSE
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_quaternion_kinematics(seed: int) -> None:
-    """q' = q (0, w) / 2."""
-    random = Random(200 + seed)
-    system = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [0.1, 1, 0.05]").system
-    w, q = random.vector(), random.quaternion()
-    got = derivative(system, np.concatenate([w, q]))[3:]
-    vector = q[0] * w + np.cross(q[1:], w)
-    expected = 0.5 * np.concatenate([[-q[1:] @ w], vector])
-    np.testing.assert_allclose(got, expected, rtol=0, atol=CLOSE)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_matrix_kinematics(seed: int) -> None:
-    """R' = R [w]x."""
-    random = Random(300 + seed)
-    system = prepared(
-        "principal_moments = [1, 2, 2.5]",
-        "angular_velocity = [0.1, 1, 0.05]",
-        integrator='formulation = "rotation_matrix"',
-    ).system
-    w, r = random.vector(), matrix(random.quaternion())
-    got = derivative(system, np.concatenate([w, r.ravel()]))[3:]
-    np.testing.assert_allclose(got.reshape(3, 3), r @ skew(w), rtol=0, atol=CLOSE)
-
-
-@pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rotation_matrix"])
-def test_all_formulations_start_from_one_attitude(formulation: str) -> None:
-    q = Random(5).quaternion()
-    system = prepared(
-        "principal_moments = [1, 2, 2.5]",
-        f"angular_velocity = [0.1, 1, 0.05]\nquaternion = {array(q)}",
-        record='["rotation_matrix"]',
-        integrator=f'formulation = "{formulation}"',
-    ).system
-    start = np.ldexp(np.array([float(x) for x in system.initial]), system.state_exponents)
-    got = observed(system, start)["rotation_matrix"].reshape(3, 3)
-    np.testing.assert_allclose(got, matrix(q), rtol=0, atol=CLOSE)
-
-
 def test_free_flight() -> None:
     """x' = v, v' = g, and gravity doesn't turn the body."""
     random = Random(11)
@@ -230,7 +144,7 @@ def test_free_flight() -> None:
 # ---- (d) observables --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("size", [1.0, 1e-5])
 def test_observables_of_a_heavy_body(seed: int, size: float) -> None:
     random = Random(400 + seed)
@@ -259,7 +173,7 @@ def test_observables_of_a_heavy_body(seed: int, size: float) -> None:
     )
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_observables_of_a_body_in_flight(seed: int) -> None:
     random = Random(500 + seed)
     tensor, mass, pull = random.tensor(), 3.3, random.vector(9)
@@ -284,16 +198,6 @@ def test_observables_of_a_body_in_flight(seed: int) -> None:
     np.testing.assert_allclose(got["energy"], total, rtol=0, atol=CLOSE * scale)
 
 
-@pytest.mark.parametrize(
-    ("axis", "moments"), [([1, 0, 0], "[3, 2, 2]"), ([0, 1, 0], "[2, 3, 2]"), ([0, 0, 1], "[2, 2, 3]")]
-)
-def test_axial_momentum_is_along_the_symmetry_axis(axis: list[int], moments: str) -> None:
-    system = prepared(f"principal_moments = {moments}", "angular_velocity = [1, 2, 3]").system
-    w = np.array([0.3, -0.4, 0.5])
-    got = observed(system, np.concatenate([w, [1, 0, 0, 0]]))["angular_momentum_axial"]
-    np.testing.assert_allclose(got, 3 * w @ axis, rtol=4 * EPS)
-
-
 def test_axial_momentum_of_a_tilted_body() -> None:
     """The axis is found in a tensor of general axes; its sign is a matter of convention."""
     random = Random(17)
@@ -310,8 +214,10 @@ def test_axial_momentum_of_a_tilted_body() -> None:
     assert np.linalg.norm(tensor @ axis - 3 * axis) <= CLOSE
 
 
-@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
-@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix"])
+@pytest.mark.parametrize(
+    ("formulation", "sequence"),
+    [*(("quaternion", sequence) for sequence in EULER_SEQUENCES), ("rotation_matrix", "zyx")],
+)
 def test_euler_angles_from_another_formulation(sequence: str, formulation: str) -> None:
     random = Random(23)
     system = prepared(
@@ -430,28 +336,6 @@ def test_only_what_is_needed_is_carried_and_each_has_a_reason(case: str) -> None
     assert ("attitude" in left_out) == (not {QUATERNION, ANGLES, NINE} & set(groups))
 
 
-def test_counts_of_states() -> None:
-    counts = {case: len(prepared(*NEEDS[case][:4], f'formulation = "{NEEDS[case][4]}"').system.states)
-              for case in NEEDS}  # fmt: skip
-    assert counts["rates alone"] == 3
-    assert counts["everything"] == 7
-    assert counts["Euler angles"] == counts["heavy top's rates"] == 6
-    assert counts["rotation matrix"] == counts["flight in Euler angles"] == 12
-    assert counts["flight"] == 13
-    assert counts["flight in a matrix"] == 18
-
-
-def test_reasons_name_what_asked() -> None:
-    recorded = prepared(FREE, SPIN, record='["quaternion", "energy"]').system
-    assert dict(recorded.reasons)[QUATERNION] == "quaternion is recorded"
-    heavy = prepared(HEAVY, SPIN, GRAVITY, record='["angular_velocity"]').system
-    assert "Euler-Poisson" in dict(heavy.reasons)[VERTICAL]
-    asked = prepared(FREE, SPIN, integrator='formulation = "euler_angles"').system
-    reasons = [why for states, why in asked.reasons if states == ANGLES]
-    assert '"euler_angles" asks for it' in reasons[0]
-    assert "near the singularity of zxz: angles of zxy" in reasons[1]
-
-
 # ---- (f) exactly the invariants that hold -----------------------------------------------------------------
 
 DOWN = np.array([0, 0, -9.80665])
@@ -565,28 +449,6 @@ def test_exactly_what_is_conserved_is_listed(case: str) -> None:
     assert gone == found.keys() - expected
 
 
-@pytest.mark.parametrize("case", SCENES)
-def test_listed_expressions_are_what_stays(case: str) -> None:
-    """The expressions themselves, whose drift the summary reports, along the same motion."""
-    moments, center, initial, gravity, _ = SCENES[case]
-    table = f"principal_moments = {array(moments)}\nmass = 1\ncenter_of_mass = {array(center)}"
-    system = prepared(table, initial, GRAVITY if gravity else "", end=END).system
-    states = motion(system)
-    inside = np.ascontiguousarray(internal(system, states).T)
-    for invariant in system.invariants:
-        values = hy.cfunc(invariant.expressions, system.variables)(inside)
-        scale = np.ldexp(float(invariant.scale), -invariant.exponents[0])
-        drift = np.linalg.norm(values - values[:, :1], axis=0) / scale
-        assert np.max(drift) < bound(states)
-        assert invariant.scale > 0
-        assert invariant.scale_name
-
-
-def test_zero_gravity_is_no_force() -> None:
-    system = prepared(FREE, FLIGHT, GRAVITY + "acceleration = [0, 0, 0]").system
-    assert "linear_momentum" in {i.name for i in system.invariants}
-
-
 @pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "rates"])
 def test_numerical_invariants(formulation: str) -> None:
     """A quaternion's norm and a matrix's orthogonality hold by definition, and are told apart."""
@@ -608,23 +470,6 @@ def test_numerical_invariants(formulation: str) -> None:
         assert abs(seen - np.sqrt(3) * 0.0201) <= CLOSE
     else:
         assert abs(seen - 0.01) <= CLOSE
-
-
-def test_drifts_are_relative_to_the_scale() -> None:
-    """(value - initial) / scale: zero at the start, and as in numpy elsewhere."""
-    system = prepared(FREE, SPIN).system
-    start = np.array([float(x) for x in system.initial])
-    components = [x for invariant in system.invariants for x in invariant.expressions]
-    begin = hy.cfunc(components, system.variables)(start)
-    drifts = hy.cfunc(system.outputs[-len(system.invariants) :], system.variables)
-    np.testing.assert_array_equal(drifts(start, pars=begin), 0)
-    moved = start.copy()
-    moved[:3] *= 1.5  # momentum grows by one half, energy by 5/4
-    got = dict(zip([i.name for i in system.invariants], drifts(moved, pars=begin), strict=True))
-    assert got["angular_momentum"] == pytest.approx(0.5, rel=CLOSE)
-    assert got["angular_momentum_norm"] == pytest.approx(0.5, rel=CLOSE)
-    assert got["energy"] == pytest.approx(1.25, rel=CLOSE)
-    assert abs(got["quaternion_norm"]) <= CLOSE
 
 
 # ---- (g) units of powers of two ---------------------------------------------------------------------------
@@ -698,13 +543,6 @@ def test_powers_of_two_change_no_bit(kind: str, inertia: int, rate: int) -> None
             }
             if recorded.name in shift:
                 assert recorded.exponents == [e + shift[recorded.name] for e in by_name[recorded.name]]
-
-
-def test_another_factor_does_change_the_equations() -> None:
-    """The counterpart: a scene that isn't a scaled copy has other equations."""
-    free = prepared(FREE, SPIN).system
-    other = prepared("principal_moments = [1, 2, 2.75]\nmass = 1", SPIN).system
-    assert free.equations != other.equations
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 1e6])

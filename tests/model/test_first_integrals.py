@@ -9,7 +9,6 @@ from equations import EPS, array, matrix, prepared
 from scipy.spatial.transform import Rotation
 from support import cases
 
-from rigidsim.errors import ConfigError
 from rigidsim.model.system import System
 
 PULL = 'kind = "uniform_gravity"\nacceleration = [0, 0, -2]'
@@ -142,26 +141,6 @@ def test_general_body_axes_have_the_constants_too() -> None:
     frame = np.array([[0, 1, 0], np.cross(axis, [0, 1, 0]), axis])
     values = constants(states, frame, 1.0, verticals(system, states))["kovalevskaya_constant"]
     assert np.ptp(values) < 50 * EPS * np.sqrt(200) * 10
-
-
-@pytest.mark.parametrize(
-    ("ratio", "center", "extra"),
-    [
-        (2.002, [1, 0, 0], ""),
-        (2.0, [1, 0, 0.01], ""),
-        (2.0, [1, 0, 0], '\n[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.01, 0, 0]'),
-    ],
-)
-def test_kovalevskayas_constant_leaves(ratio: float, center: list[float], extra: str) -> None:
-    """A moment, the centre of mass or a further load: not listed any more, and it drifts."""
-    system = top(ratio, 2, center, [0.4, 0.9, 0.7], loads=PULL + extra)
-    assert named(system) == set()
-    states = travel(system)
-    frame = np.eye(3)
-    k = 0.5 * 2 * np.hypot(center[0], center[2])
-    assert np.ptp(constants(states, frame, k, verticals(system, states))["kovalevskaya_constant"]) > 1e-4
-    with pytest.raises(ConfigError, match="this scene has none"):
-        top(ratio, 2, center, [0.4, 0.9, 0.7], record='["kovalevskaya_constant"]', loads=PULL + extra)
 
 
 def test_other_tops_have_neither() -> None:

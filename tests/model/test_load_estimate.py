@@ -49,22 +49,6 @@ def test_a_push_to_and_fro_does_not_add_up(frequency: float, end: float) -> None
     assert true / 4 < gained(f"sin({frequency}*t)", end=end) < 40 * true
 
 
-def test_damping_adds_nothing() -> None:
-    assert gained("-0.3*wz", initial=SPIN) == 0
-    assert gained("-0.3*wz^3", initial=SPIN) == 0
-
-
-def test_a_load_that_is_zero_is_none() -> None:
-    for load in (
-        'kind = "torque"\ncomponents = [0, "1 - 1", "0*2"]',
-        'kind = "viscous_torque"\ncoefficients = [0, 0, 0]',
-    ):
-        system = prepared(BODY, SPIN, load).system
-        assert system.scaling.drive is None
-        assert "work" not in system.states
-        assert {"energy", "angular_momentum"} <= {i.name for i in system.invariants}
-
-
 @pytest.mark.parametrize("size", ["1e-9", "1", "1e9"])
 def test_a_body_at_rest_is_measured_by_what_drives_it(size: str) -> None:
     """Whatever the size of the torque: the same relative drifts, and no warning without a cause."""
@@ -124,13 +108,3 @@ def test_plan_with_loads_from_python() -> None:
     assert [i["name"] for i in found["invariants"] if not i["numerical"]] == ["energy_balance"]
     alone = rigidsim.plan(rigidsim.parse(FREE))
     assert "work" not in alone["states"]
-
-
-def test_a_push_of_the_centre_of_mass() -> None:
-    flight = REST + "\nposition = [0, 0, 0]\nvelocity = [0, 0, 0]"
-    load = 'kind = "force"\ncomponents = [4, 0, 0]'
-    system = prepared(BODY + "\nmass = 2", flight, load, end=10.0).system
-    assert system.scaling.drive is not None
-    assert float(system.scaling.drive.speed) == pytest.approx(20, rel=0.5)
-    assert 16 <= 2.0**system.scaling.speed <= 64
-    assert 64 <= 2.0**system.scaling.length <= 1024

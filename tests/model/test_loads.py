@@ -88,7 +88,7 @@ def quaternions(system: System, states: np.ndarray) -> np.ndarray:
 # ---- (a) gravity gradient ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(1))
 @pytest.mark.parametrize("shape", ["circular", "eccentric", "moving", "period"])
 def test_gradient_torque_of_a_body_on_an_orbit(seed: int, shape: str) -> None:
     """Along the motion, from a start that isn't zero, the torque is that of an independent Kepler orbit."""
@@ -142,7 +142,7 @@ def test_eccentric_anomaly_solves_keplers_equation() -> None:
             assert abs(residual) < 1e-18
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(1))
 def test_several_sources_add_up(seed: int) -> None:
     random = Random(1100 + seed)
     tensor, w, q = random.tensor(), random.vector(), random.quaternion()
@@ -164,15 +164,6 @@ def test_several_sources_add_up(seed: int) -> None:
     np.testing.assert_allclose(
         derivative(system, state)[:3], turning(tensor, w, torque), rtol=0, atol=CLOSE * size
     )
-
-
-def test_two_orbits_have_states_of_their_own() -> None:
-    loads = (
-        gradient(1.0, {"semi_major_axis": 1.0}) + "\n[[loads]]\n" + gradient(2.0, {"semi_major_axis": 3.0})
-    )
-    start = "angular_velocity = [0, 0.1, 1]"
-    states = prepared("principal_moments = [1, 2, 2.5]", start, loads).system.states
-    assert len(set(states)) == len(states) == 3 + 4 + 2 + 2 + 1  # and the work
 
 
 def test_fixed_source_keeps_energy() -> None:
@@ -276,7 +267,7 @@ def central_potential(x: Any, r: Any, tensor: Any, mass: float, strength: float)
     return -strength * mass / distance - strength / (2 * distance**3) * bracket
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_central_force_and_torque_are_gradients_of_the_potential(seed: int) -> None:
     random = Random(1200 + seed)
     tensor, mass, strength = random.tensor(), 1.7, 3.0
@@ -333,7 +324,7 @@ end = 30
 """
 
 
-@pytest.mark.parametrize("formulation", ["rotation_matrix", "euler_angles"])  # others: test_conservation
+@pytest.mark.parametrize("formulation", ["rotation_matrix"])  # others: test_conservation
 def test_central_gravity_keeps_energy_and_total_momentum(formulation: str) -> None:
     run = run_text(CENTRAL, f'integrator.formulation="{formulation}"', 'integrator.euler_sequence="zxz"')
     assert run.status == "finished"
@@ -425,7 +416,7 @@ samples = 2001
 # ---- (f) expressions --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(1))
 @pytest.mark.parametrize("frame", ["body", "space"])
 def test_torque_of_expressions(seed: int, frame: str) -> None:
     random = Random(1300 + seed)
@@ -488,8 +479,9 @@ def test_force_about_a_fixed_point() -> None:
         np.testing.assert_allclose(got[:3], expected, rtol=0, atol=CLOSE * 5)
 
 
-@pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rotation_matrix"])
-@pytest.mark.parametrize("sequence", ["zxz", "zyx", "xyz"])
+@pytest.mark.parametrize(
+    ("formulation", "sequence"), [("quaternion", "zxz"), ("euler_angles", "zyx"), ("rotation_matrix", "xyz")]
+)
 def test_a_load_reads_the_attitude_and_the_path(formulation: str, sequence: str) -> None:
     random = Random(1500)
     angles, w, x, v = [0.4, 0.7, -0.3], random.vector(), random.vector(), random.vector()
@@ -506,26 +498,6 @@ def test_a_load_reads_the_attitude_and_the_path(formulation: str, sequence: str)
     torque = np.array([qw * qx, np.sin(angles[0]) - np.sin(angles[2]) * angles[1], x[0] * qw * qz + qy**2])
     expected = turning(np.diag([1, 2, 2.5]), w, torque)
     np.testing.assert_allclose(derivative(system, state)[:3], expected, rtol=0, atol=CLOSE)
-
-
-def test_time_of_a_load_is_the_scenes() -> None:
-    """A run that starts at 3 s feels the torque of 3 s: w = w0 + (1 - cos) in closed form."""
-    text = """name = "pushed"
-[body]
-principal_moments = [1, 1, 1]
-[initial]
-angular_velocity = [0, 0, 0.5]
-[[loads]]
-kind = "torque"
-components = [0, 0, "sin(t)"]
-[time]
-start = 3
-end = 12
-"""
-    dataset = run_text(text).dataset
-    time = dataset["time"].values
-    expected = 0.5 + np.cos(3) - np.cos(time)
-    np.testing.assert_allclose(dataset["angular_velocity"].values[:, 2], expected, rtol=0, atol=50 * EPS)
 
 
 # ---- (g) what loads require -------------------------------------------------------------------------------
@@ -563,21 +535,6 @@ def test_loads_that_read_the_attitude_say_so(title: str, load: str) -> None:
     assert why == f"{title} reads it"
     with pytest.raises(ConfigError, match=f'given "rates", but {title} reads the attitude; choose "auto"'):
         prepared(FREE, turned, load, integrator='formulation = "rates"')
-
-
-def test_reasons_name_every_load_that_reads() -> None:
-    flight = SPIN + "\nposition = [2, 0, 0]\nvelocity = [0, 0.7, 0]"
-    central = 'kind = "central_gravity"\ngravitational_parameter = 1'
-    system = prepared(FREE, flight, central, record='["angular_velocity"]').system
-    reasons = dict(system.reasons)
-    assert reasons["qw qx qy qz"] == "central_gravity reads it"
-    assert reasons["x y z vx vy vz"] == "central_gravity reads them"
-    both = prepared(FREE, SPIN, READERS["torque"][0] + "\n[[loads]]\n" + fixed_source(1.0, [1, 2, 3]),
-                    record='["angular_velocity"]').system  # fmt: skip
-    assert dict(both.reasons)["qw qx qy qz"] == "torque, gravity_gradient reads it"
-    moving = {"semi_major_axis": 1.0, "inclination": 0.4, "node_rate": 0.1}
-    orbit = prepared(FREE, SPIN, gradient(1.0, moving)).system
-    assert "cos_anomaly1 sin_anomaly1 cos_node1 sin_node1" in dict(orbit.reasons)
 
 
 # ---- (h) exactly the invariants that hold -----------------------------------------------------------------

@@ -126,18 +126,3 @@ def test_events_read_the_attitude_in_space() -> None:
 def test_elsewhere_the_attitude_in_space_is_carried(loads: str, integrator: str) -> None:
     system = prepared(BODY, SPIN, loads, integrator=integrator).system
     assert "pw" not in system.states
-
-
-def test_a_load_in_body_axes_leaves_the_orbital_frame() -> None:
-    """Damping reads the rates alone."""
-    loads = orbit_load() + '\n[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.1, 0, 0]'
-    assert "pw" in prepared(BODY, SPIN, loads).system.states
-
-
-def test_only_the_orbits_own_states_know_the_orbit() -> None:
-    """The motion in the orbital frame doesn't depend on the orbit's phase: shifted, it is the same."""
-    system = prepared(BODY, SPIN, orbit_load("inclination = 1.0")).system
-    start = initial(system)
-    other = start.copy()
-    other[-2:] = [np.cos(1.0), np.sin(1.0)]
-    np.testing.assert_array_equal(derivative(system, start, 0.0)[:7], derivative(system, other, 5.0)[:7])

@@ -13,31 +13,8 @@ from support import config, run_text
 import rigidsim
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged import resonance
-from rigidsim.model.averaged.hansen import hansen
-from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import parse
 from rigidsim.solve.problem import InitialValueProblem, prepare
-
-CONTEXT = context_for("double")
-
-
-def test_hansen_coefficients_have_their_published_series() -> None:
-    """H(p, e) of Goldreich & Peale 1966, as continued by Murray & Dermott 1999, eq. 5.77 ff."""
-    e = CONTEXT.mpf("0.01")
-    series = {
-        2: 1 - 5 * e**2 / 2 + 13 * e**4 / 16,
-        3: 7 * e / 2 - 123 * e**3 / 16,
-        1: -e / 2 + e**3 / 16,
-        4: 17 * e**2 / 2 - 115 * e**4 / 6,
-    }
-    for multiple, expected in series.items():
-        assert abs(hansen(CONTEXT, e, multiple, 2) - expected) < 30 * e**5  # the next terms
-    exact = context_for("quadruple")
-    # <(a/r)^3> = (1 - e^2)^(-3/2)
-    for eccentricity in ("0.2056", "0.7"):
-        f = exact.mpf(eccentricity)
-        assert abs(hansen(exact, f, 0, 0) * (1 - f * f) ** exact.mpf("1.5") - 1) < 1e-33
-
 
 MOMENTS = np.array([0.998, 0.999, 1.0])
 
@@ -270,8 +247,3 @@ def test_the_slow_energy_is_kept_on_an_orbit_that_rests() -> None:
 def test_what_a_resonance_can_not_give_is_refused(given: dict[str, str], said: str) -> None:
     with pytest.raises(ConfigError, match=said):
         averaged(1.005, 0.05, **given)
-
-
-def test_the_angle_is_no_other_scenes() -> None:
-    with pytest.raises(ConfigError, match=r'given "resonant_angle": is of.*where the body keeps pace'):
-        averaged(1.005, 0.05, level="full", record='"resonant_angle"')
