@@ -279,6 +279,11 @@ def python_page() -> str:
         + "\n\n".join(
             [
                 _directive("autoclass", "rigidsim.model.load.Load", members=True),
+                _directive("automodule", "rigidsim.model.capabilities", members=True),
+                *(
+                    _directive("autoclass", f"rigidsim.model.scaling.{name}", members=True)
+                    for name in ("Sized", "Swift", "BoundsFlight")
+                ),
                 _directive("autoclass", "rigidsim.model.observables.observable.Observable"),
                 _directive("autofunction", "rigidsim.model.observables.observable.continuous_angles"),
                 _directive("autofunction", "rigidsim.scene.registry.register_load"),

@@ -19,6 +19,7 @@ from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.driven import Driven, driven_by
 from rigidsim.model.averaged.free_motion import Separatrix
 from rigidsim.model.averaged.torques import reads_rates_alone
+from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.steppers import stepper_of
@@ -33,7 +34,7 @@ _RATES = ("wx", "wy", "wz")
 def is_braked(prepared: InitialValueProblem) -> bool:
     """Whether torques that are functions of the rates change a full motion's rotation lastingly."""
     plan = prepared.system.plan
-    alone = [load for load in plan.loads if load.gradient_source is None]
+    alone = [load for load in plan.loads if gradient_source_of(load) is None]
     return plan.average is None and bool(alone) and all(reads_rates_alone(load) for load in alone)
 
 
@@ -87,7 +88,7 @@ def forecast_pace(prepared: InitialValueProblem, pilot: Pilot) -> float | None:
 
 def _driven(prepared: InitialValueProblem) -> Driven | None:
     scene, plan = prepared.scene, prepared.system.plan
-    alone = [load for load in plan.loads if load.gradient_source is None]
+    alone = [load for load in plan.loads if gradient_source_of(load) is None]
     scaling = replace(prepared.system.scaling, rates=(0, 0, 0))
     try:
         return driven_by(scene, scaling, alone, float(precision_of("double").epsilon))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import heyoka as hy
 
 from rigidsim.model.canonical import MOMENTA, CanonicalStates, canonical_states, hamilton_equations
+from rigidsim.model.capabilities import Reacting, having, orbit_of, table_of
 from rigidsim.model.equations import (
     flight_equations,
     rate_equations,
@@ -194,7 +195,7 @@ def _point_mass_blocks(m: Mechanics) -> list[StateBlock]:
     states = m.point_masses
     if states is None:
         return []
-    states.react([part for load in m.loads for part in load.reaction(m)])
+    states.react([part for load in having(Reacting, m.loads) for part in load.reaction(m)])
     return [states.block()]
 
 
@@ -204,17 +205,17 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
     placed: dict[KeplerOrbit, list[str]] = {}
     carried: set[TabulatedOrbit] = set()
     for load in m.loads:
-        if load.orbit is not None:
-            placed.setdefault(load.orbit, []).append(load.title)
+        if (orbit := orbit_of(load)) is not None:
+            placed.setdefault(orbit, []).append(load.title)
     for load in m.loads:
-        if load.orbit is not None and load.orbit in placed:
-            titles = ", ".join(dict.fromkeys(placed.pop(load.orbit)))
-            block = m.orbit_block(load.orbit)
+        if (orbit := orbit_of(load)) is not None and orbit in placed:
+            titles = ", ".join(dict.fromkeys(placed.pop(orbit)))
+            block = m.orbit_block(orbit)
             blocks.append(replace(block, why=block.why or f"{titles}: where its source is"))
-        if load.table is not None and load.table not in carried:
-            carried.add(load.table)
-            block = m.table(load.table).block
-            blocks.append(replace(block, why=f'{load.title}: where its source is, by "{load.table.name}"'))
+        if (table := table_of(load)) is not None and table not in carried:
+            carried.add(table)
+            block = m.table(table).block
+            blocks.append(replace(block, why=f'{load.title}: where its source is, by "{table.name}"'))
         own = load.extra_states(m)
         if own is not None:
             blocks.append(replace(own, why=own.why or f"{load.title}: where its source is"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rigidsim.model import fixed_axes
+from rigidsim.model.capabilities import Attracting, having
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.scene.arithmetic import Vector, norm, parallel
@@ -13,7 +14,7 @@ def _pulling(m: Mechanics) -> list[Load]:
 
 
 def _points(m: Mechanics) -> list[Vector]:
-    return [load.attracting_point for load in m.loads if load.attracting_point is not None]
+    return [load.attracting_point for load in having(Attracting, m.loads)]
 
 
 def one_point(m: Mechanics) -> bool:
@@ -30,7 +31,7 @@ def line(m: Mechanics) -> Vector | None:
     if not points or one_point(m):
         return None
     directions = [[x - y for x, y in zip(point, points[0], strict=True)] for point in points[1:]]
-    others = [load for load in m.loads if load.attracting_point is None]
+    others = [load for load in m.loads if not isinstance(load, Attracting)]
     if m.scene.gravity is not None and any(load.uniform_field is not None for load in others):
         directions.append(m.scene.gravity)
     directions = [d for d in directions if any(x != 0 for x in d)]

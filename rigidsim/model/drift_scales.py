@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rigidsim.model.capabilities import Attracting, having
 from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.scaling import loads_amplitude, potential_amplitude, source_rate
@@ -77,7 +78,7 @@ def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
 
 def attracting_point(m: Mechanics) -> Vector:
     """Position of the (first) attracting point, m, space axes."""
-    return next(load.attracting_point for load in m.loads if load.attracting_point is not None)
+    return having(Attracting, m.loads)[0].attracting_point
 
 
 def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:

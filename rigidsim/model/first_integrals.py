@@ -15,6 +15,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.fixed_axes import about_vertical
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene import attitude
@@ -43,7 +44,7 @@ def equatorial_top(m: Mechanics) -> EquatorialTop | None:
     axis, arm = m.symmetry_direction, scene.torque_arm
     if m.vertical is None or axis is None or arm is None or scene.gravity is None:
         return None
-    if any(load.about_vertical and load.torque(m) for load in m.loads):
+    if any(about_vertical(load) and load.torque(m) for load in m.loads):
         return None
     tiny = negligible(context)
     length = norm(context, arm)

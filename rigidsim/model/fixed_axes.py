@@ -28,6 +28,12 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import (
+    SparesVertical,
+    TurnsAbout,
+    fixed_source_of,
+    linear_potential_of,
+)
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
@@ -51,12 +57,12 @@ def _size(matrix: Matrix) -> Any:
 
 
 def _linear(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Vector, Vector]]:
-    found = [load.linear_potential(m.scene) for load in loads]
+    found = [linear_potential_of(load, m.scene) for load in loads]
     return [pair for pair in found if pair is not None]
 
 
 def _sources(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Any, Vector]]:
-    found = [load.fixed_source(m.scene) for load in loads]
+    found = [fixed_source_of(load, m.scene) for load in loads]
     return [pair for pair in found if pair is not None]
 
 
@@ -84,10 +90,23 @@ def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bo
         if max(abs(turned[i][j] + turned[j][i]) for i in range(3) for j in range(i + 1)) > tiny * _size(s):
             return False
     return not any(
-        load.turns_about(m, axis)
+        _turns_about(m, load, axis)
         for load in turning
-        if load.linear_potential(m.scene) is None and load.fixed_source(m.scene) is None
+        if linear_potential_of(load, m.scene) is None and fixed_source_of(load, m.scene) is None
     )
+
+
+def about_vertical(load: Load) -> bool:
+    """Whether it may have a torque about the direction of gravity."""
+    return not isinstance(load, SparesVertical) or load.about_vertical
+
+
+def _turns_about(m: Mechanics, load: Load, axis: Vector) -> bool:
+    """Whether it may have a torque about a unit axis in space."""
+    if isinstance(load, TurnsAbout):
+        return load.turns_about(m, axis)
+    up = m.numbers.up
+    return about_vertical(load) or up is None or norm(m.scene.context, cross(up, axis)) != 0
 
 
 def field_axis(m: Mechanics) -> Vector | None:
@@ -171,7 +190,7 @@ def along(m: Mechanics, axis: Vector) -> Symbolic:
 def sources_alone(m: Mechanics) -> bool:
     """Whether all torque comes from fixed sources."""
     turning = m.turning
-    return bool(turning) and all(load.fixed_source(m.scene) is not None for load in turning)
+    return bool(turning) and all(fixed_source_of(load, m.scene) is not None for load in turning)
 
 
 def several_directions(m: Mechanics) -> bool:

@@ -16,6 +16,7 @@ from itertools import product
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.capabilities import Narrow, having
 from rigidsim.model.equations import vertical_from_attitude
 from rigidsim.model.formulations import BUILDERS
 from rigidsim.model.heyoka_expressions import to_heyoka
@@ -66,7 +67,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     torque = [term for load in loads for term in torque_terms(load, m)]
     force = [term for load in loads for term in force_terms(load, m)] if m.velocity is not None else []
     names, start = start_of(m, loads)
-    narrow = [u for load in loads for u in load.narrow(m)]
+    narrow = [u for load in having(Narrow, loads) for u in load.narrow(m)]
     in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})
     narrow += [to_heyoka(u, state_names(m, ("t",)), m.number, m.scene.context) for u in in_time]
     samples = _Samples(m, names, start, narrow)

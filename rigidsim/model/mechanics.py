@@ -8,12 +8,13 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import KeepsAxial, linear_potential_of
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.scaling import exponent
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.arithmetic import Vector, dot, negligible, norm
 from rigidsim.scene.tracing.numbers import largest_of
 
 
@@ -146,7 +147,7 @@ class Mechanics(Kinematics):
         """See ``Kinematics``: points to the centre of mass of a heavy body, or along the dipole of any
         other.
         """
-        pulled = [load.linear_potential(self.scene) for load in self.loads]
+        pulled = [linear_potential_of(load, self.scene) for load in self.loads]
         return self.numbers.arm or next((found[0] for found in pulled if found is not None), None)
 
     @property
@@ -155,4 +156,22 @@ class Mechanics(Kinematics):
         axis = self.symmetry_direction
         if axis is None:
             return False
-        return all(load.keeps_axial(self, axis) for load in self.turning)
+        return all(
+            load.keeps_axial(self, axis) if isinstance(load, KeepsAxial) else self._spares(terms, axis)
+            for load, terms in zip(self.loads, self._torques, strict=True)
+            if terms
+        )
+
+    def _spares(self, torque: list[Term], axis: Vector) -> bool:
+        """Whether the vectors of a torque have no part along an axis of the body."""
+        context = self.scene.context
+        tiny = negligible(context)
+        none = (
+            hy.expression(0.0),
+            hy.expression(self.number(context.zero)),
+        )  # zeros of two types aren't equal
+        return all(
+            abs(dot(vector, axis)) <= tiny * norm(context, vector)
+            for vector, expression in torque
+            if expression not in none
+        )

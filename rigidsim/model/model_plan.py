@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.capabilities import is_wide, orbit_of, table_of
 from rigidsim.model.frames.orbital import corotating_orbit
 from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load, loads_of
@@ -16,7 +17,7 @@ from rigidsim.model.numbers import ScaledNumbers, scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.planar import PlaneOfMotion, asked_plane, gradient_plane
 from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
-from rigidsim.model.scaling import Scaling, choose_scaling
+from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling
 from rigidsim.model.state_selection import PLANAR, Requirements, choose_requirements
 from rigidsim.scene.moments import happens_at_a_moment
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -64,7 +65,7 @@ class ModelPlan:
         if average is not None and average.resonance is not None:
             return True
         summed = average is not None and average.driven is not None and average.driven.course.nodes
-        return bool(summed) or any(load.wide for load in self.loads)
+        return bool(summed) or any(map(is_wide, self.loads))
 
 
 def plan_model(
@@ -99,7 +100,7 @@ def plan_model(
     if scaling is None and like is not None:
         scaling = choose_scaling(scene, like.scaling.drive)
     elif scaling is None:
-        unknown = [load for load in loads if load.amplitude(scene) is None]
+        unknown = [load for load in loads if amplitude_of(load, scene) is None]
         refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if requirements.canonical or plane is not None:
@@ -130,15 +131,15 @@ def plan_model(
 
 
 def _tables(scene: Scene, longitude: Carried = Carried.ECCENTRIC) -> dict[TabulatedOrbit, TablePlace]:
-    tables = [(str(number), load.table) for number, load in enumerate(loads_of(scene), start=1)]
+    tables = [(str(number), table_of(load)) for number, load in enumerate(loads_of(scene), start=1)]
     return places_of([(tag, table) for tag, table in tables if table is not None], longitude)
 
 
 def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
     tags: dict[KeplerOrbit, str] = {}
     for number, load in enumerate(loads_of(scene), start=1):
-        if load.orbit is not None:
-            tags.setdefault(load.orbit, str(number))
+        if (orbit := orbit_of(load)) is not None:
+            tags.setdefault(orbit, str(number))
     return tags
 
 

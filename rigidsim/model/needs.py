@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rigidsim.model import central_forces, fixed_axes
+from rigidsim.model.capabilities import Attracting, Damping, corotating_orbit_of
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.frames.local import first_source, flies_about_source
 from rigidsim.model.frames.reference_plane import flies_in_plane
@@ -48,7 +49,7 @@ def work_is_needed(m: Mechanics) -> bool:
     """Whether the energy balance is checked by integrating power: where energy isn't conserved and no Jacobi
     constant of a single load takes its place.
     """
-    has_jacobi = m.attitude is not None and len(m.loads) == 1 and m.loads[0].corotating_orbit is not None
+    has_jacobi = m.attitude is not None and len(m.loads) == 1 and corotating_orbit_of(m.loads[0]) is not None
     return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
 
 
@@ -102,7 +103,7 @@ def _sourced(m: Mechanics) -> bool:
     return (
         load is not None
         and m.attitude is not None
-        and (load.attracting_point is None or m.velocity is not None)
+        and (not isinstance(load, Attracting) or m.velocity is not None)
     )
 
 
@@ -118,7 +119,7 @@ def _isotropic_damping(m: Mechanics) -> bool:
     """Whether the body turns and every load that exerts a torque is a damping, with coefficients that add up
     to a multiple of the inertia tensor.
     """
-    found = [load.damping() for load in m.turning]
+    found = [load.damping() if isinstance(load, Damping) else None for load in m.turning]
     if not found or any(c is None for c in found) or all(w == 0 for w in m.scene.angular_velocity):
         return False
     total = [sum((c[i] for c in found if c is not None), m.scene.context.zero) for i in range(3)]
@@ -153,8 +154,6 @@ NEEDS: dict[str, Need] = {
     ),
     "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_no_point_masses),
     "free_fall": Need(lambda m: m.velocity is not None and central_forces.falls_freely(m)),
-    "attractor": Need(
-        lambda m: m.velocity is not None and any(x.attracting_point is not None for x in m.loads)
-    ),
+    "attractor": Need(lambda m: m.velocity is not None and any(isinstance(x, Attracting) for x in m.loads)),
 }
 """All needs, by the names that ``Observable.needs`` uses."""

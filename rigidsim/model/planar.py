@@ -20,6 +20,7 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
+from rigidsim.model.capabilities import KeepsPlane, has_source
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import Rounder, ScaledNumbers
@@ -84,7 +85,7 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     axis = _spin_axis(scene, loads)
     normal = apply(attitude.rotation_matrix(scene.quaternion), axis)
     for load in loads:
-        if not load.keeps_plane(scene, axis, normal):
+        if not _keeps(load, scene, axis, normal):
             raise NotPlanar(f"the torque of {load.title} may turn the body out of its plane")
     turned = _least_turn(context, axis, normal)
     # the remaining rotation is about the axis, and the scalar product gives its half angle
@@ -100,7 +101,7 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
 
 def gradient_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion | None:
     """The plane of a motion under gravity gradients if it stays in one; None otherwise."""
-    if not any(load.has_source for load in loads):
+    if not any(map(has_source, loads)):
         return None
     try:
         return plane_of(scene, loads)
@@ -177,6 +178,10 @@ def spin_equation(
     return hy.sum(terms) if terms else hy.expression(0.0)
 
 
+def _keeps(load: Load, scene: Scene, axis: Vector, normal: Vector) -> bool:
+    return isinstance(load, KeepsPlane) and load.keeps_plane(scene, axis, normal)
+
+
 def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
     """Axis that the body turns about; at rest, the principal axis that lies along an orbit's normal."""
     context, rates = scene.context, scene.angular_velocity
@@ -190,7 +195,7 @@ def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
         return axis
     matrix = attitude.rotation_matrix(scene.quaternion)
     for axis in scene.body.principal_axes[::-1]:
-        if all(load.keeps_plane(scene, axis, apply(matrix, axis)) for load in loads):
+        if all(_keeps(load, scene, axis, apply(matrix, axis)) for load in loads):
             return list(axis)
     raise NotPlanar("the body is at rest, and none of its principal axes is one that every torque is along")
 

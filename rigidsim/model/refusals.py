@@ -15,6 +15,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.capabilities import GradientAlone, Reacting
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load, force_terms, torque_terms
 from rigidsim.model.load_estimate import probe, start_of
@@ -125,10 +126,10 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
         return any(abs(strength - other) <= _SAME_BODY * other for other in others)
 
     for load in loads:
-        if not load.gradient_alone:
+        if not isinstance(load, GradientAlone):
             continue
-        if load.masses_beside:
-            named = [getattr(x, "number", None) for x in pulling if x.masses_beside and not x.gradient_alone]
+        if isinstance(load, Reacting):
+            named = [getattr(x, "number", None) for x in pulling if _flown_about(x)]
             if getattr(load, "number", None) in named:
                 what = "given beside central_gravity of the same body, which has its torque; remove it"
                 raise ConfigError(Problem(where, what))
@@ -142,6 +143,10 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
                 what = "given with the gravitational parameter of one of [[bodies]] and an orbit of its own; "
                 what += 'give orbit = {body = "..."}, which is where that body is'
                 raise ConfigError(Problem(where, what))
+
+
+def _flown_about(load: Load) -> bool:
+    return isinstance(load, Reacting) and not isinstance(load, GradientAlone)
 
 
 def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> Problem:

@@ -7,9 +7,8 @@ are therefore measured in a unit of their own; results are multiplied back, exac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, runtime_checkable
 
 from rigidsim.scene.arithmetic import dot, norm
 from rigidsim.scene.scene import Scene
@@ -135,32 +134,50 @@ def potential_amplitude(scene: Scene) -> Any:
     return norm(scene.context, arm) * norm(scene.context, scene.gravity)
 
 
-class Estimated(Protocol):
-    """The part of a load's interface used here; see ``rigidsim.model.load.Load``."""
+@runtime_checkable
+class Sized(Protocol):
+    """A load of known size; others are estimated by trial (``rigidsim.model.load_estimate``)."""
 
     def amplitude(self, scene: Scene) -> Any | None:
-        """Largest change of the energy of rotation that it can cause, J; None if unknown."""
+        """Largest change of the energy of rotation that it can cause (mpf, J); None if unknown."""
+
+
+@runtime_checkable
+class Swift(Protocol):
+    """A load whose source may move."""
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """Fastest angular rate of its source, rad/s."""
+        """Fastest angular rate of the source as seen from the body (mpf, rad/s)."""
+
+
+@runtime_checkable
+class BoundsFlight(Protocol):
+    """A load that keeps the body near."""
 
     def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
-        """Largest distance (m) and speed (m/s) under this load alone; None if it doesn't bound the flight."""
+        """Largest distance from the origin (m) and speed (m/s) of a body that flies under this load alone;
+        None if it doesn't bound the flight.
+
+        Args:
+            fed: speed that loads of unknown size are estimated to add, m/s.
+        """
 
 
-def _loads(scene: Scene) -> Sequence[Estimated]:
-    return cast(Sequence[Estimated], scene.loads)
+def amplitude_of(load: object, scene: Scene) -> Any | None:
+    """The amplitude of a load that is ``Sized``; None if it is unknown."""
+    return load.amplitude(scene) if isinstance(load, Sized) else None
 
 
 def loads_amplitude(scene: Scene) -> Any:
     """Largest change of the energy of rotation, J, by all loads of known size except uniform gravity."""
-    known = [load.amplitude(scene) for load in _loads(scene)]
+    known = [amplitude_of(load, scene) for load in scene.loads]
     return sum((size for size in known if size is not None), scene.context.zero)
 
 
 def source_rate(scene: Scene) -> Any:
     """Fastest angular rate of any source seen from the body, rad/s; zero without one."""
-    return largest_of([load.fastest_rate(scene) for load in _loads(scene)] or [scene.context.zero])
+    rates = [load.fastest_rate(scene) for load in scene.loads if isinstance(load, Swift)]
+    return largest_of(rates or [scene.context.zero])
 
 
 def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
@@ -169,7 +186,8 @@ def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
     assert scene.position is not None
     assert scene.velocity is not None
     fed = context.zero if drive is None else drive.speed
-    bounds = [found for load in _loads(scene) if (found := load.flight_bounds(scene, fed)) is not None]
+    loads = [load for load in scene.loads if isinstance(load, BoundsFlight)]
+    bounds = [found for load in loads if (found := load.flight_bounds(scene, fed)) is not None]
     if len(bounds) == 1 and scene.gravity is None:
         return bounds[0]
     horizon = scene.end - scene.start

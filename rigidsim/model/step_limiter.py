@@ -24,6 +24,7 @@ from collections.abc import Mapping, Sequence
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import Narrow, Rooted
 from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
@@ -39,7 +40,7 @@ _CLOCK = "t_of_pace"  # stands in for the time, by which heyoka doesn't differen
 
 def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, argument) for all loads and events."""
-    found = [(load.title, u) for load in m.loads for u in load.narrow(m)]
+    found = [(load.title, u) for load in m.loads if isinstance(load, Narrow) for u in load.narrow(m)]
     angles = frozenset(ATTITUDE_NAMES[4:])
     for event in m.scene.events:
         names = state_names(m, event.reads, clocked=False)
@@ -54,7 +55,7 @@ def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
 
 def roots(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, radicand) for the roots of all loads."""
-    return [(load.title, v) for load in m.loads for v in load.roots(m)]
+    return [(load.title, v) for load in m.loads if isinstance(load, Rooted) for v in load.roots(m)]
 
 
 def pace_derivative(

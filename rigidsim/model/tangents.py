@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import orbit_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Observable, only_when_named
 from rigidsim.model.planar import ANGLE, SPIN
@@ -212,7 +213,7 @@ def _absent(m: Mechanics) -> str | None:
     if m.attitude is not None and m.attitude.kind == "euler_angles":
         return f'formulation = "{integrator.formulation}" has singularities that the vector would feel'
     driven = any(
-        load.orbit is not None for load in m.loads
+        orbit_of(load) is not None for load in m.loads
     )  # whose phase keeps the steps of any motion short
     if not driven and all(w == 0 for w in m.scene.angular_velocity):
         return "the body is at rest, where steps are as long as one likes; give it a small rate"

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rigidsim.errors import ConfigError
+from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.scene.model_table import FULL, REDUCED
 from rigidsim.session.tuning import AdviceLimits
 from rigidsim.solve.problem import InitialValueProblem, prepare
@@ -41,7 +42,7 @@ def cheaper_model(
     """
     config = prepared.scene.config
     loads = prepared.system.plan.loads
-    suited = bool(loads) and all(load.gradient_source is not None for load in loads)
+    suited = bool(loads) and all(gradient_source_of(load) is not None for load in loads)
     if steps < limits.steps or not suited or config.model.level != FULL or config.output.record is None:
         return None
     from rigidsim.accuracy.models.modelling import measure_modelling

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigidsim.model.capabilities import Rooted, having, table_of
 from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
 from rigidsim.session.timings import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words, told_loads
@@ -183,7 +184,8 @@ def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Asse
         reason = why_it_broke(prepared, progress.time)
         if reason:
             return text + reason
-        if any(load.roots(prepared.system.mechanics) for load in prepared.system.plan.loads):
+        m = prepared.system.mechanics
+        if any(load.roots(m) for load in having(Rooted, m.loads)):
             text += (
                 "; a root of zero has no series: if one of the loads vanished there, such as a norm, write "
                 "abs(u) for the component u that moves, or add a small number under the root"
@@ -259,7 +261,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
 
 
 def _tables(found: Diagnostics) -> dict[str, TableErrors]:
-    orbits = [load.table for load in found.prepared.system.plan.loads]
+    orbits = [table_of(load) for load in found.prepared.system.plan.loads]
     return {
         orbit.name: TableErrors(
             direction=orbit.error.direction, distance=orbit.error.distance, expected=orbit.error.expected

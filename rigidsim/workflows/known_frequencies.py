@@ -11,6 +11,7 @@ from typing import Any
 import mpmath
 
 from rigidsim.analysis.labels import Known
+from rigidsim.model.capabilities import GradientAlone, gradient_source_of, orbit_of
 from rigidsim.model.load import loads_of
 from rigidsim.scene.arithmetic import Vector, apply, dot, transpose
 from rigidsim.scene.attitude import rotation_matrix
@@ -48,10 +49,10 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
     found = []
     loads = loads_of(scene)
-    orbits = [load.orbit for load in loads if load.orbit is not None]
+    orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]
     for number, orbit in enumerate(orbits, 1):
         found += _of_orbit(orbit, str(number) if len(orbits) > 1 else "")
-    sources = [load.gradient_source for load in loads]
+    sources = [gradient_source_of(load) for load in loads]
     if any(source is not None and source.ephemeris for source in sources):
         found += _delaunay(scene)
     librations = _librations(scene, orbits[0]) if len(orbits) == 1 == len(loads) else []
@@ -177,7 +178,7 @@ def _of_spin(scene: Scene) -> list[Known]:
         if abs(third) <= 3 * context.hypot(rates[across[0]], rates[across[1]]):
             continue
         # gravity gradients leave a symmetric body its axial rate, and hardly change its wobble
-        pulled = all(load.gradient_alone for load in loads_of(scene))
+        pulled = all(isinstance(load, GradientAlone) for load in loads_of(scene))
         symmetric = abs(a - b) <= 1e-12 * c and pulled
         source = "initial rate about the principal axis"
         body = "body" if symmetric else ""

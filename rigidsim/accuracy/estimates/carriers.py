@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidsim.accuracy.estimates.course import Course
 from rigidsim.accuracy.estimates.margins import Margins
+from rigidsim.model.capabilities import Ahead, having, is_wide
 from rigidsim.model.system import System
 from rigidsim.scene.moments import acts_at_moments_alone
 from rigidsim.solve.effects.angle_wrapping import STEPS_BETWEEN
@@ -103,9 +104,9 @@ def loose(prepared: InitialValueProblem) -> bool:
 
 def plain_pushes(system: System) -> Pushes:
     """Errors of a step in quaternions or rates at the precision's own tolerance."""
-    ahead = max((load.seconds_ahead for load in system.plan.loads), key=abs, default=0.0)
+    ahead = max((x.seconds_ahead for x in having(Ahead, system.plan.loads)), key=abs, default=0.0)
     plain = Pushes(ahead=math.ldexp(ahead, -system.scaling.time))
-    if not any(load.wide for load in system.plan.loads):
+    if not any(map(is_wide, system.plan.loads)):
         return plain
     return replace(plain, clock=_OF_SERIES * plain.clock, together=_WITHIN_MONTH)
 

@@ -20,6 +20,7 @@ from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.averaged.torques import reads_rates_alone
+from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.load import Load
 from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.readable_time import span_text
@@ -53,7 +54,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         ConfigError: no average applies; says why.
     """
     config, level = scene.config, scene.config.model.level
-    alone = [load for load in loads if load.gradient_source is None]
+    alone = [load for load in loads if gradient_source_of(load) is None]
     integrator = config.integrator
     against: str | None = None
     if scene.free_flight:
@@ -92,7 +93,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = 'coupling = "full" makes the bodies feel every rotation of this one'
         raise _refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
     elif level == ORBIT_AVERAGED:
-        sources = [load.gradient_source for load in loads]
+        sources = [gradient_source_of(load) for load in loads]
         if beside := [source.pair.name for source in sources if source is not None and source.pair]:
             against = f'the orbit of the point mass "{beside[0]}" is integrated, so that there is no '
             against += "ellipse to average over"

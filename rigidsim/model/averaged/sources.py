@@ -19,6 +19,7 @@ from rigidsim.model.averaged.orbit_terms import (
     turned,
 )
 from rigidsim.model.averaged.spectrum import orbit_harmonics
+from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.load import Load
 from rigidsim.model.orbits.point_mass_pair import PointMassPair
@@ -250,7 +251,7 @@ def sources_of(scene: Scene, loads: Sequence[Load]) -> list[Source]:
     """Sources of all gravity gradients of a scene, with their strengths."""
     context, found = scene.context, []
     for number, load in enumerate(loads, start=1):
-        source = load.gradient_source
+        source = gradient_source_of(load)
         if source is not None:
             strength = 3 * source.gravitational_parameter / source.distance(context) ** 3
             seen = None if source.pair is None else Osculating.of(context, source.pair)

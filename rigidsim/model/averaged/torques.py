@@ -20,6 +20,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed, nodes_needed
+from rigidsim.model.capabilities import Damping, Reacting, has_source, orbit_of, table_of
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder, ScaledNumbers
@@ -41,7 +42,8 @@ _BITS_CHECKED = 40
 
 def reads_rates_alone(load: Load) -> bool:
     """Whether a load is a function of the body's rates, in body axes, that doesn't depend on time."""
-    return not (load.reads or load.orbit or load.table or load.has_source or load.masses_beside)
+    placed = orbit_of(load) or table_of(load) or has_source(load) or isinstance(load, Reacting)
+    return not (load.reads or placed)
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class DrivingTorques:
         context, others = scene.context, []
         damping = [context.zero] * 3
         for load in loads:
-            coefficients = load.damping()
+            coefficients = load.damping() if isinstance(load, Damping) else None
             if coefficients is None:
                 others.append(load)
                 continue

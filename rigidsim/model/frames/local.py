@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import Sourced, fixed_source_of, has_source, plane_of
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
@@ -51,18 +52,20 @@ class LocalFrame:
 
 def first_source(loads: Iterable[Load]) -> Load | None:
     """The load whose source defines the local frame; None if no load has a source."""
-    return next((load for load in loads if load.has_source), None)
+    return next((load for load in loads if has_source(load)), None)
 
 
 def flies_about_source(scene: Scene) -> bool:
     """Whether the source's direction is that of the body's own flight."""
     load = first_source(loads_of(scene))
-    return load is not None and load.plane is not None and load.plane.flown
+    plane = plane_of(load)
+    return plane is not None and plane.flown
 
 
 def local_frame(m: Mechanics) -> LocalFrame:
     """The local frame of the first source."""
     load = m.carried(first_source(m.loads))
+    assert isinstance(load, Sourced)
     down = m.carried(load.source_direction(m))
     normal, described = _normal(m, load, down)
     return LocalFrame(down, normal, f"source: {load.title}, number {m.loads.index(load) + 1}; {described}")
@@ -72,20 +75,19 @@ def moves_slowly_in_orbit(m: Mechanics) -> bool:
     """Whether the scene is about the body's attitude in its orbit: a prescribed one or free flight, and at
     most two turns per revolution at the start.
     """
-    load = first_source(m.loads)
-    if load is None:
-        return False
-    rate = None if load.plane is None else load.plane.rate(m.scene)
+    plane = plane_of(first_source(m.loads))
+    rate = None if plane is None else plane.rate(m.scene)
     return rate is not None and bool(norm(m.scene.context, m.scene.angular_velocity) <= _SLOW * rate)
 
 
 def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbolic], str]:
     if m.attitude is not None and m.attitude.orbital is not None:
         return m.attitude.orbital.normal, "normal of its orbit"
-    if load.plane is not None and load.plane.called:
-        return apply(transpose(m.matrix), load.plane.normal(m)), load.plane.called
+    plane = plane_of(load)
+    if plane is not None and plane.called:
+        return apply(transpose(m.matrix), plane.normal(m)), plane.called
     which, described = 2, "space Z, across the source's direction, as the normal"
-    fixed = load.fixed_source(m.scene)
+    fixed = fixed_source_of(load, m.scene)
     if fixed is not None and all(x == 0 for x in fixed[1][:2]):
         which, described = 0, "space X as the normal"
     pole = m.matrix[which]

@@ -19,6 +19,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import rotations
+from rigidsim.model.capabilities import corotating_orbit_of
 from rigidsim.model.formulations import AttitudeStates, OrbitalFrame, quaternion_kinematics
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder
@@ -37,7 +38,7 @@ def corotating_orbit(scene: Scene, loads: Sequence[Load], formulation: str) -> K
     readers = [load for load in loads if {"attitude", "vertical"} & load.reads]
     if formulation != "quaternion" or scene.torque_arm is not None or len(readers) != 1:
         return None
-    return readers[0].corotating_orbit
+    return corotating_orbit_of(readers[0])
 
 
 def orbital_states(

@@ -17,6 +17,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.capabilities import WithoutPlane, having, plane_of
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbit_planes import OrbitPlane
@@ -98,10 +99,10 @@ def plane_drift(scene: Scene, loads: Sequence[Load]) -> Any | None:
 def _orbit_plane(loads: Sequence[Load]) -> OrbitPlane:
     """Plane of the first load that has one."""
     for load in loads:
-        if load.plane is not None:
-            return load.plane
+        if (plane := plane_of(load)) is not None:
+            return plane
     what = f'given "{ORBIT}", but no load of the scene has an orbit whose plane is known'
-    why = next((load.without_plane for load in loads if load.without_plane), "")
+    why = next((x.without_plane for x in having(WithoutPlane, loads) if x.without_plane), "")
     what += f" ({why})" if why else ""
     raise ConfigError(Problem("[frame] reference", what + '; "space" or a normal [x, y, z] is allowed'))
 

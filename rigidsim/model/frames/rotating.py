@@ -12,6 +12,7 @@ from operator import add
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import corotating_orbit_of
 from rigidsim.model.fixed_axes import keeps, parallel
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
@@ -36,10 +37,10 @@ def _same_frame(m: Mechanics, a: KeplerOrbit, b: KeplerOrbit) -> bool:
 
 def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
     """An orbit with whose frame all potentials turn; None if there is none."""
-    orbits = [load.corotating_orbit for load in m.turning if load.corotating_orbit is not None]
+    orbits = [orbit for load in m.turning if (orbit := corotating_orbit_of(load)) is not None]
     if not orbits or not all(_same_frame(m, orbits[0], orbit) for orbit in orbits[1:]):
         return None
-    others = [load for load in m.turning if load.corotating_orbit is None]
+    others = [load for load in m.turning if corotating_orbit_of(load) is None]
     if not all(load.conservative for load in others) or not keeps(m, _normal(m, orbits[0]), others):
         return None
     return orbits[0]

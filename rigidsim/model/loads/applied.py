@@ -12,6 +12,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import span_words, value_text
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.state_names import state_names
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
@@ -107,7 +108,6 @@ class Applied(Load):
 
     @classmethod
     def resolve(cls, fields: Any, around: Surroundings) -> Applied:
-        """See ``SceneLoad``."""
         names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if around.free_flight else ()))
         components = []
         for i, text in enumerate(fields.components):
@@ -126,7 +126,6 @@ class Applied(Load):
         return not all(_vanishes(component) for component in self.components)
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
-        """See ``SceneLoad``."""
         for i, component in enumerate(self.components):
             yield f"[[loads]] number {self.number + 1} components[{i}]", component
 
@@ -146,13 +145,9 @@ class Applied(Load):
 
     @property
     def described(self) -> str:  # type: ignore[override]
-        """See ``Load``."""
         return f"a {self.title} given by expressions"
 
     def told(self, scene: Scene) -> str:
-        """See ``Load``."""
-        from rigidsim.model.load_words import value_text
-
         context, values = scene.context, start_values(scene)
         found = [evaluate(component, values, context) for component in self.components]
         texts = ", ".join(_brief(component.text) for component in self.components)
@@ -164,8 +159,6 @@ class Applied(Load):
 
     def _effect(self, scene: Scene, found: Vector) -> str:
         """What a torque or force of this size at the start would do, in words."""
-        from rigidsim.model.load_words import span_words, value_text
-
         context = scene.context
         turning = found if self.title == "torque" else self._moment(scene, found)
         size, momentum = (
@@ -254,7 +247,6 @@ class Torque(Applied):
         )
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """See ``Load``."""
         size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)
         return list(zip(diagonal([size] * 3), self._in_body(m), strict=True))
 

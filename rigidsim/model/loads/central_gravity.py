@@ -9,13 +9,15 @@ from typing import Any, Literal
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.gradient import gradient_terms, tidal_range
-from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
+from rigidsim.model.gradient import tidal_range
+from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.loads.gravity_gradient import positive_strength
-from rigidsim.model.loads.moving_source import MovingSource
+from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
+from rigidsim.model.loads.moving_source import MovingAttractor
+from rigidsim.model.loads.point_attraction import PointAttraction, positive_strength
 from rigidsim.model.numbers import unit_vectors
-from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.plausibility import about_start, about_strength, attracting
+from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
@@ -47,8 +49,8 @@ class CentralGravityFields(LoadFields):
 
 @register_load
 @dataclass(frozen=True)
-class CentralGravity(Load):
-    """A point that attracts a free body: U = -GMm/r - (GM/2r^3)(tr I - 3 c . I c), c = R^T r/|r|.
+class CentralGravity(PointAttraction):
+    """A point at rest that attracts a free body.
 
     Attributes:
         position: position of the point, space axes, m (mpf).
@@ -61,11 +63,9 @@ class CentralGravity(Load):
     described = "a central-gravity load"
     reads = frozenset({"attitude", "flight"})
     conservative = True
-    has_source = True
 
     @classmethod
     def resolve(cls, fields: CentralGravityFields, around: Surroundings) -> Load:
-        """See ``SceneLoad``."""
         if fields.orbit is not None:
             if fields.orbit.body is None:
                 raise around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed")
@@ -73,7 +73,7 @@ class CentralGravity(Load):
             for key in ("gravitational_parameter", "position"):
                 if key in fields.model_fields_set:
                     raise around.fault(key, "given beside orbit.body, which says it; remove it")
-            return MovingSource(around.carried_bodies, number, pulls=True)
+            return MovingAttractor(around.carried_bodies, number)
         strength = positive_strength(fields.gravitational_parameter, around)
         return cls(strength, [x.at(around.context) for x in fields.position])
 
@@ -98,58 +98,24 @@ class CentralGravity(Load):
             raise ConfigError(Problem(where, "the body starts at the attracting point; start it elsewhere"))
 
     @property
-    def attracting_point(self) -> Vector:  # type: ignore[override]
+    def attracting_point(self) -> Vector:
         """The point to which the force points, except for the effect of the body's own shape."""
         return self.position
 
-    def geometry(self, m: Kinematics) -> tuple[list[Symbolic], list[Symbolic], Symbolic]:
-        """Unit direction from the attracting point in space axes and in body axes, and 1/r (1/length)."""
-        space, inverse = m.seen_from(self.position)
-        return space, apply(transpose(m.matrix), space), inverse
+    @property
+    def strength(self) -> Any:
+        return self.gravitational_parameter
 
-    def source_direction(self, m: Kinematics) -> list[Symbolic]:
-        """Unit vector to the attracting point, body axes."""
-        return [-x for x in self.geometry(m)[1]]
-
-    def _strength(self, m: Kinematics, length_power: int, extra: int) -> Any:
-        """G M over length^power times 2^extra, internal units."""
-        exponent = extra - length_power * m.scaling.length
-        return m.scene.context.ldexp(self.gravitational_parameter, exponent)
-
-    def torque(self, m: Kinematics) -> list[Term]:
-        """Torque (3 G M / r^3) c x (I c)."""
-        _, body, inverse = self.geometry(m)
-        return gradient_terms(m, body, self._strength(m, 3, 2 * m.scaling.time), inverse**3)
+    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
+        return m.seen_from(self.position)
 
     def force(self, m: Kinematics) -> list[Term]:
         """-GM r/r^3 - (3GM / 2 M r^4)[(tr I - 5 c . I c) r/|r| + 2 R I c] (physics of MacCullagh)."""
-        scaling = m.scaling
-        space, body, inverse = self.geometry(m)
-        shift = scaling.time - scaling.speed
-        point = m.number(self._strength(m, 2, shift)) * inverse**2
-        ratio = self._strength(m, 4, shift + scaling.inertia) * 3 / (2 * m.carried(m.scene.body.mass))
-        second = m.number(ratio) * inverse**4
-        trace = sum(m.numbers.inertia[i][i] for i in range(3))
-        radial = point + second * (m.number(trace) - 5.0 * quadratic_form(m, body))
-        turned = apply(m.matrix, inertia_times(m, body))
-        terms: list[Term] = []
-        for i, axis in enumerate(unit_vectors(m.scene.context)):
-            terms.append(([-x for x in axis], radial * space[i] + 2.0 * second * turned[i]))
-        return terms
+        pairs = zip(unit_vectors(m.scene.context), *self.pull(m, as_point=True), strict=True)
+        return [([-x for x in axis], radial + turned) for axis, radial, turned in pairs]
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """Potential energy to second degree."""
-        scaling = m.scaling
-        _, body, inverse = self.geometry(m)
-        point = self._strength(m, 1, -scaling.energy) * m.scene.body.mass
-        second = self._strength(m, 3, scaling.inertia - scaling.energy) / 2
-        trace = sum(m.numbers.inertia[i][i] for i in range(3))
-        bracket = m.number(trace) - 3.0 * quadratic_form(m, body)
-        return -(m.number(point) * inverse) - m.number(second) * inverse**3 * bracket
-
-    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
-        """True: c x (I c) has no component along an axis of symmetry."""
-        return True
+        return -self.as_point(m) - self.second_degree(m)
 
     # --- estimates, from the Kepler orbit through the initial state --------------------------------------
 
@@ -185,7 +151,6 @@ class CentralGravity(Load):
         return momentum / self.nearest_approach(scene) ** 2
 
     def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any]:
-        """See ``Load``."""
         context, strength = scene.context, self.gravitational_parameter
         assert scene.position is not None
         horizon = scene.end - scene.start
@@ -200,9 +165,6 @@ class CentralGravity(Load):
         return norm(context, scene.position) + (swiftest + fed) * horizon, swiftest + fed
 
     def told(self, scene: Scene) -> str:
-        """See ``Load``."""
-        from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
-
         context, strength = scene.context, self.gravitational_parameter
         offset, speed = self._relative(scene)
         distance = norm(context, offset)
@@ -216,9 +178,6 @@ class CentralGravity(Load):
         return f"central gravity of {source}, {path}; torque up to {value_text(self.amplitude(scene), 'N m')}"
 
     def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
-        """See ``Load``."""
-        from rigidsim.model.plausibility import about_start, about_strength, attracting
-
         given = fields.gravitational_parameter
         assert given is not None
         assert scene.velocity is not None

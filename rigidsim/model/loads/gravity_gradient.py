@@ -16,10 +16,14 @@ from rigidsim.model.gradient import gradient_terms, tidal_range
 from rigidsim.model.gradient_source import GradientSource
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.loads.moving_source import MovingSource
+from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
+from rigidsim.model.loads.moving_source import MovingGradient
+from rigidsim.model.loads.point_attraction import positive_strength
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.orbits.ephemeris import SourcePosition, source_position
+from rigidsim.model.plausibility import about_distance, about_orbit, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.spin_plausibility import about_spin
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
@@ -78,16 +82,14 @@ class GravityGradient(Load):
     described = "a gravity-gradient load"
     reads = frozenset({"attitude"})
     has_source = True
-    gradient_alone = True
 
     @classmethod
     def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> Load:
-        """See ``SceneLoad``."""
         if fields.orbit is not None and fields.orbit.body is not None:
             for key in ("gravitational_parameter", "position", "ephemeris"):
                 if getattr(fields, key) is not None:
                     raise around.fault(key, "given beside orbit.body, which says it; remove it")
-            return MovingSource(around.carried_bodies, attracting_body(fields.orbit, around), pulls=False)
+            return MovingGradient(around.carried_bodies, attracting_body(fields.orbit, around))
         strength, context = positive_strength(fields.gravitational_parameter, around), around.context
         given = [key for key in ("orbit", "position", "ephemeris") if getattr(fields, key) is not None]
         if len(given) != 1:
@@ -125,7 +127,7 @@ class GravityGradient(Load):
         return shown
 
     @property
-    def gradient_source(self) -> GradientSource:  # type: ignore[override]
+    def gradient_source(self) -> GradientSource:
         """The source of this gradient."""
         return GradientSource(
             self.gravitational_parameter, self.orbit, self.table, self.position, self.ephemeris, self.epoch
@@ -137,28 +139,27 @@ class GravityGradient(Load):
         return self.position is not None
 
     @property
-    def wide(self) -> bool:  # type: ignore[override]
+    def wide(self) -> bool:
         """Whether an analytic series, which has thousands of terms, gives the source's position."""
         return self.ephemeris is not None
 
     @property
-    def corotating_orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
+    def corotating_orbit(self) -> KeplerOrbit | None:
         """The source's orbit, if it is circular and in a fixed plane."""
         orbit = self.orbit
         return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
 
     @property
     def plane(self) -> OrbitPlane | None:
-        """Plane of the source's orbit, or the ecliptic for the Sun's series."""
-        return EclipticPlane() if self.ephemeris == "sun" else super().plane
+        """The ecliptic for the Sun's series."""
+        return EclipticPlane() if self.ephemeris == "sun" else None
 
     @property
-    def without_plane(self) -> str:  # type: ignore[override]
-        """See ``Load``."""
+    def without_plane(self) -> str:
         return "the series of the Moon alone names none" if self.ephemeris == "moon" else ""
 
     @property
-    def seconds_ahead(self) -> float:  # type: ignore[override]
+    def seconds_ahead(self) -> float:
         """Time of the scene's epoch since J2000, in which the series count."""
         if self.ephemeris is None or self.epoch is None:
             return 0.0
@@ -254,9 +255,6 @@ class GravityGradient(Load):
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
     def told(self, scene: Scene) -> str:
-        """See ``Load``."""
-        from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
-
         strength, context = self.gravitational_parameter, scene.context
         if self.orbit is not None:
             where = orbit_text(self.orbit, strength)
@@ -271,14 +269,9 @@ class GravityGradient(Load):
         return f"gravity gradient of {source_text(strength)}, {where}; torque up to {largest}"
 
     def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
-        """See ``Load``."""
-        from rigidsim.model.plausibility import about_distance, about_orbit, about_strength, attracting
-
         given = fields.gravitational_parameter
         assert given is not None
         if fields.orbit is not None and self.orbit is not None:
-            from rigidsim.model.spin_plausibility import about_spin  # which other scenes don't need
-
             yield from about_orbit(fields.orbit, self.orbit, given, where, scene)
             yield from about_spin(fields.orbit, self.orbit, given, where, scene)
         elif fields.position is not None:
@@ -287,16 +280,3 @@ class GravityGradient(Load):
             yield from about_distance(
                 attracting(given, distance), distance, fields.position, f"{where} position"
             )
-
-
-def positive_strength(given: Any, around: Surroundings) -> Any:
-    """A gravitational parameter, m^3/s^2 (mpf).
-
-    Raises:
-        ConfigError: it is missing or isn't positive.
-    """
-    if given is None:
-        raise around.fault("gravitational_parameter", "missing; it is needed")
-    if given.sign <= 0:
-        raise around.fault("gravitational_parameter", f"given {float(given):g}; a positive number is allowed")
-    return given.at(around.context)

@@ -12,9 +12,12 @@ import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.capabilities import Attracting, having
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
+from rigidsim.model.load_words import length_text, orbit_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
+from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, dot, negligible, norm
@@ -92,7 +95,6 @@ class MagneticDipole(Load):
 
     @classmethod
     def resolve(cls, fields: MagneticDipoleFields, around: Surroundings) -> MagneticDipole:
-        """See ``SceneLoad``."""
         flies = around.free_flight and fields.source_moment is not None
         _refuse_contradictions(fields, around)
         strength = fields.gravitational_parameter
@@ -141,7 +143,7 @@ class MagneticDipole(Load):
         return self.uniform
 
     @property
-    def has_source(self) -> bool:  # type: ignore[override]
+    def has_source(self) -> bool:
         """Whether the body moves along an orbit about the dipole."""
         return self.orbit is not None
 
@@ -165,7 +167,7 @@ class MagneticDipole(Load):
         """
         if self.place:
             return self.place
-        points = [load.attracting_point for load in loads_of(scene) if load.attracting_point is not None]
+        points = [load.attracting_point for load in having(Attracting, loads_of(scene))]
         if not points or any(point != points[0] for point in points):
             found = "several points" if points else "no point at rest"
             what = f"missing; it is needed where {found} attracts the body by central_gravity"
@@ -244,10 +246,6 @@ class MagneticDipole(Load):
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
     def told(self, scene: Scene) -> str:
-        """See ``Load``."""
-        from rigidsim.model.load_words import length_text, orbit_text, value_text
-        from rigidsim.model.plausibility import implied_strength
-
         moment = f"magnetic dipole of {value_text(norm(scene.context, self.moment), 'A m^2')}"
         largest = f"torque up to {value_text(self.amplitude(scene) / 2, 'N m')}"
         if self.uniform:
@@ -261,9 +259,6 @@ class MagneticDipole(Load):
         return f"{moment} in the field of a dipole of {source}, {where}; {largest}"
 
     def cautions(self, fields: MagneticDipoleFields, where: str, scene: Scene) -> Iterator[Caution]:
-        """See ``Load``."""
-        from rigidsim.model.plausibility import about_orbit
-
         if self.orbit is not None and fields.orbit is not None:
             yield from about_orbit(fields.orbit, self.orbit, fields.gravitational_parameter, where, scene)
 

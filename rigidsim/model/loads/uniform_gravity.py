@@ -12,6 +12,7 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import direction_text, value_text
 from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
@@ -63,7 +64,6 @@ class UniformGravity(Load):
 
     @classmethod
     def resolve(cls, fields: UniformGravityFields, around: Surroundings) -> UniformGravity:
-        """See ``SceneLoad``."""
         return cls([a.at(around.context) for a in fields.acceleration])
 
     @classmethod
@@ -136,9 +136,6 @@ class UniformGravity(Load):
         return None if scene.torque_arm is None else (scene.torque_arm, self.acceleration)
 
     def told(self, scene: Scene) -> str:
-        """See ``Load``."""
-        from rigidsim.model.load_words import direction_text, value_text
-
         if all(g == 0 for g in self.acceleration):
             return "uniform gravity of zero"
         size = value_text(norm(scene.context, self.acceleration), "m/s^2", 6)
@@ -148,7 +145,6 @@ class UniformGravity(Load):
         return f"{field}: free fall" if scene.free_flight else f"{field}: no effect about the centre of mass"
 
     def cautions(self, fields: UniformGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
-        """See ``Load``."""
         pull = [float(x) for x in fields.acceleration]
         size = math.hypot(*pull)
         standard = abs(size / STANDARD_GRAVITY - 1) < _ON_EARTH or size == 10

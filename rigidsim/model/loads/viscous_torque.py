@@ -9,6 +9,7 @@ from pydantic import Field
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import span_words
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, Triple
 from rigidsim.scene.readable_time import number_text
@@ -38,7 +39,6 @@ class ViscousTorque(Load):
 
     @classmethod
     def resolve(cls, fields: ViscousTorqueFields, around: Surroundings) -> ViscousTorque:
-        """See ``SceneLoad``."""
         for i, coefficient in enumerate(fields.coefficients):
             if coefficient.sign < 0:
                 given = f"given {float(coefficient):g}; zero or more is allowed"
@@ -50,7 +50,6 @@ class ViscousTorque(Load):
         return any(c != 0 for c in self.coefficients)
 
     def damping(self) -> Vector | None:
-        """See ``Load``."""
         return self.coefficients
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
@@ -75,8 +74,6 @@ class ViscousTorque(Load):
 
     def told(self, scene: Scene) -> str:
         """See ``Load``; the times are those of the rates about the body axes, moment over coefficient."""
-        from rigidsim.model.load_words import span_words
-
         sizes = ", ".join(number_text(float(c), 4) for c in self.coefficients)
         inertia = scene.body.inertia
         spans = [

@@ -12,6 +12,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import Reacting
 from rigidsim.model.drift_scales import rotational_scale
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import SPACE, Observable, same_unit
@@ -148,7 +149,7 @@ def _flat(vectors: Sequence[list[Symbolic]]) -> list[Symbolic]:
 def _kept(m: Mechanics) -> str | None:
     if not _masses(m).full:
         return "the point masses feel each other's gravity alone"
-    if any(not load.masses_beside for load in m.loads):
+    if any(not isinstance(load, Reacting) for load in m.loads):
         return None
     return "all forces are those of the bodies on each other"
 

@@ -6,6 +6,8 @@ motion, wobble and a rotation angle. Tops and tumbling bodies have neither by de
 
 from __future__ import annotations
 
+from rigidsim.model.capabilities import Reacting, gradient_source_of, orbit_of, table_of
+from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.scaling import source_rate
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
@@ -30,17 +32,19 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
     return bool(across <= _AXIAL * aligned) and principal
 
 
+def _moves(load: Load) -> bool:
+    source = gradient_source_of(load)
+    series = source is not None and source.ephemeris
+    return bool(orbit_of(load) or table_of(load) or series or isinstance(load, Reacting))
+
+
 def is_planet(m: Mechanics) -> bool:
     """Whether the scene is a fast spin that precesses under the gravity gradient of an orbiting or ephemeris
     body.
     """
     if m.attitude is None or not m.turning:
         return False
-    distant = [
-        x
-        for x in m.turning
-        if x.orbit or x.table or x.masses_beside or getattr(x, "ephemeris", None) is not None
-    ]
+    distant = [x for x in m.turning if _moves(x)]
     fast = norm(m.scene.context, m.scene.angular_velocity) >= _FAST * source_rate(m.scene)
     return len(distant) == len(m.turning) and bool(fast) and _turns_about_its_figure(m)
 
