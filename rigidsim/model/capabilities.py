@@ -191,7 +191,7 @@ class Rooted(Protocol):
 
 
 @runtime_checkable
-class Wide(Protocol):
+class Lengthy(Protocol):
     """``wide`` is True for expressions too long to be unrolled (series of thousands of terms)."""
 
     wide: bool
@@ -237,7 +237,7 @@ def has_source(load: object) -> bool:
 
 def is_wide(load: object) -> bool:
     """Whether its expressions are too long to be unrolled."""
-    return isinstance(load, Wide) and load.wide
+    return isinstance(load, Lengthy) and load.wide
 
 
 def plane_of(load: object) -> OrbitPlane | None:
